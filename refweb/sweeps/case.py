@@ -174,6 +174,8 @@ def cells_of(summary):
     for name, result in summary["results"].items():
         cells[f"{name} [{result['unit']}]"] = result["value"]
         cells[f"{name} ±"] = result["error"]
+        if "verdict" in result:
+            cells[f"{name} verdict"] = result["verdict"]
         if result.get("interval") is not None:
             lower, upper = result["interval"]
             cells[f"{name} least"] = -float("inf") if lower is None else lower

@@ -92,10 +92,9 @@ def judged(solution, name):
             f"The net holds the {name}.",
             "holds",
             f"the centre of the {name} is inside, the mouth is closed{doubt}, the net covers {covered} of all "
-            f"directions, the largest stress is {solution.utilisation[0]:.2f} of the strength: numbers of one motion of "
-            f"many, found in "
-            f"{solver['nsteps']} steps, {solution.cost['cpu_s'] - solution.cost['compile_s']:.0f} s of CPU time with "
-            "the twin",
+            f"directions, the largest stress is {solution.utilisation[0]:.2f} of the strength: numbers of one motion "
+            f"of many, found in {solver['nsteps']} steps, "
+            f"{solution.cost['cpu_s'] - solution.cost['compile_s']:.0f} s of CPU time with the twin",
             throw["inside"]["drawn"] and throw["closed"]["drawn"],
         ),
     ]
