@@ -276,15 +276,15 @@ def _add_errors_of_shares(simulation, run, twin, rows, factor, known):
     solution, largest = simulation.solution, run.course.largest
     tables = (rows, simulation.share_rows), (twin.rows, twin.share_rows)
     compared = [np.column_stack([table[:, 0], shares, table[:, -1]]) for table, shares in tables]
-    found = with_errors(run.shares, run.share_corrections, twin.shares, *compared, factor, energy=largest)
+    results = with_errors(run.shares, run.share_corrections, twin.shares, *compared, factor, energy=largest)
     if run.course.stopped and len(rows) > 1:
-        _add_lateness(found, solution.events, compared[0][-2:])
-    errors = {name: share.error if share.time < known else None for name, share in found.items()}
+        _add_lateness(results, solution.events, compared[0][-2:])
+    errors = {name: share.error if share.time < known else None for name, share in results.items()}
     solution.utilisation = solution.utilisation._replace(error=errors["utilisation"])
-    error, margin = errors.get("margin", errors["utilisation"]), solution.margin
-    if (
-        "margin" not in errors and error is not None and margin["allowed"]
-    ):  # one line has both: one is that over a share
+    margin, error = solution.margin, errors["utilisation"]
+    if "margin" in errors:
+        error = errors["margin"]
+    elif error is not None and margin["allowed"]:  # the same stress, over another limit
         error *= margin["strength"] / margin["allowed"]
     solution.margin = {**margin, "error": error}
 

@@ -260,7 +260,7 @@ def side_of_mouth(outline, nodes, centre):
     size = np.linalg.norm(normal)
     if size == 0.0:
         return 0.0
-    of_centre, of_net = ((place - middle) @ normal / size for place in (centre, nodes.mean(axis=0)))
+    of_centre, of_net = ((position - middle) @ normal / size for position in (centre, nodes.mean(axis=0)))
     return float(np.sign(of_centre * of_net) * min(abs(of_centre), abs(of_net)))
 
 

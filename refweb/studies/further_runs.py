@@ -160,8 +160,8 @@ class FurtherRuns:
 
     def findings(self):
         """Errors by result, as far as these runs tell: ``parts``, ``reasons`` and ``mesh_only``."""
-        found: dict = {o.name: self._found_of(o) for o in self.scene.observables}
-        return found | {UTILISATION: {"parts": self._parts_of(UTILISATION)}}
+        errors: dict = {o.name: self._found_of(o) for o in self.scene.observables}
+        return errors | {UTILISATION: {"parts": self._parts_of(UTILISATION)}}
 
     def _parts_of(self, name):
         """Errors of a result by part of the model; of the utilisation, which has no history, by its largest value."""
