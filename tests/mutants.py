@@ -114,6 +114,8 @@ MIRRORS = {
     "effects/self_contact/table": "effects/test_self_contact.py",
     "results/columns": "test_build.py",
     "results/units": "results/test_loaded.py",
+    "results/strength": "results/test_strength.py",
+    "results/throw": "results/test_throw.py",
     "results/comparison": "results/test_comparison.py",
     "results/vtu_file": "results/test_frames.py",
     "results/state": "results/test_results.py results/test_observable_contract.py",
@@ -560,6 +562,19 @@ MUTANTS = [
     Mutant("reference/pages", 'f"[[{name}]]" if several', 'f"[[{name}]]" if not several'),
     Mutant("results/comparison", "for lower, _ in spans) <= min(", "for lower, _ in spans) < min("),
     Mutant("results/comparison", "len(spans) == len(results) and max", "max"),
+    # ± of derived numbers
+    Mutant(
+        "results/comparison", "verdicts = [verdict for verdict in MEANINGLESS if verdict in given]", "verdicts = []"
+    ),
+    Mutant("results/strength", "abs(value - 1.0) <= error", "value - 1.0 <= error"),
+    Mutant("results/strength", "error += utilisation.smoothing or 0.0", "pass"),
+    Mutant("results/throw", "decided = error is not None and abs(value) > error", "decided = error is not None"),
+    Mutant("results/throw", "return inside and (side or", "return inside or (side or"),
+    Mutant("results/throw", '{*values["bounds"], *(refined', '{*values["bounds"], *(() and refined'),
+    Mutant("sweeps/chances", '1.0 - count["false"] / n', 'count["true"] / n'),
+    Mutant(
+        "sweeps/chances", "0.0 if sampled else math.inf if error is None", "0.0 if sampled else 0.0 if error is None"
+    ),
 ]
 
 

@@ -65,6 +65,8 @@ def rows_of_spread(entry):
             [".2g" if key in short else ".4g" for key in keys] + [".4g"] * len(of_result.get("quantiles", ())) + [".2g"]
         )
         texts = ["not known" if v is None else f"{v / factor:{form}}" for v, form in zip(values, forms, strict=True)]
+        if (off := of_result.get("deviation_error")) is not None:
+            texts[keys.index("deviation")] += f" ± {off / factor:.2g}"
         verdicts = ", ".join(f"{number} {verdict}" for verdict, number in of_result.get("verdicts", {}).items())
         rows.append([f"{name} [{unit}]" if unit else name, *texts, *([verdicts] if judged else [])])
         heads = ("mean", "its ±", "by samples ±", "spread") if "mean" in of_result else keys

@@ -86,7 +86,11 @@ def column_of(row, result):
 
 
 def _spread(study, result, rows, sampled):
-    """Mean, spread and quantiles of a result, each with what ± makes of it; None where no row has it."""
+    """Mean, spread and quantiles of a result, each with what ± makes of it; None where no row has it.
+
+    A standard deviation is the norm of what is left of the values without their mean, over √(n − 1): it changes by no
+    more than the norm of their errors over that.
+    """
     values, errors, within, means = [], [], [], []
     for row in rows:
         value, error, statistical = column_of(row, result)
@@ -112,6 +116,7 @@ def _spread(study, result, rows, sampled):
     deviation = math.sqrt(between + float(np.mean(np.square(within))))
     statistics_found |= {"mean": float(means.mean()), "mean_error": None if unknown else float(wide.mean())}
     statistics_found |= {"deviation": deviation, "standard_error": math.sqrt(between / n) if n > 1 else None}
+    statistics_found["deviation_error"] = None if unknown or n == 1 else float(np.sqrt((wide**2).sum() / (n - 1)))
     statistics_found["quantiles"] = [
         _quantile(values, None if unknown else wide, q, study.confidence) for q in study.quantiles
     ]

@@ -109,6 +109,23 @@ def test_spread_and_error_are_told_apart():
         assert shares[0] / shares[1] == pytest.approx(4.0, rel=0.05)
 
 
+def test_the_spread_of_values_that_are_off_is_within_its_error():
+    """Values off by up to ±, also all away from their mean, where the spread changes most."""
+    generator = np.random.default_rng(0)
+    study = Study(scene="s", parameters={"x": U}, sample="random", count=8, seed=3)
+    (exact,) = told(study, lambda v: v["x"], 0.1)
+    spread, error = (exact["results"]["y"][key] for key in ("deviation", "deviation_error"))
+    assert error == pytest.approx(0.1 * np.sqrt(8 / 7))
+    outward = [lambda v: v["x"] + 0.1 * np.sign(v["x"] - exact["results"]["y"]["mean"])]
+    changed = [
+        told(study, off, 0.1)[0]["results"]["y"]["deviation"] - spread
+        for off in [*outward, *[lambda v: v["x"] + generator.uniform(-0.1, 0.1)] * 50]
+    ]
+    assert 0.8 * error < max(np.abs(changed)) <= error
+    (unknown,) = told(study, lambda v: v["x"], lambda v: None)
+    assert unknown["results"]["y"]["deviation_error"] is None
+
+
 def test_results_beyond_the_horizon_join_by_their_ensemble():
     """The variance is that between the cases and that within: x uniform, each run spread by 0.1 about it."""
     study = Study(scene="s", parameters={"x": U}, sample="sobol", count=256, seed=3, conditions={"high": "y > 0.5"})
