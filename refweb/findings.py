@@ -32,7 +32,7 @@ CODES = {
     "no-stiffness": "Directions without stiffness, which have no frequency.",
     "no-support": "Parts that no support holds along an axis.",
     "not-proven": "± of statics is an estimate and no proven bound.",
-    "over-strength": "A line is stressed above its strength.",
+    "over-strength": "A line is stressed above its strength, or may be within ±.",
     "passage-in-doubt": "Lines may have passed through bodies.",
     "push-along-lines": "Contact pushes a body along lines, to which ± is blind.",
     "repeated": "A run was repeated with other settings.",

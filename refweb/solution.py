@@ -12,6 +12,7 @@ from .findings import read_findings
 from .messages import nearest, short
 from .results.folder import read_summary
 from .results.solution import OTHER_ERRORS, SolutionData, read_results
+from .results.strength import read_utilisation
 from .scene import Scene
 
 if TYPE_CHECKING:
@@ -311,7 +312,7 @@ def load(folder) -> Solution:
         solution.broken_before = summary.get("broken_before", [])
         solution.breaks, solution.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
-            solution.utilisation = used["value"], used["line"]
+            solution.utilisation = read_utilisation(used)
         solution.margin = summary.get("margin")
         solution.steps = [{**step, "results": read_results(step["results"])} for step in summary["steps"]]
         solution.reduced = {} if solution.steps else read_results(summary["results"])

@@ -114,6 +114,8 @@ MIRRORS = {
     "effects/self_contact/table": "effects/test_self_contact.py",
     "results/columns": "test_build.py",
     "results/units": "results/test_loaded.py",
+    "results/strength": "results/test_strength.py",
+    "results/throw": "results/test_throw.py",
     "results/comparison": "results/test_comparison.py",
     "results/vtu_file": "results/test_frames.py",
     "results/state": "results/test_results.py results/test_observable_contract.py",
@@ -509,7 +511,7 @@ MUTANTS = [
     Mutant("studies/further_runs", "lost == 12", "lost == 13"),
     Mutant("results/error_budget", "float(sum(numbers))", "float(max(numbers))"),
     Mutant("results/error_budget", "if error <= ALLOWED * value", "if error < value"),
-    Mutant("results/error_budget", "reasons[\"contact_stiffness\"] = \"nothing touches\"", "pass"),
+    Mutant("results/error_budget", 'reasons["contact_stiffness"] = "nothing touches"', "pass"),
     Mutant("results/error_budget", "terms <= EXACT:", "True:"),
     Mutant("results/error_budget", "0.5 * mass * speed**2", "mass * speed**2"),
     Mutant("dynamics/divergence", "IN_TURN, FACTOR = 5, 2.5", "IN_TURN, FACTOR = 3, 2.0"),
@@ -573,6 +575,19 @@ MUTANTS = [
     Mutant("reference/pages", 'f"[[{name}]]" if several', 'f"[[{name}]]" if not several'),
     Mutant("results/comparison", "for lower, _ in spans) <= min(", "for lower, _ in spans) < min("),
     Mutant("results/comparison", "len(spans) == len(results) and max", "max"),
+    # ± of derived numbers
+    Mutant(
+        "results/comparison", "verdicts = [verdict for verdict in MEANINGLESS if verdict in given]", "verdicts = []"
+    ),
+    Mutant("results/strength", "abs(value - 1.0) <= error", "value - 1.0 <= error"),
+    Mutant("results/strength", "error += utilisation.smoothing or 0.0", "pass"),
+    Mutant("results/throw", "decided = error is not None and abs(value) > error", "decided = error is not None"),
+    Mutant("results/throw", "return inside and (side or", "return inside or (side or"),
+    Mutant("results/throw", '{*values["bounds"], *(refined', '{*values["bounds"], *(() and refined'),
+    Mutant("sweeps/chances", '1.0 - count["false"] / n', 'count["true"] / n'),
+    Mutant(
+        "sweeps/chances", "0.0 if sampled else math.inf if error is None", "0.0 if sampled else 0.0 if error is None"
+    ),
 ]
 
 

@@ -255,6 +255,10 @@ def print_comparison(comparison):
     known = (value is None or value["error"] is not None for row in comparison["results"] for value in row["values"])
     if not all(known):
         rows.append(("", "a value without ± has no known error, and agrees with equal ones alone"))
+    for row in comparison["results"]:
+        if row["meaningless"] is not None:
+            step = "" if row["step"] is None else f", step {row['step']:g}"
+            rows.append(("", f"{row['name']}{step}: the comparison means nothing: {row['meaningless']}"))
     rows += [(s, f"is the run in {f}") for f, s in zip(folders, comparison["status"], strict=True) if s != "solved"]
     if comparison["scene"]:
         grid = Grid(box=None, padding=(0, 2), pad_edge=False)

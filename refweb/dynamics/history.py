@@ -16,6 +16,7 @@ from ..results.observables.balances import weights
 from ..results.observables.observe import SIGN, Observe
 from ..results.solution import Result
 from ..results.state import State, margin_of
+from ..results.strength import Utilisation
 from .integrators.crossings import PAIRS
 from .integrators.events import Event
 from .integrators.integrator import History, Sum
@@ -290,11 +291,11 @@ class Watch:
         return None if at is None else float(course.extremes.values[at])
 
     def utilisation(self, course):
-        """Largest stress over strength of all steps and its line, None where no line has a strength."""
+        """The `Utilisation` of all steps, without its error; None where no line has a strength."""
         at = self._of_warning("utilisation")
         if at is None:
             return None
-        return float(course.extremes.values[at]), int(self.system.net.line[course.extremes.places[at]])
+        return Utilisation(float(course.extremes.values[at]), int(self.system.net.line[course.extremes.places[at]]))
 
     def margin(self, course):
         """Smallest margin of safety of all steps, see `margin_of`; None where no line has a strength."""
@@ -304,6 +305,35 @@ class Watch:
             return None
         element, used = int(extremes.places[at]), float(extremes.values[at])
         return margin_of(net, element, used if share is None else used / float(share[element]), extremes.times[at])
+
+    @property
+    def _shares(self):
+        """Names of what is followed of stress over its limits, with the numbers of the probes."""
+        return {name: at for name in ("utilisation", "margin") if (at := self._of_warning(name)) is not None}
+
+    def shares(self, course):
+        """Largest stress over strength and, where its line may be another, over the allowed stress: results by name.
+
+        They have no errors; none where no line has a strength.
+        """
+        values, times, places = course.extremes.values, course.extremes.times, course.extremes.places
+        lines = self.system.net.line
+        return {
+            name: Result(float(values[at]), None, "1", float(times[at]), int(lines[places[at]]), at="line")
+            for name, at in self._shares.items()
+        }
+
+    def shares_of(self, history):
+        """Stress over its limits in the rows of a `History`, in the order of `shares`, shape (rows, shares)."""
+        return history.probes[:, list(self._shares.values())]
+
+    def share_corrections(self, course, relative=0.0):
+        """Lower limits of ± of `shares`, by name, see `corrections`."""
+        extremes = course.extremes
+        return {
+            name: max(float(extremes.corrections[at]), SPREAD * relative * abs(float(extremes.values[at])))
+            for name, at in self._shares.items()
+        }
 
     def strain(self, course):
         """Largest strain of all steps [1] and its line."""

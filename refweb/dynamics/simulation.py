@@ -11,7 +11,8 @@ from ..errors import InputError, IntegrationError, SolverError
 from ..findings import NOTE, Finding
 from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
-from ..results.state import State, floor_remark, strain_remark, strength_remark
+from ..results.state import State, floor_remark, strain_remark
+from ..results.strength import strength_remark
 from .accuracy_loop import CLIMBS, AccuracyState, reach_digits, run_within_drift
 from .budget import Budget, check_budget
 from .history import Watch
@@ -27,11 +28,16 @@ NO_TWIN = (
 
 
 class RunResult(NamedTuple):
-    """A run at its end: its results by name, without errors, what they owe to looks between steps, and its course."""
+    """A run at its end: results by name, without errors, what they owe to looks between steps, and the course.
+
+    Stress over its limits has the same, ``shares`` and ``share_corrections``, see `refweb.dynamics.history.Watch`.
+    """
 
     results: dict[str, Result]
     corrections: dict[str, float]
     course: IntegratorState
+    shares: dict[str, Result]
+    share_corrections: dict[str, float]
 
 
 class Simulation:
@@ -93,7 +99,7 @@ class Simulation:
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
         self._lines, self._through = None, _through_of(system)
-        self._tables, self._compared, self._kept = [], [], kept
+        self._tables, self._compared, self._share_rows, self._kept = [], [], [], kept
         _check_step(scene)
         self._stand(kept)
         self.integrator = self.integrator_at(self.standing.knob)
@@ -201,6 +207,7 @@ class Simulation:
                 table = self.watch.table(history)
                 if len(self.schedule.between):
                     self._compared += self.watch.compared(self.watch.table(compared)).tolist()
+                self._share_rows.append(self.watch.shares_of(compared))
                 self._refuse_overlap(course)
                 if self._silent is not None:
                     self._silent.inspect(course.time, course.x)
@@ -221,7 +228,8 @@ class Simulation:
             self._record(course)
         relative = self.standing.knob if integrator.knob == "rtol" else 0.0
         corrections = self.watch.corrections(course, relative, getattr(integrator, "tolerances", {}))
-        return RunResult(self.watch.results(course, self._tables[-1][-1]), corrections, course)
+        shares = self.watch.shares(course), self.watch.share_corrections(course, relative)
+        return RunResult(self.watch.results(course, self._tables[-1][-1]), corrections, course, *shares)
 
     def compared(self, folder):
         """Rows that are compared with those of a twin, see `refweb.dynamics.history.Watch.compared`."""
@@ -229,9 +237,15 @@ class Simulation:
             return np.array(self._compared)
         return self.watch.compared(self.rows if folder is None else folder.rows())
 
+    @property
+    def share_rows(self):
+        """Stress over its limits in the rows of `compared`, shape (rows, shares), see `Watch.shares_of`."""
+        return np.concatenate(self._share_rows)
+
     def again(self, folder):
         """Forget what was computed, for a run at another value of the knob, that of ``standing``."""
         self.integrator, self._tables, self._compared = self.integrator_at(self.standing.knob), [], []
+        self._share_rows = []
         self.overlaps, self._lines = _overlaps_of(self.scene, self.system), None
         self._through, self._silent = _through_of(self.system), _silent_of(self.system)
         self.solution.frames.clear()
@@ -245,6 +259,7 @@ class Simulation:
             return self.integrator.start(*self.begin.motion), 0
         course, row = self.integrator.load(fields_of(self._kept["run"])), int(self._kept["row"])
         self._compared = self._kept.get("compared", np.zeros((0, 0))).tolist()
+        self._share_rows = [self._kept["share_rows"]] if "share_rows" in self._kept else []
         if self._silent is not None:
             self._silent.restore(self._kept.get("silent", np.zeros((0, 3))))
         self._kept, self._tables = None, [np.array([folder.last_row()])]
@@ -326,6 +341,7 @@ class Simulation:
             kept |= {f"twin_begin_{name}": array for name, array in zip("xv", self.begin_of_twin.motion, strict=True)}
         kept |= {"row": number} | self.standing.arrays() | ({} if self._ways is None else self._ways.arrays())
         kept |= {} if self._silent is None else {"silent": self._silent.kept()}
+        kept |= {"share_rows": self.share_rows} if self._share_rows and self._share_rows[0].size else {}
         folder.frame(number, state, run=kept | ({"compared": np.array(self._compared)} if self._compared else {}))
 
     def remarks(self):

@@ -41,11 +41,17 @@ class TwinRun(NamedTuple):
         Its end.
     rows : ndarray, shape (rows, columns)
         See `refweb.dynamics.history.Watch.compared`.
+    shares : dict of str to refweb.results.solution.Result
+        See `refweb.dynamics.history.Watch.shares`.
+    share_rows : ndarray, shape (rows, shares)
+        See `refweb.dynamics.history.Watch.shares_of`.
     """
 
     results: dict[str, Result]
     course: IntegratorState
     rows: np.ndarray
+    shares: dict[str, Result]
+    share_rows: np.ndarray
 
 
 class Twin:
@@ -67,7 +73,7 @@ class Twin:
 
     def __init__(self, simulation):
         self._simulation, self._stop = simulation, threading.Event()
-        self._thread = self._course = self._last = self._rows = self.failure = None
+        self._thread = self._course = self._last = self._rows = self._share_rows = self.failure = None
 
     def __enter__(self):
         integrator = self._simulation.integrator
@@ -88,7 +94,7 @@ class Twin:
         check_budget(self._simulation, t / self._simulation.schedule.times[-1], twin=True)
 
     def _run(self, made):
-        simulation, rows = self._simulation, []
+        simulation, rows, share_rows = self._simulation, [], []
         try:
             integrator = made()
             integrator.on_progress = self._on_progress
@@ -97,8 +103,10 @@ class Twin:
             for block in blocks(integrator, course, simulation.schedule):
                 table = simulation.watch.table(block.compared)
                 rows.append(simulation.watch.compared(table))
+                share_rows.append(simulation.watch.shares_of(block.compared))
                 if self._stop.is_set():
                     return
+            self._share_rows = np.concatenate(share_rows)
             self._course, self._last, self._rows = course, table[-1], np.concatenate(rows)
         except Exception as error:  # whatever it is, it belongs into the warnings of the run itself
             self.failure = error
@@ -111,7 +119,9 @@ class Twin:
             self._run(self._simulation.integrator.refined)
         if self._course is None or self._rows is None:
             return None
-        return TwinRun(self._simulation.watch.results(self._course, self._last), self._course, self._rows)
+        watch, course = self._simulation.watch, self._course
+        results, shares = watch.results(course, self._last), watch.shares(course)
+        return TwinRun(results, course, self._rows, shares, self._share_rows)
 
 
 def _parts(times, end):
@@ -214,7 +224,7 @@ def with_errors(results, floors, twin, kept_rows, rows_refined, order=2.0, drift
 
 
 def add_errors(simulation, run, twin, rows):
-    """Add ± to the results of a simulation and to the times of its events.
+    """Add ± to the results of a simulation, to stress over its limits, and to the times of its events.
 
     Parameters
     ----------
@@ -250,19 +260,43 @@ def add_errors(simulation, run, twin, rows):
             off = abs(entry["time"] - float(time))
             entry["error"] = SPREAD * factor * off + float(width) + 4e-16 * entry["time"]
     if first_run.stopped and len(rows) > 1:
-        _add_lateness(solution, rows[-2:])
+        _add_lateness(solution.reduced, solution.events, rows[-2:])
+    known = np.inf
     if solution.breaks is not None:
         from .break_errors import add_errors_of_breaks
 
-        return add_errors_of_breaks(solution, first_run.breaks, refined.breaks, SPREAD * factor)
-    return np.inf
+        known = add_errors_of_breaks(solution, first_run.breaks, refined.breaks, SPREAD * factor)
+    if run.shares and len(simulation.share_rows) == len(rows):
+        _add_errors_of_shares(simulation, run, twin, rows, factor, known)
+    return known
 
 
-def _add_lateness(solution, rows):
-    """Add to ± of results at the end what they change in that of the time of the event there."""
+def _add_errors_of_shares(simulation, run, twin, rows, factor, known):
+    """Add ± to the utilisation and the margin of safety of a solution, as far as these are before a ``known`` time."""
+    solution, largest = simulation.solution, run.course.largest
+    tables = (rows, simulation.share_rows), (twin.rows, twin.share_rows)
+    compared = [np.column_stack([table[:, 0], shares, table[:, -1]]) for table, shares in tables]
+    results = with_errors(run.shares, run.share_corrections, twin.shares, *compared, factor, energy=largest)
+    if run.course.stopped and len(rows) > 1:
+        _add_lateness(results, solution.events, compared[0][-2:])
+    errors = {name: share.error if share.time < known else None for name, share in results.items()}
+    solution.utilisation = solution.utilisation._replace(error=errors["utilisation"])
+    margin, error = solution.margin, errors["utilisation"]
+    if "margin" in errors:
+        error = errors["margin"]
+    elif error is not None and margin["allowed"]:  # the same stress, over another limit
+        error *= margin["strength"] / margin["allowed"]
+    solution.margin = {**margin, "error": error}
+
+
+def _add_lateness(results, events, rows):
+    """Add to ± of results at the end what they change in that of the time of the event there.
+
+    ``rows`` are the last two, of time and of the results in their order.
+    """
     before, last = rows
-    late = max((event["error"] or 0.0 for event in solution.events if event["time"] == last[0]), default=0.0)
+    late = max((event["error"] or 0.0 for event in events if event["time"] == last[0]), default=0.0)
     change = late * np.abs(last - before) / (last[0] - before[0])
-    for i, (name, result) in enumerate(solution.reduced.items(), 1):
+    for i, (name, result) in enumerate(results.items(), 1):
         if result.time == last[0]:
-            solution.reduced[name] = result._replace(error=result.error + float(change[i]))
+            results[name] = result._replace(error=result.error + float(change[i]))

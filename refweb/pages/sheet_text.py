@@ -66,10 +66,18 @@ def on_margin(summary, scene, dynamic):
     terms = _terms(margin, scene, readable(margin["stress"], error, "Pa"))
     yield "its terms", f"{terms}, of line {margin['line']} at {when(margin['time'], dynamic)}"
     used = {"value": margin["stress"] / margin["strength"], "line": margin["line"]}
+    used["error"] = None if error is None else error / margin["strength"]
     if (given := summary.get("utilisation")) and given["value"] > used["value"]:  # in statics that of the last step
         used = given
-    share = f"its stress reaches {100.0 * used['value']:.3g} % of its strength"
+    share = f"its stress reaches {_percent(used['value'], used.get('error'))} of its strength"
     yield "breaks first", f"line {used['line']}: {share}"
+
+
+def _percent(value, error):
+    """A share in percent with its ±, which may not be known."""
+    if error is None:
+        return f"{100.0 * value:.3g} % (its ± is not known)"
+    return f"{with_error(100.0 * value, 100.0 * error)} %"
 
 
 def decision(margin, error):
@@ -89,8 +97,7 @@ def _decided(margin, error):
     lower, upper, verdict = decision(margin, error)
     value = margin["value"]
     if error is None:
-        text = "the ± of the largest stress is not known: an [[observe]] of its stress over all lines, with reduce = "
-        return f'{value:.3g}, {verdict} without ±; {text}"max", has it'
+        return f"{value:.3g}, {verdict} without ±; the ± of the largest stress is not known"
     to = "without limit" if math.isinf(upper) else f"to {upper:.3g}"
     ends = "" if f"{lower:.3g}" == f"{upper:.3g}" else f", from {lower:.3g} {to}"
     reason = ", as 0 lies within ±" if verdict == "undecided" else ""
@@ -111,14 +118,19 @@ def _terms(margin, scene, stress):
 
 
 def _error_of(summary, scene, margin):
-    """± of the stress of the smallest margin [Pa], by a result that stands at its line; None where there is none."""
+    """± of the stress of the smallest margin [Pa], None where it is not known.
+
+    It is that of a result that stands at its line, and else that of the margin itself.
+    """
     for quantity, factor in (("stress", 1.0), ("tension", 1.0 / margin["area"])):
         largest = observed(summary, scene, quantity)
         if largest is None or largest.error is None or largest.line != margin["line"]:
             continue
         if abs(factor * largest.value - margin["stress"]) <= BESIDE * margin["stress"]:
             return factor * largest.error
-    return None
+    if margin.get("error") is None or margin["allowed"] is None:
+        return None
+    return margin["error"] * margin["allowed"]
 
 
 def rows_of_worth(results):

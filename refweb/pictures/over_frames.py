@@ -102,6 +102,6 @@ def _peak(record, name):
         if not used or record.kind != "dynamic":
             return None
         time = margin["time"] if margin.get("line") == used["line"] else None
-        return Largest(used["value"], None, used["line"], time)
+        return Largest(used["value"], used.get("error"), used["line"], time)
     except (InputError, KeyError, TypeError, ValueError, AttributeError):  # of files that no run has written
         return None

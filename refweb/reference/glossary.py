@@ -139,6 +139,7 @@ GLOSSARY = {
         "observable": "Quantity that a scene asks for by `[[observe]]`.",
         "result": "Value of an observable, with ±, time and position.",
         "±": "Error of a result; its kind says what it covers.",
+        "undecided": "Neither true nor false: the limit lies within ± of what is compared with it.",
         "discretisation error": "Change of a result when every line gets more elements.",
         "work–precision diagram": "Error over CPU time for several methods on one scene.",
         "history": "Values of all columns at every row, in `history.csv`.",

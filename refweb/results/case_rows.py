@@ -2,7 +2,8 @@
 
 Columns are ``case``, which tells what was run by its content, ``status``, the parameters by their paths, of each result
 ``NAME [unit]`` with ``NAME ±`` behind it and, where there is such, ``NAME least`` and ``NAME most``, between which it
-may lie anywhere, and ``NAME mean`` and ``NAME deviation`` of its ensemble; ``statistical``, names of results of which
+may lie anywhere, ``NAME mean`` and ``NAME deviation`` of its ensemble, and ``NAME verdict``, see
+`refweb.results.error_budget`; ``statistical``, names of results of which
 one run is one draw; ``message``, and what the run cost. An empty cell is what is not known. Numbers read back to the
 same floats.
 
@@ -47,7 +48,7 @@ def results_among(columns):
 def result_cells(row):
     """The cells of a row that its case alone determines: without parameters, whose names may be others by now."""
     names = {result.name for result in results_among(row)}
-    ends = (" ±", " least", " most", " mean", " deviation")
+    ends = (" ±", " least", " most", " mean", " deviation", " verdict")
     mine = {f"{result.name} [{result.unit}]" for result in results_among(row)} | {
         f"{n}{end}" for n in names for end in ends
     }

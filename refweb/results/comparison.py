@@ -8,6 +8,7 @@ import tomllib
 
 from ..errors import InputError
 from ..messages import short
+from .error_budget import NO_LIMIT, STATISTICAL
 from .folder import read_summary
 from .solution import read_results
 
@@ -25,7 +26,8 @@ def compare(folders):
     dict
         Plain values: ``folders``, ``status`` of each run; ``results``, a list of ``name``, ``step`` (None but for
         several load steps), ``unit``, ``values``, what each ``run.json`` holds or None, ``differences`` from the first
-        that is there, and ``agree``; ``scene``, a list of ``path`` and ``values``, None where a scene lacks the key;
+        that is there, ``agree``, and ``meaningless``, why the comparison of the result means nothing, else None;
+        ``scene``, a list of ``path`` and ``values``, None where a scene lacks the key;
         ``agree``, whether all results that are there twice do.
 
     Raises
@@ -36,7 +38,9 @@ def compare(folders):
     Notes
     -----
     Results agree where all intervals value ± error, or those in which an open value may lie, have a point in common. A
-    value without ± agrees with equal ones alone: that others are near shows nothing.
+    value without ± agrees with equal ones alone: that others are near shows nothing. Where the verdict on a result of
+    either run is "no limit" or "statistical" its value belongs to a mesh, or is one draw of many: whether it agrees is
+    told as of others, but means nothing.
     """
     if len(folders) < 2:
         raise InputError(f"compare {' '.join(map(str, folders))}: needs two result folders or more")
@@ -98,10 +102,29 @@ def _row(key, values):
         "name": key[0],
         "step": key[1],
         "unit": first["unit"],
-        "values": [value and {k: value.get(k) for k in ("value", "error", "interval", "unit")} for value in values],
+        "values": [
+            value and {k: value.get(k) for k in ("value", "error", "interval", "unit", "verdict")} for value in values
+        ],
         "differences": [_difference(value, first) for value in values],
         "agree": _agree(known) if len(known) > 1 else None,
+        "meaningless": _why_meaningless(known) if len(known) > 1 else None,
     }
+
+
+MEANINGLESS = {
+    NO_LIMIT: "it changes with every finer mesh, so that neither agreement nor difference says anything of the scenes; "
+    "compare its mean over a time (average)",
+    STATISTICAL: "the motion is chaotic and each value is one draw of many; compare mean and spread of many runs "
+    "(refweb sweep)",
+}
+"""Reasons why a comparison means nothing, by the verdict on a result."""
+
+
+def _why_meaningless(results):
+    """Reason why a comparison of results means nothing, by their verdicts; None where it means something."""
+    given = [result.get("verdict") for result in results]
+    verdicts = [verdict for verdict in MEANINGLESS if verdict in given]
+    return "; ".join(f'verdict "{verdict}": {MEANINGLESS[verdict]}' for verdict in verdicts) or None
 
 
 def _difference(value, first):

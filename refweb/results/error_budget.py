@@ -26,6 +26,8 @@ import numpy as np
 
 from ..findings import Finding
 from ..net.tension_laws import SMOOTH
+from .solution import Result
+from .strength import ALIKE, UTILISATION, of_observable
 from .units import readable
 
 PARTS = ("time", "elements", "contact_stiffness", "smoothing", "chance", "rounding")
@@ -236,9 +238,46 @@ def judge(solution, scene, system, price=None, asked=None):
     if static:
         for step in solution.steps:
             step["results"] = judged(step["results"])
+    else:
+        solution.reduced = judged(solution.reduced)
+    _judge_utilisation(solution, scene, system, reasons, asked.get(UTILISATION, {}))
+    if static:
         return
-    solution.reduced = judged(solution.reduced)
     solution.findings += _warnings(solution, named, known=bool(asked))
+
+
+def _judge_utilisation(solution, scene, system, reasons, further):
+    """Give the utilisation and the margin of safety of a solution their ±.
+
+    Parameters
+    ----------
+    solution : refweb.solution.Solution
+        With its results judged; its ``utilisation`` and ``margin`` are replaced.
+    scene : refweb.Scene
+        As it was solved.
+    system : refweb.system.system.System
+        That of the scene.
+    reasons : dict of str to str
+        Reasons why parts of the error do not exist, by part.
+    further : dict
+        ``parts`` and ``reasons`` by further runs, as of results.
+    """
+    used, margin = solution.utilisation, solution.margin
+    if used is None:
+        return
+    result = Result(used.value, used.error, "1", 0.0, used.line, smoothing=used.smoothing)
+    result = with_parts(result, scene.solve.kind == "static", {**reasons, **further.get("reasons", {})})
+    result = summed(result._replace(parts={**result.parts, **further.get("parts", {})}))
+    proven = used.proven
+    if (match := of_observable(scene, system, solution.results, used)) is not None:
+        observed, factor = match
+        scaled = {k: factor * part if isinstance(part, float) else part for k, part in observed.parts.items()}
+        result, proven = result._replace(error=factor * observed.error, parts=scaled), observed.proven
+    solution.utilisation = used._replace(error=result.error, parts=result.parts, proven=proven)
+    if margin and margin["line"] == used.line and margin["strength"] and margin["allowed"] and result.error is not None:
+        over_allowed = margin["strength"] / margin["allowed"]
+        if abs(margin["used"] - over_allowed * used.value) <= ALIKE * abs(margin["used"]):
+            solution.margin = {**margin, "error": over_allowed * result.error}
 
 
 def _remedies(result, solution, price):

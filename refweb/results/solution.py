@@ -133,8 +133,8 @@ class SolutionData:
         The history, where it is held in memory; of load steps always.
     path : pathlib.Path, optional
         The result folder that a run wrote while it went.
-    utilisation : (float, int), optional
-        Largest stress over strength, in dynamics over time, and its line; None where no line has a strength.
+    utilisation : refweb.results.strength.Utilisation, optional
+        Largest stress over strength, in dynamics over time, its line and its ±; None where no line has a strength.
     margin : dict, optional
         The smallest margin of safety, in dynamics over time, in statics over load steps, see
         `refweb.results.state.margin_of`; None where no line has a strength.
@@ -254,7 +254,7 @@ class SolutionData:
             **({"chosen": list(self.scene.chosen)} if self.scene.chosen else {}),
             "warnings": self.warnings,
             "findings": [finding._asdict() for finding in self.findings],
-            **({"utilisation": dict(zip(("value", "line"), used, strict=True))} if (used := self.utilisation) else {}),
+            **({"utilisation": self.utilisation.plain()} if self.utilisation else {}),
             **({"margin": self.margin} if self.margin else {}),
             **({"bodies": self.bodies} if self.bodies else {}),
             **({"pairs": self.pairs} if self.pairs else {}),

@@ -162,8 +162,9 @@ def margin_of(net, element, used, time):
     -------
     dict
         ``value``, the allowed stress over the largest one less 1; the stress ``used`` over the one ``allowed`` [Pa];
-        the ``line``, its largest ``stress`` [Pa], ``area`` [m²] and ``strength`` [Pa]; and the ``time``. ``value``,
-        ``allowed`` and ``strength`` are None where they are infinite.
+        the ``line``, its largest ``stress`` [Pa], ``area`` [m²] and ``strength`` [Pa]; the ``time``; and ``error``, the
+        ± of ``used``, None as long as it is not known. ``value``, ``allowed`` and ``strength`` are None where they are
+        infinite.
     """
     allowed, strength = float(net.allowed[element]), float(net.strength[element])
     return {
@@ -175,14 +176,8 @@ def margin_of(net, element, used, time):
         "strength": strength if np.isfinite(strength) else None,
         "area": float(net.area[element]),
         "time": float(time),
+        "error": None,
     }
-
-
-def strength_remark(utilisation):
-    """A warning where the largest stress over strength, (value, line), exceeds 1."""
-    if utilisation is not None and utilisation[0] > 1.0:
-        text = f"line {utilisation[1]} breaks: stress over strength is {utilisation[0]:.3g}"
-        yield Finding("over-strength", text, "cable")
 
 
 MUCH = 0.2

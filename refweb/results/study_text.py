@@ -46,8 +46,12 @@ def of_group(of):
 
 
 def rows_of_spread(entry):
-    """A row for each result: its mean, the shares of ± and of the samples in that, its spread, its quantiles."""
+    """A row for each result: its mean, the shares of ± and of the samples in that, its spread, its quantiles.
+
+    Where runs have given verdicts, how often each was given stands behind.
+    """
     rows, columns = [], []
+    judged = any(set(of_result.get("verdicts", ())) - {"none"} for of_result in entry["results"].values())
     for name, of_result in entry["results"].items():
         factor, unit = scale_of(max(abs(of_result["least"]), abs(of_result["largest"])), of_result["unit"])
         keys = ("mean", "mean_error", "standard_error", "deviation") if "mean" in of_result else ("least", "largest")
@@ -61,9 +65,13 @@ def rows_of_spread(entry):
             [".2g" if key in short else ".4g" for key in keys] + [".4g"] * len(of_result.get("quantiles", ())) + [".2g"]
         )
         texts = ["not known" if v is None else f"{v / factor:{form}}" for v, form in zip(values, forms, strict=True)]
-        rows.append([f"{name} [{unit}]" if unit else name, *texts])
+        if (off := of_result.get("deviation_error")) is not None:
+            texts[keys.index("deviation")] += f" ± {off / factor:.2g}"
+        verdicts = ", ".join(f"{number} {verdict}" for verdict, number in of_result.get("verdicts", {}).items())
+        rows.append([f"{name} [{unit}]" if unit else name, *texts, *([verdicts] if judged else [])])
         heads = ("mean", "its ±", "by samples ±", "spread") if "mean" in of_result else keys
         columns = ["result", *heads, *(f"{100.0 * q['q']:g} %" for q in of_result.get("quantiles", ())), "± at most"]
+        columns += ["verdict"] * judged
     return Rows(columns, rows, [])
 
 
@@ -92,6 +100,9 @@ def rows_of_conditions(entry):
             chance = "not known"
         else:
             chance = f"{100.0 * of_condition['share']:.4g} %"
+        lower, upper = of_condition.get("lower"), of_condition.get("upper")
+        if lower is not None and lower != upper:
+            chance += f", from {100.0 * lower:.4g} to {100.0 * upper:.4g} %"
         between = of_condition.get("interval")
         text = f"{100.0 * between[0]:.3g} … {100.0 * between[1]:.3g} %" if between else ""
         left = ", ".join(

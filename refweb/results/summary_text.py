@@ -135,8 +135,7 @@ def on_run(summary):
         line = f"{', '.join(map(str, before[:FEW_BREAKS]))}{', ...' * (len(before) > FEW_BREAKS)}"
         yield "broken", f"{len(before)} line{'s' * (len(before) > 1)} before the run began: {line}"
     if worst := summary.get("utilisation"):
-        digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
-        yield "strength", f"utilisation {worst['value']:{digits}} at line {worst['line']}"
+        yield "strength", _of_strength(worst)
 
 
 def on_solver(solver):
@@ -192,11 +191,26 @@ def _breaks(breaks):
         yield "", f"and {len(breaks) - FEW_BREAKS} more, the last at t = {breaks[-1]['time']:.6g} s"
 
 
+def _of_strength(worst):
+    """Sentence on the largest stress over strength, with its ± and what that holds."""
+    if (error := worst.get("error")) is None:
+        digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
+        return f"utilisation {worst['value']:{digits}} at line {worst['line']}, its ± is not known"
+    text = f"utilisation {with_error(worst['value'], error)} at line {worst['line']}"
+    return f"{text} ({parts})" if (parts := shares(worst)) else text
+
+
 def _of_throw(thrown):
     """A number of a throw, or whether something is so, in words."""
     if "unit" not in thrown:
-        return {True: "yes", False: "no", None: "not known"}[thrown["value"]]
-    return "at least " * thrown.get("at_least", False) + readable(thrown["value"], thrown["error"], thrown["unit"])
+        if thrown["value"] is not None:
+            return "yes" if thrown["value"] else "no"
+        drawn = "yes" if thrown["drawn"] else "no"
+        if thrown.get("error") is None:
+            return f"not known, {drawn} in this run: {thrown.get('reason', 'it has no ±')}"
+        return f"undecided, {drawn} in this run"
+    text = "at least " * thrown.get("at_least", False) + readable(thrown["value"], thrown["error"], thrown["unit"])
+    return text if thrown["error"] is not None else f"{text}, its ± is not known: {thrown.get('reason', 'it has none')}"
 
 
 def _horizon(horizon):

@@ -8,7 +8,10 @@ from ..errors import InputError
 from ..messages import nearest, quote
 from ..tables import Table, real, table, text
 
+NO_TWIN = "there is no step refinement"
 UNITS = {"largest_area": "m²", "deployment_time": "s", "travelled": "m", "effective_period": "s", "covered": "1"}
+FLAGS = ("inside", "closed")
+"""Names of what is so or is not."""
 
 
 @table
@@ -19,7 +22,7 @@ class Throw(Table):
     three rows around the largest: ``largest_area``; ``deployment_time``, when that is; ``travelled``, by how much
     another observable has changed until then; ``effective_period``, how long the area is at least ``share`` of the
     largest around that time. What is not over at the end of the run, or was so at its start, is a lower bound, and says
-    so.
+    so: the number less its ± is the least that it may be.
 
     Of a ``target`` at the end of the run: ``inside``, whether its centre is in the convex hull of the web's nodes;
     ``closed``, whether the area of the mouth is at most ``closed`` of the largest; ``covered``, the share of directions
@@ -27,10 +30,14 @@ class Throw(Table):
     is 1 − Ω/4π where the centre lies on the side of the mouth that the mean of all nodes is on, and inside the hull,
     and else Ω/4π: the net seen through its outline.
 
-    ± holds what differs in the twin run and what a history of half the rows would make of the same motion; where run
-    and twin disagree on what is inside or closed it is not known, and ``drawn`` is what one run of many has. Behind the
-    time at which lines break in another order in the twin, or an event ends only one of them, nothing is. Studies have
-    these numbers among their results, 1 and 0 for what is so and what is not, see `refweb.sweeps.case.cells_of`.
+    ± holds what differs in the twin run and what a history of half the rows would make of the same motion. What is
+    inside or closed is decided by a ``margin`` with a ± of its own: the depth of the centre in the hull [m], and the
+    area at which the mouth counts as closed less that at the end [m²]. It is true or false where the margin exceeds its
+    ±, and else undecided, ``value`` being None; ``drawn`` is what this run has. Where it is undecided whether the
+    centre is inside, or on which side of the mouth, ± of ``covered`` holds both. Without a twin, behind the time at
+    which lines break in another order in the twin, and where an event ends only one of them there is no ±, ``reason``
+    says why, and nothing is known of what is inside or closed. Studies have these numbers among their results, 1 and 0
+    for what is so and what is not, see `refweb.sweeps.case.cells_of`.
 
     Parameters
     ----------
@@ -115,19 +122,28 @@ class Throw(Table):
             Time from which on the twin tells nothing of the run [s].
         """
         names = [o.name for o in observables]
-        values = self._of(rows, names)
-        half, refined_values = self._of(rows[::2], names), None if twin is None else self._of(twin[0], names)
+        values, half = self._of(rows, names), self._of(rows[_every_other(len(rows))], names)
+        refined = None if twin is None else self._of(twin[0], names)
         mouth = observables[names.index(self.area)].node
         if self.target is not None:
             values |= self._capture(state, mouth, values["largest_area"])
-            if twin is not None and refined_values is not None:
-                refined_values |= self._capture(twin[1], mouth, refined_values["largest_area"])
-        settled, end, record = values.pop("settled"), rows[-1, 0], {}
-        for name, value in values.items():
-            if name != "bounds":
-                compared = refined_values if settled.get(name, end) < known else None
-                record[name] = _entry(name, value, half, compared, factor, values, known)
-        return record
+            half |= {"closed": values["closed"] + self.closed * (half["largest_area"] - values["largest_area"])}
+            if twin is not None and refined is not None:
+                refined |= self._capture(twin[1], mouth, refined["largest_area"])
+        settled, end, errors = values["settled"], rows[-1, 0], {}
+        bounds = {*values["bounds"], *(refined["bounds"] if refined else ())}
+        for name in (*self.numbers, *(["side"] if self.target is not None else [])):
+            tells = refined is not None and settled.get(name, end) < known
+            errors[name] = _error_of(name, values, half, refined, factor) if tells else None
+        if errors.get("covered") is not None and not _decided(values, errors):
+            errors["covered"] += abs(1.0 - 2.0 * values["covered"])
+        why = {"reason": NO_TWIN}
+        if refined is not None:
+            why = {"reason": f"the step refinement tells nothing of it from t = {known:.6g} s on", "statistical": True}
+        return {
+            name: _entry(name, values[name], errors[name], bounds) | (why if errors[name] is None else {})
+            for name in self.numbers
+        }
 
     def _of(self, rows, names):
         """Values by name; ``bounds`` are names of those that are lower bounds, ``settled`` is when values are [s]."""
@@ -160,24 +176,41 @@ class Throw(Table):
         (centre,) = (state.position[body.row] for body in net.bodies if body.name == self.target)
         outline, nodes = state.position[net.web.find_around(mouth)], state.position[: len(net.web.points)]
         size = 0.5 * np.linalg.norm(np.cross(outline, np.roll(outline, -1, axis=0)).sum(axis=0))
-        inside = in_hull(nodes, centre)
+        depth = depth_in_hull(nodes, centre)
         return {
-            "inside": inside,
-            "closed": bool(size <= self.closed * largest),
-            "covered": covered(outline, nodes, centre, inside),
+            "inside": depth,
+            "closed": float(self.closed * largest - size),
+            "covered": covered(outline, nodes, centre, depth > 0.0),
+            "side": side_of_mouth(outline, nodes, centre),
         }
 
 
-def _entry(name, value, half, refined, factor, own_value, known):
+def _every_other(count):
+    """Numbers of every other row of a count, the last one among them."""
+    return np.unique([*range(0, count, 2), count - 1])
+
+
+def _error_of(name, values, half, refined, factor):
+    """± of a number, or of the margin that decides on what is so."""
+    value = values[name]
+    return float(factor * abs(value - refined[name]) + abs(value - half.get(name, value)) + 4e-16 * abs(value))
+
+
+def _decided(values, errors):
+    """Tell if ± leaves no doubt on which side of the mouth the centre is, and whether it is inside."""
+    inside, side = (abs(values[name]) > errors[name] for name in ("inside", "side"))
+    return inside and (side or values["inside"] < 0.0)
+
+
+def _entry(name, value, error, bounds):
     """A number with its ±, or whether something is so, for ``run.json``."""
-    if isinstance(value, bool):
-        same = known == np.inf if refined is None else refined[name] == value
-        return {"value": value if same else None, "drawn": value}
-    error = None
-    if refined is not None:
-        error = factor * abs(value - refined[name]) + abs(value - half.get(name, value)) + 4e-16 * abs(value)
-    bound = {"at_least": True} if name in own_value["bounds"] else {}
-    return {"value": float(value), "error": None if bound else error, "unit": UNITS[name], **bound}
+    if name in FLAGS:
+        drawn = value > 0.0 or (name == "closed" and value == 0.0)
+        decided = error is not None and abs(value) > error
+        return {"value": drawn if decided else None, "drawn": drawn, "margin": value, "error": error}
+    if name == "covered" and error is not None:
+        error = min(error, max(value, 1.0 - value))
+    return {"value": float(value), "error": error, "unit": UNITS[name]} | ({"at_least": True} if name in bounds else {})
 
 
 def _parabola(times, values, when):
@@ -197,15 +230,38 @@ def _vertex(times, values):
     return float(times[1] - 0.5 * b / a), float(c - 0.25 * b * b / a)
 
 
-def in_hull(points, point):
-    """Tell if a position is in the convex hull of points; that of points in a plane has no inside."""
+def depth_in_hull(points, point):
+    """Depth of a position below the nearest face of the convex hull of points [m], negative outside.
+
+    The hull of points in a plane has no inside: it is the distance from the plane, negative.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     try:
         hull = ConvexHull(points)
     except QhullError:
-        return False
-    return bool((hull.equations[:, :3] @ point + hull.equations[:, 3] < 0.0).all())
+        middle = points.mean(axis=0)
+        *_, axes = np.linalg.svd(points - middle)
+        return -float(abs(axes[-1] @ (point - middle)))
+    return -float((hull.equations[:, :3] @ point + hull.equations[:, 3]).max())
+
+
+def in_hull(points, point):
+    """Tell if a position is in the convex hull of points; that of points in a plane has no inside."""
+    return depth_in_hull(points, point) > 0.0
+
+
+def side_of_mouth(outline, nodes, centre):
+    """Distance of a centre from the plane of a mouth [m], negative where the mean of all nodes is on the other side.
+
+    It is at most the distance of that mean, which decides as well.
+    """
+    normal, middle = np.cross(outline, np.roll(outline, -1, axis=0)).sum(axis=0), outline.mean(axis=0)
+    size = np.linalg.norm(normal)
+    if size == 0.0:
+        return 0.0
+    of_centre, of_net = ((position - middle) @ normal / size for position in (centre, nodes.mean(axis=0)))
+    return float(np.sign(of_centre * of_net) * min(abs(of_centre), abs(of_net)))
 
 
 def solid_angle(outline, centre):
@@ -224,7 +280,5 @@ def solid_angle(outline, centre):
 
 def covered(outline, nodes, centre, inside):
     """Share of directions from a centre that a net covers, see `Throw`."""
-    normal, middle = np.cross(outline, np.roll(outline, -1, axis=0)).sum(axis=0), outline.mean(axis=0)
     share = solid_angle(outline, centre) / (4.0 * np.pi)
-    within = inside and ((centre - middle) @ normal) * ((nodes.mean(axis=0) - middle) @ normal) > 0.0
-    return 1.0 - share if within else share
+    return 1.0 - share if inside and side_of_mouth(outline, nodes, centre) > 0.0 else share

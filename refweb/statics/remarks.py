@@ -6,7 +6,8 @@ import numpy as np
 
 from ..findings import Finding
 from ..net.tension_laws import LINEAR, NAMES, TENSION_ONLY
-from ..results.state import floor_remark, strain_remark, strength_remark
+from ..results.state import floor_remark, strain_remark
+from ..results.strength import strength_remark
 
 
 class Remarks:
@@ -20,6 +21,13 @@ class Remarks:
         self._steps += 1
         for finding in findings:
             self._made.setdefault(finding.code, []).append((step, finding))
+
+    def renew(self, step, code, findings):
+        """Take the findings of one code at a load step anew."""
+        made = [entry for entry in self._made.pop(code, []) if entry[0] != step]
+        made += [(step, finding) for finding in findings]
+        if made:
+            self._made[code] = made
 
     def findings(self):
         """Each code as it was last found, with its load steps unless it was found at all of them."""

@@ -12,8 +12,10 @@ from ..findings import Finding
 from ..net.tension_laws import SMOOTH
 from ..registry import STATICS, load
 from ..results.columns import FIRST, static_energies
+from ..results.observables.line import StressShare
 from ..results.solution import SOLVER, Result
 from ..results.state import State
+from ..results.strength import Utilisation, strength_remark
 from ..system.static_system import at_rest
 from .remarks import Remarks, open_rows, remarks_on
 
@@ -43,6 +45,10 @@ class Simulation:
         self.scene, self.system, self.solution = scene, system, solution
         self.rows, self._remarks, self._framed = [], Remarks(), -1
         self._passage, self._lines = _passage_of(scene, system), _lines_of(scene, system)
+        self._shares = {}
+        if np.isfinite(system.net.strength).any():
+            differ = system.net.allowed_share is not None
+            self._shares = {over: StressShare(over) for over in ("strength", *(["allowed"] if differ else []))}
         self._totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
         self.columns = [FIRST["static"], *(f"{o.name} [{o.unit}]" for o in scene.observables)]
         self.columns += [f"{name} [J]" for name in static_energies(system)]
@@ -74,6 +80,8 @@ class Simulation:
 
     def remarks(self):
         """Remarks for a reader of the results."""
+        if self.rows:  # ± of the last load step may have grown since
+            self._remarks.renew(self.rows[-1][0], "over-strength", strength_remark(self.solution.utilisation))
         yield from self._remarks.findings()
         yield from self.system.remarks()
         if self._passage is not None and self.rows:
@@ -89,7 +97,7 @@ class Simulation:
             return None
         from .smoothing_error import Smoothing
 
-        return Smoothing(scene)
+        return Smoothing(scene, self._shares.values())
 
     def _accept(self, equilibrium, smoothing):
         """Write down an equilibrium; its history row."""
@@ -109,7 +117,8 @@ class Simulation:
             self._lines.record(state)
             solution.passage = {**solution.passage, "lines": f"not certified: {self._lines.why}"}
             solution.lines = self._lines.deepest.plain()
-        results = self._results(equilibrium, state, smoothing)
+        smoothed = self._smoothed(equilibrium, state, smoothing)
+        results = self._results(equilibrium, state, smoothed)
         row = [equilibrium.step, *(result.value for result in results.values()), *state.energies.values()]
         if not np.isfinite(row).all():
             bad = self.columns[np.isfinite(row).argmin()]
@@ -125,11 +134,8 @@ class Simulation:
         solution.steps.append({"step": equilibrium.step, **load, "results": results, "solver": stats})
         solution.solver = {**stats, **self._totals}
         solution.state = state
-        if (used := state.utilisation) is not None:
-            solution.utilisation = float(used.max()), int(used.argmax())
-        if (margin := state.margin) is not None:
-            if solution.margin is None or margin["used"] > solution.margin["used"]:
-                solution.margin = margin
+        if self._shares:
+            self._record_shares(equilibrium, state, smoothed[len(results) :])
         self._remarks.record(equilibrium.step, remarks_on(state, stats, solution.utilisation, equilibrium))
         return row
 
@@ -140,18 +146,37 @@ class Simulation:
         before = self.solution.steps[-1]["step"] if self.solution.steps else 0.0
         refuse_break(self.system, load(STATICS[self.scene.solve.method]), equilibrium, before)
 
-    def _results(self, equilibrium, state, smoothing):
-        """The observables of an equilibrium by name, with their errors."""
+    def _record_shares(self, equilibrium, state, smoothed):
+        """Write down the largest stress over strength and the margin of safety, with their errors.
+
+        ``smoothed`` are errors of the smooth law, None where they are not known, of each number in ``_shares``.
+        """
+        solution, used, errors = self.solution, self._shares["strength"].of(state), []
+        for share, moved in zip(self._shares.values(), smoothed, strict=True):
+            error = share.error(state, equilibrium)
+            errors.append((error, None if error is None else error + (moved or 0.0)))
+        proven = errors[0][0] is not None and self._shares["strength"].proven(equilibrium)
+        known = dict(error=errors[0][0], smoothing=smoothed[0], proven=proven)
+        solution.utilisation = Utilisation(used.value, used.where, **known)
+        if solution.margin is None or state.margin["used"] > solution.margin["used"]:
+            solution.margin = {**state.margin, "error": errors[-1][1]}
+
+    def _smoothed(self, equilibrium, state, smoothing):
+        """Errors of the smooth law of results, and of what is in ``_shares``; None where they are not known."""
+        observed = [*(o.observable for o in self.scene.observables), *self._shares.values()]
+        if smoothing is None:
+            return [None] * len(observed)
+        return smoothing.errors(equilibrium, [o.of(state).value for o in observed])
+
+    def _results(self, equilibrium, state, smoothed):
+        """The observables of an equilibrium by name, with their errors, of which those of the smooth law are given."""
         observables = self.scene.observables
         values = [o.value(state) for o in observables]
         errors = [o.error(state, equilibrium) for o in observables]
-        smoothed = [None] * len(values)
         share = None
         if (radius := self.system.orbit_radius) is not None:
             places = state.position[: self.system.rows - self.system.net.spins]
             share = float(np.linalg.norm(places, axis=1).max()) / radius
-        if smoothing is not None:
-            smoothed = smoothing.errors(equilibrium, [value.value for value in values])
         return {
             o.name: o.bounded(
                 Result(
@@ -163,7 +188,7 @@ class Simulation:
                 ),
                 self.system,
             )
-            for o, value, error, moved in zip(observables, values, errors, smoothed, strict=True)
+            for o, value, error, moved in zip(observables, values, errors, smoothed, strict=False)
         }
 
     def _frame(self, folder):

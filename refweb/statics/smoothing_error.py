@@ -18,12 +18,20 @@ SHARE = 0.1
 
 
 class Smoothing:
-    """The equilibria of a static scene with `SHARE` of its smoothing, one for each that is asked for."""
+    """The equilibria of a static scene with `SHARE` of its smoothing, one for each that is asked for.
 
-    def __init__(self, scene):
+    Parameters
+    ----------
+    scene : refweb.Scene
+        The scene.
+    more : sequence of refweb.results.observables.observable.Observable
+        Further numbers whose errors are found, behind those of the scene's observables.
+    """
+
+    def __init__(self, scene, more=()):
         cable = scene.cable
         groups = {name: less_smooth(group) for name, group in cable.groups.items()}
-        self._observables = scene.observables
+        self._observables = [*(o.observable for o in scene.observables), *more]
         self._system = scene.replace(cable=replace(less_smooth(cable), groups=groups)).build()
         self._newton = Newton(at_rest(self._system))
 
@@ -34,7 +42,7 @@ class Smoothing:
         except SolverError:
             return [None] * len(values)
         state = State(self._system, equilibrium_near.step, equilibrium_near.x)
-        values_near = [o.value(state).value for o in self._observables]
+        values_near = [o.of(state).value for o in self._observables]
         return [abs(value - value_near) / (1.0 - SHARE) for value, value_near in zip(values, values_near, strict=True)]
 
 

@@ -26,6 +26,7 @@ from ..registry import EFFECTS, INTEGRATORS, name_of
 from ..results.error_budget import ALLOWED, SMOOTHED, first_touch, reasons_of
 from ..results.files import write_atomically, write_text
 from ..results.solution import as_history
+from ..results.strength import UTILISATION
 from ..settings import Accuracy
 from .discretisation_error import MARGIN, left_of
 from .predictability import ensemble, horizon, lost_digits
@@ -176,14 +177,21 @@ class FurtherRuns:
 
     def findings(self):
         """Errors by result, as far as these runs tell: ``parts``, ``reasons`` and ``mesh_only``."""
-        return {o.name: self._found_of(o) for o in self.scene.observables}
+        errors: dict = {o.name: self._found_of(o) for o in self.scene.observables}
+        return errors | {UTILISATION: {"parts": self._parts_of(UTILISATION)}}
 
-    def _found_of(self, observable):
-        name, parts, reasons = observable.name, {}, {}
+    def _parts_of(self, name):
+        """Errors of a result by part of the model; of the utilisation, which has no history, by its largest value."""
+        parts = {}
         for part, texts in (("elements", FINER), ("contact_stiffness", STIFFNESS), ("smoothing", (SMOOTHER,))):
             texts = [text for text in texts if text in self._compared]
-            if texts:
+            if texts and name in self._compared[None][0]:
                 parts[part] = self._left(name, texts, SMOOTHED / (1.0 - LESS) / MARGIN if part == "smoothing" else 2.0)
+        return parts
+
+    def _found_of(self, observable):
+        name, reasons = observable.name, {}
+        parts = self._parts_of(name)
         entry = {"parts": parts, "reasons": reasons, "mesh_only": self._mesh_only(observable)}
         horizon = self.solution.horizon
         if not horizon:
@@ -208,7 +216,7 @@ class FurtherRuns:
 
     def _mean_apart(self, name, text):
         """Mean difference of an observable before its result between the scene and another run; 0 in statics."""
-        if self.static:
+        if self.static or name == UTILISATION:
             return 0.0
         table, compared = self._compared[None][1], self._compared[text][1]
         count, end = min(len(table["time"]), len(compared["time"])), self.solution.results[name].time
@@ -286,7 +294,8 @@ def _at_knob(simulation):
 
 
 def _results(solution):
-    return {name: result.value for name, result in solution.results.items()}
+    values: dict = {name: result.value for name, result in solution.results.items()}
+    return values | ({UTILISATION: solution.utilisation.value} if solution.utilisation else {})
 
 
 def report(solution):

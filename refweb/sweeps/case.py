@@ -165,7 +165,8 @@ def unpacked(content, folder):
 def cells_of(summary):
     """Cells of a row from the content of a ``run.json``: results and, where none has their names, those of a throw.
 
-    What the twin does not agree on, or tells nothing of, is one draw of many, as are results behind the horizon.
+    What is inside or closed is 1 or 0 as this run has it, and anything from 0 to 1 where ± leaves it undecided. What
+    the twin tells nothing of is one draw of many, as are results behind the horizon.
     """
     cells = {"status": summary["status"], "message": summary["message"]}
     horizon = summary.get("horizon") or {}
@@ -173,6 +174,8 @@ def cells_of(summary):
     for name, result in summary["results"].items():
         cells[f"{name} [{result['unit']}]"] = result["value"]
         cells[f"{name} ±"] = result["error"]
+        if "verdict" in result:
+            cells[f"{name} verdict"] = result["verdict"]
         if result.get("interval") is not None:
             lower, upper = result["interval"]
             cells[f"{name} least"] = -float("inf") if lower is None else lower
@@ -182,12 +185,17 @@ def cells_of(summary):
     of_throw = {n: throw_entry for n, throw_entry in summary.get("throw", {}).items() if n not in summary["results"]}
     for name, throw_entry in of_throw.items():
         value, error = throw_entry["value"], throw_entry.get("error")
+        interval = None
         if "drawn" in throw_entry:
-            value, error = float(throw_entry["drawn"]), 0.0 if value == throw_entry["drawn"] else None
+            value, decided = float(throw_entry["drawn"]), value is not None
+            if error is not None:
+                error, interval = (0.0, None) if decided else (1.0, (0.0, 1.0))
+        elif throw_entry.get("at_least"):
+            error, interval = None, (value - (error or 0.0), float("inf"))
         cells[f"{name} [{throw_entry.get('unit', '1')}]"], cells[f"{name} ±"] = value, error
-        if throw_entry.get("at_least"):
-            cells[f"{name} least"], cells[f"{name} most"] = value, float("inf")
-        elif error is None:
+        if interval is not None:
+            cells[f"{name} least"], cells[f"{name} most"] = interval
+        if throw_entry.get("statistical"):
             statistical = [*statistical, name]
     cells["statistical"] = " ".join(statistical)
     return cells

@@ -7,10 +7,12 @@ that is ±, which no number of samples lets fall. They are told beside each othe
 The probability of a condition has an interval by Clopper and Pearson (1934), which covers it at least as often as its
 level says, of independent samples; of samples that are evenly spread it is that of as many independent ones, and
 mostly wider than it need be. A case that its ± leaves undecided, and one that has failed, may count either way: the
-interval holds for both. Results behind the horizon of their motion are draws, and their ± says nothing. Where they have
-an ensemble, its mean and spread join those of the cases. Of samples a case counts by its one run, as the trials of
-Clopper and Pearson do: what differs between runs of one case is one chance more among those that are sampled. Of cases
-that are not drawn a condition says what holds of each, and of a draw with an ensemble that is `LIKELY` of its spread.
+interval holds for both, and the share of cases lies between a lower and an upper one. Results behind the horizon of
+their motion are draws, and their ± says nothing. Where they have an ensemble, its mean and spread join those of the
+cases. Of samples a case counts by its one run, as the trials of Clopper and Pearson do: what differs between runs of
+one case is one chance more among those that are sampled. Of cases that are not drawn a condition says what holds of
+each: with an ensemble that is `LIKELY` of its spread, and without one a draw counts with its ±, and as undecided where
+it has none.
 """
 
 from __future__ import annotations
@@ -84,7 +86,11 @@ def column_of(row, result):
 
 
 def _spread(study, result, rows, sampled):
-    """Mean, spread and quantiles of a result, each with what ± makes of it; None where no row has it."""
+    """Mean, spread and quantiles of a result, each with what ± makes of it; None where no row has it.
+
+    A standard deviation is the norm of what is left of the values without their mean, over √(n − 1): it changes by no
+    more than the norm of their errors over that.
+    """
     values, errors, within, means = [], [], [], []
     for row in rows:
         value, error, statistical = column_of(row, result)
@@ -101,12 +107,16 @@ def _spread(study, result, rows, sampled):
     wide = np.array([error or 0.0 for error in errors])
     statistics_found = {"unit": result.unit, "count": n, "least": float(values.min()), "largest": float(values.max())}
     statistics_found |= {"without_error": unknown, "error": None if unknown else float(wide.max())}
+    if any(f"{result.name} verdict" in row for row in rows):
+        named = [row.get(f"{result.name} verdict") or "none" for row in rows if f"{result.name} verdict" in row]
+        statistics_found["verdicts"] = {verdict: named.count(verdict) for verdict in dict.fromkeys(named)}
     if not sampled:
         return statistics_found
     between = float(np.var(means, ddof=1)) if n > 1 else 0.0
     deviation = math.sqrt(between + float(np.mean(np.square(within))))
     statistics_found |= {"mean": float(means.mean()), "mean_error": None if unknown else float(wide.mean())}
     statistics_found |= {"deviation": deviation, "standard_error": math.sqrt(between / n) if n > 1 else None}
+    statistics_found["deviation_error"] = None if unknown or n == 1 else float(np.sqrt((wide**2).sum() / (n - 1)))
     statistics_found["quantiles"] = [
         _quantile(values, None if unknown else wide, q, study.confidence) for q in study.quantiles
     ]
@@ -137,16 +147,19 @@ def _ranks(n, q, level):
 
 
 def bounds(row, results, values, sampled):
-    """Values by name for a condition: parameters, and results as intervals; exact of draws and of unknown ±.
+    """Values by name for a condition: parameters, and results as intervals, exact where ± is not known.
 
-    Where cases are not ``sampled``, those of draws with an ensemble are `LIKELY` standard deviations about its mean.
+    Draws are exact where cases are ``sampled``. Else they are `LIKELY` standard deviations about the mean of their
+    ensemble, or without one as wide as their ±, and any number where that is not known.
     """
     values_found = dict(values)
     for result in results:
         value, error, statistical = column_of(row, result)
         if value is None:
             continue
-        wide = 0.0 if statistical or error is None else error
+        wide = 0.0 if error is None else error
+        if statistical:
+            wide = 0.0 if sampled else math.inf if error is None else error
         if not sampled and (spread := row.get(f"{result.name} deviation")) is not None:
             value, wide = row[f"{result.name} mean"], LIKELY * spread
         lower, upper = row.get(f"{result.name} least"), row.get(f"{result.name} most")
@@ -160,8 +173,9 @@ def _share(study, condition, results, cases, sampled):
     """Share of the cases for which a condition holds, and of samples its probability.
 
     ``true`` and ``false`` count cases that are decided whatever ± does, ``undecided`` those that it or the spread of
-    an ensemble leaves open, and ``failed`` those without a result; ``unproven`` of the decided have a result without ±,
-    and ``statistical`` have one that is a draw.
+    an ensemble leaves open, and ``failed`` those without a result; ``unproven`` of the decided have a result without ±
+    and bounds, and ``statistical`` have one that is a draw. ``share`` is by values alone. Cases that are undecided or
+    have failed count as false in ``lower`` and as true in ``upper``.
     """
     used = [item for item in results if item.name in condition.used]
     count: dict[str, int] = dict.fromkeys(
@@ -178,7 +192,10 @@ def _share(study, condition, results, cases, sampled):
         count[{True: "true", False: "false", None: "undecided"}[verdict]] += 1
         columns = [column_of(row, item) for item in used]
         count["statistical"] += any(statistical for *_, statistical in columns)
-        count["unproven"] += any(error is None and not statistical for _, error, statistical in columns)
+        count["unproven"] += verdict is not None and any(
+            error is None and not statistical and row.get(f"{item.name} least") is None
+            for item, (_, error, statistical) in zip(used, columns, strict=True)
+        )
         values = {name: value for name, value in bounds_found.items()} | {
             item.name: Interval(value, value) for item, (value, *_) in zip(used, columns, strict=True)
         }
@@ -186,6 +203,7 @@ def _share(study, condition, results, cases, sampled):
     decided = count["true"] + count["false"] + count["undecided"]
     n = decided + count["failed"]
     share = {"condition": condition.text, **count, "share": count["by_value"] / decided if decided else None}
+    share["lower"], share["upper"] = (count["true"] / n, 1.0 - count["false"] / n) if n else (None, None)
     if sampled and n:
         lower, _ = clopper_pearson(count["true"], n, study.confidence)
         _, upper = clopper_pearson(n - count["false"], n, study.confidence)

@@ -198,7 +198,8 @@ class Study(Table):
         Whether a run leaves its row alone, its ``run.json`` as well, or its whole result folder.
     conditions : dict
         Conditions on results and parameters by name, of which the share of the cases is told, and of samples the
-        probability.
+        probability. Arithmetic in them carries ± along. A case that ± leaves undecided is neither true nor false: such
+        cases are counted apart, and the share has a lower and an upper value.
     quantiles : sequence of float
         Of samples: quantiles that are told of each result.
     confidence : float

@@ -6,7 +6,6 @@ interpolation, as exactly as that is. Either says by ± how far off that may be.
 
 import dataclasses
 import json
-from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -409,9 +408,10 @@ def test_what_the_time_of_the_end_is_off_by_moves_results_at_the_end():
     """Rows before and at the event, 0.02 s apart, and an event known to 3 ms: 3/20 of what changes between them."""
     result = refweb.run(oscillator(STOPPED, EXPLICIT, [PLACE], 8.0 / RATE)).results["x"]._replace(time=1.0, error=0.5)
     early = result._replace(time=0.5)
-    run = SimpleNamespace(events=[{"time": 1.0, "error": 3e-3}], reduced={"x": result, "peak": early, "y": result})
-    _add_lateness(run, np.array([[0.98, 2.0, 5.0, -1.0], [1.0, 6.0, 9.0, -2.0]]))
-    found = {name: one.error for name, one in run.reduced.items()}
+    results = {"x": result, "peak": early, "y": result}
+    rows = np.array([[0.98, 2.0, 5.0, -1.0], [1.0, 6.0, 9.0, -2.0]])
+    _add_lateness(results, [{"time": 1.0, "error": 3e-3}], rows)
+    found = {name: one.error for name, one in results.items()}
     np.testing.assert_allclose([found["x"], found["peak"], found["y"]], [0.5 + 0.6, 0.5, 0.5 + 0.15], rtol=1e-12)
 
 

@@ -105,6 +105,36 @@ def test_command(tmp_path, capsys, monkeypatch):
     assert json.loads(capsys.readouterr().out) == compare(["a", "c"])
 
 
+@pytest.mark.parametrize(
+    ("verdicts", "words"),
+    [
+        (("no limit", "wide"), ["no limit", "finer mesh"]),
+        (("determined", "statistical"), ["statistical", "one draw of many"]),
+        (("statistical", "no limit"), ["statistical", "no limit"]),
+        (("wide", "depends on the model"), []),
+        ((None, None), []),
+    ],
+)
+def test_a_comparison_that_means_nothing_says_so_and_counts_as_before(tmp_path, capsys, verdicts, words):
+    for number, near in enumerate((1.1, 1.3)):  # within ± of both, and beyond
+        folders = [
+            folder(tmp_path / f"{number}{i}", {"d": result(v, verdict=verdict, verdict_text="", parts={})})
+            for i, (v, verdict) in enumerate(zip((1.0, near), verdicts, strict=True))
+        ]
+        (row,) = compare(folders)["results"]
+        assert (row["meaningless"] is not None) == bool(words)
+        assert all(word in row["meaningless"] for word in words)
+        assert [value["verdict"] for value in row["values"]] == list(verdicts)
+        assert main(["compare", *map(str, folders)]) == number
+        assert ("d: the comparison means nothing: verdict" in " ".join(capsys.readouterr().out.split())) == bool(words)
+
+
+def test_what_only_one_run_has_is_not_compared(tmp_path):
+    one = folder(tmp_path / "a", {"d": result(1.0), "e": result(1.0, verdict="no limit", parts={})})
+    found = compare([one, folder(tmp_path / "b", {"d": result(1.0)})])
+    assert [row["meaningless"] for row in found["results"]] == [None, None]
+
+
 def test_what_cannot_be_compared(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder(tmp_path / "a", {"d": result(1.0)})

@@ -119,7 +119,8 @@ def test_where_results_stand(both, capsys):
     shown = capsys.readouterr().out
     for one in run.results.values():
         assert f"at {one.at} {one.where}" in shown
-    assert f"utilisation {run.utilisation[0]:.2g} at line {run.utilisation[1]}" in shown
+    text = with_error(run.utilisation.value, run.utilisation.error)
+    assert f"utilisation {text} at line {run.utilisation.line}" in shown
 
 
 def test_load_steps_in_columns_of_one_unit(tmp_path, capsys):

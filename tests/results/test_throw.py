@@ -5,7 +5,8 @@ import pytest
 
 import refweb
 from refweb.net.web import Web
-from refweb.results.throw import Throw, covered, in_hull, solid_angle
+from refweb.results.summary_text import on_run
+from refweb.results.throw import Throw, covered, depth_in_hull, in_hull, side_of_mouth, solid_angle
 from refweb.sweeps.case import cells_of
 
 METHODS = ["central-difference", "cvode", "ida"]
@@ -67,12 +68,30 @@ def test_a_mouth_on_springs(method):
 
 
 def test_lower_bounds():
-    """A run that ends while the mouth opens says so, and gives no ±."""
-    solution = refweb.run(thrown(duration=0.03))
-    for name in ("largest_area", "deployment_time", "travelled", "effective_period"):
-        assert solution.throw[name]["at_least"] and solution.throw[name]["error"] is None
-    without = refweb.run(thrown(accuracy=refweb.Accuracy(error="none")))
-    assert without.throw["deployment_time"]["error"] is None and "at_least" not in without.throw["deployment_time"]
+    """A run that ends while the mouth opens says so, with ± of what it came to by then."""
+    solution, rate = refweb.run(thrown(duration=0.03)), np.sqrt(STIFF / MASS)
+    area = 2.0 * (1.0 + OUT / rate * np.sin(rate * 0.03)) ** 2
+    expected = dict(largest_area=area, deployment_time=0.03, travelled=ALONG * 0.03, effective_period=0.03)
+    for name, value in expected.items():
+        found = solution.throw[name]
+        assert found["at_least"] and abs(found["value"] - value) <= found["error"] + 1e-15 < 0.02 * value, name
+    cells = cells_of(solution.summary())
+    assert cells["largest_area ±"] is None and cells["largest_area most"] == np.inf
+    assert (
+        cells["largest_area least"] == solution.throw["largest_area"]["value"] - solution.throw["largest_area"]["error"]
+    )
+
+
+def test_without_a_twin_nothing_is_known_and_it_says_so():
+    hub = refweb.Body(name="target", radius=0.01, mass=1.0, position=(0.0, 0.0, 1.0))
+    scene = thrown(effects=[hub], throw=Throw(area="mouth", target="target"), accuracy=refweb.Accuracy(error="none"))
+    solution = refweb.run(scene)
+    assert all(entry["error"] is None for entry in solution.throw.values())
+    assert solution.throw["inside"]["value"] is solution.throw["closed"]["value"] is None
+    texts = [text for _, text in on_run(solution.summary()) if text.split()[0] in ("deployment", "inside", "closed")]
+    assert len(texts) == 3 and all("not known" in text and "no step refinement" in text for text in texts)
+    cells = cells_of(solution.summary())
+    assert cells["statistical"] == "" and cells["inside ±"] is None and cells["inside [1]"] == 0.0
 
 
 def ring(radius, height, count=400):
@@ -88,6 +107,20 @@ def test_solid_angles():
     face = np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]], dtype=float)
     assert solid_angle(face, np.zeros(3)) == pytest.approx(4.0 * np.pi / 6.0, rel=1e-12)
     assert solid_angle(face, np.array([0.0, 0.0, 1.0 - 1e-9])) == pytest.approx(2.0 * np.pi, rel=1e-6)
+
+
+def test_depth_in_a_hull_and_side_of_a_mouth():
+    """In a cube of edge 2 the nearest face; of points in a plane the distance from it, and no inside."""
+    cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    mouth = np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]], dtype=float)
+    for place, depth, side in (
+        ((0.2, 0.0, 0.5), 0.5, 0.5),
+        ((0.2, 0.0, 1.25), -0.25, -0.25),
+        ((3.0, 0, -9), -8.0, 1.0),
+    ):
+        assert depth_in_hull(cube, np.array(place)) == pytest.approx(depth, rel=1e-12)
+        assert side_of_mouth(mouth, cube, np.array(place)) == pytest.approx(side, rel=1e-12)
+    assert depth_in_hull(mouth, np.array([0.0, 0.0, 1.5])) == pytest.approx(-0.5, rel=1e-12)
 
 
 def test_share_of_directions():
@@ -130,46 +163,96 @@ def test_a_target_in_a_net():
 
 
 def test_cells_of_what_is_not_known():
-    """What twins do not agree on is one draw; a result of the same name goes first."""
+    """What ± leaves undecided may be 0 or 1; what twins tell nothing of is one draw; a result goes first."""
     mine = {"value": 3.0, "error": 0.5, "unit": "m", "time": 0.0, "where": None}
     throw = {
-        "inside": {"value": None, "drawn": True},
-        "closed": {"value": False, "drawn": False},
-        "covered": {"value": 0.25, "error": None, "unit": "1"},
+        "inside": {"value": None, "drawn": True, "margin": 0.1, "error": 0.2},
+        "closed": {"value": False, "drawn": False, "margin": -1.0, "error": 0.2},
+        "covered": {"value": 0.25, "error": None, "unit": "1", "reason": "it is late", "statistical": True},
         "travelled": {"value": 7.0, "error": 0.1, "unit": "m"},
-        "effective_period": {"value": 2.0, "error": None, "unit": "s", "at_least": True},
+        "effective_period": {"value": 2.0, "error": 0.5, "unit": "s", "at_least": True},
     }
-    cells = cells_of({"status": "solved", "message": "", "results": {"travelled": mine}, "throw": throw})
-    assert cells["inside [1]"] == 1.0 and cells["inside ±"] is None
-    assert cells["closed [1]"] == 0.0 and cells["closed ±"] == 0.0
+    given = {"status": "solved", "message": "", "results": {"travelled": mine}, "throw": throw}
+    cells = cells_of(given)
+    assert cells["inside [1]"] == 1.0 and [cells[f"inside {end}"] for end in ("±", "least", "most")] == [1.0, 0.0, 1.0]
+    assert cells["closed [1]"] == 0.0 and cells["closed ±"] == 0.0 and "closed least" not in cells
     assert cells["covered [1]"] == 0.25 and cells["travelled [m]"] == 3.0 and cells["travelled ±"] == 0.5
-    assert cells["effective_period least"] == 2.0 and cells["effective_period most"] == np.inf
-    assert cells["statistical"] == "inside covered"
+    assert cells["effective_period least"] == 1.5 and cells["effective_period most"] == np.inf
+    assert cells["statistical"] == "covered"
+    texts = [text for _, text in on_run(given)]
+    assert texts[:3] == [
+        "inside undecided, yes in this run",
+        "closed no",
+        "covered 0.25, its ± is not known: it is late",
+    ]
+    assert texts[4] == "effective period at least 2.00 ± 0.50 s"
 
 
-def test_what_run_and_twin_disagree_on_is_not_known():
-    rows = np.column_stack([np.linspace(0.0, 1.0, 11), np.sin(np.linspace(0.0, 3.0, 11))])
+class Scripted(Throw):
+    """A throw whose capture is what its state says."""
 
-    class Twin(Throw):
-        """Says something else of a state each time."""
+    def _capture(self, state, mouth, largest):
+        return dict(zip(("inside", "closed", "covered", "side"), state, strict=True))
 
-        def _capture(self, state, mouth, largest):
-            return {"inside": state, "covered": 0.5}
 
-    observables = [refweb.Observe(name="mouth", quantity="mouth_area", node=[0, 1, 2])]
-    throw = Twin(area="mouth", target="one")
-    undecided = {"value": None, "drawn": True}
-    assert throw.results(observables, rows, True, (rows, False), 3.0)["inside"] == undecided
-    assert throw.results(observables, rows, True, (rows, True), 3.0, rows[-1, 0])["inside"] == undecided
-    assert throw.results(observables, rows, True, (rows, True), 3.0)["inside"] == {"value": True, "drawn": True}
-    for known, told in ((0.7, True), (0.5, False)):  # the largest area is at t = π/6, between rows at 0.4 and 0.6
-        found = throw.results(observables, rows, True, (rows, True), 3.0, known)
+@pytest.fixture
+def hump():
+    """Rows of a mouth whose area is largest at t = π/6, between rows at 0.5 and 0.6."""
+    return np.column_stack([np.linspace(0.0, 1.0, 11), np.sin(np.linspace(0.0, 3.0, 11))])
+
+
+MOUTH = [refweb.Observe(name="mouth", quantity="mouth_area", node=[0, 1, 2])]
+
+
+def test_what_lies_within_its_error_is_undecided(hump):
+    """± is three times what run and twin differ by: a depth of 0.1 m is inside where that is below 0.1/3 m."""
+    throw = Scripted(area="mouth", target="one")
+    for refined, decided in ((0.08, True), (0.06, False), (-0.1, False), (0.12, True), (0.14, False)):
+        found = throw.results(MOUTH, hump, (0.1, -1.0, 0.2, 5.0), (hump, (refined, -1.0, 0.2, 5.0)), 3.0)
+        inside = found["inside"]
+        assert inside["value"] is (True if decided else None) and inside["drawn"] is True
+        assert inside["error"] == pytest.approx(3.0 * abs(refined - 0.1)) and inside["margin"] == 0.1
+        assert found["closed"]["value"] is False
+        # either side of the mouth: what is covered is 0.2 or 0.8
+        assert found["covered"]["error"] == pytest.approx(0.0 if decided else 0.6, abs=1e-12)
+    found = throw.results(MOUTH, hump, (0.1, -1.0, 0.2, 0.5), (hump, (0.1, -1.0, 0.2, 0.2)), 3.0)
+    assert found["inside"]["value"] is True and found["covered"]["error"] == pytest.approx(0.6)
+    found = throw.results(MOUTH, hump, (-0.1, 0.1, 0.2, 0.5), (hump, (-0.1, 0.05, 0.2, 0.2)), 3.0)
+    assert found["inside"]["value"] is False and found["covered"]["error"] < 1e-12  # outside the side has no meaning
+    assert found["closed"]["value"] is None and found["closed"]["drawn"] is True
+
+
+def test_the_closed_share_is_of_an_area_that_has_an_error(hump):
+    """Half the rows make another largest area, and a mouth that is as near to closed is undecided."""
+    throw = Scripted(area="mouth", target="one", closed=0.5)
+    coarse = throw.results(MOUTH, hump, (1.0, 1.0, 0.2, 1.0), (hump, (1.0, 1.0, 0.2, 1.0)), 3.0)
+    off = 0.5 * coarse["largest_area"]["error"]
+    assert coarse["closed"]["error"] == pytest.approx(off) and off > 0.0
+    for margin, value in ((0.9 * off, None), (1.1 * off, True), (-1.1 * off, False)):
+        state = (1.0, margin, 0.2, 1.0)
+        assert throw.results(MOUTH, hump, state, (hump, state), 3.0)["closed"]["value"] is value
+
+
+def test_nothing_is_known_behind_the_time_that_the_twin_tells_of(hump):
+    throw, state = Scripted(area="mouth", target="one"), (0.1, -1.0, 0.2, 1.0)
+    late = throw.results(MOUTH, hump, state, (hump, state), 3.0, hump[-1, 0])["inside"]
+    assert (
+        late["value"] is None and late["error"] is None and late["statistical"] and "from t = 1 s on" in late["reason"]
+    )
+    for known, told in ((0.7, True), (0.5, False)):
+        found = throw.results(MOUTH, hump, state, (hump, state), 3.0, known)
         assert (found["deployment_time"]["error"] is not None) == told == (found["largest_area"]["error"] is not None)
+        assert ("reason" in found["deployment_time"]) != told
+
+
+def test_what_is_a_bound_in_the_twin_is_one(hump):
+    """The area of the twin still rises at its end: what the run has as its largest one may not be that."""
+    rising = hump[:6]
+    found = Throw(area="mouth").results(MOUTH, hump, None, (rising, None), 3.0)
+    assert found["largest_area"]["at_least"] and found["largest_area"]["error"] > 0.0
 
 
 def test_it_is_written_and_read(tmp_path):
-    from refweb.results.summary_text import on_run
-
     scene = thrown()
     solution = refweb.run(scene, out=tmp_path / "run")
     told = [text for _, text in on_run(solution.summary()) if text.startswith("deployment time ")]

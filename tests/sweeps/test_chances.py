@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import beta, binom, norm
 
 import refweb
+from refweb.results.study_text import rows_of_conditions, rows_of_spread
 from refweb.sweeps.chances import chances, clopper_pearson
 from refweb.sweeps.design import groups, points
 from refweb.sweeps.study import Study
@@ -108,6 +109,23 @@ def test_spread_and_error_are_told_apart():
         assert shares[0] / shares[1] == pytest.approx(4.0, rel=0.05)
 
 
+def test_the_spread_of_values_that_are_off_is_within_its_error():
+    """Values off by up to ±, also all away from their mean, where the spread changes most."""
+    generator = np.random.default_rng(0)
+    study = Study(scene="s", parameters={"x": U}, sample="random", count=8, seed=3)
+    (exact,) = told(study, lambda v: v["x"], 0.1)
+    spread, error = (exact["results"]["y"][key] for key in ("deviation", "deviation_error"))
+    assert error == pytest.approx(0.1 * np.sqrt(8 / 7))
+    outward = [lambda v: v["x"] + 0.1 * np.sign(v["x"] - exact["results"]["y"]["mean"])]
+    changed = [
+        told(study, off, 0.1)[0]["results"]["y"]["deviation"] - spread
+        for off in [*outward, *[lambda v: v["x"] + generator.uniform(-0.1, 0.1)] * 50]
+    ]
+    assert 0.8 * error < max(np.abs(changed)) <= error
+    (unknown,) = told(study, lambda v: v["x"], lambda v: None)
+    assert unknown["results"]["y"]["deviation_error"] is None
+
+
 def test_results_beyond_the_horizon_join_by_their_ensemble():
     """The variance is that between the cases and that within: x uniform, each run spread by 0.1 about it."""
     study = Study(scene="s", parameters={"x": U}, sample="sobol", count=256, seed=3, conditions={"high": "y > 0.5"})
@@ -179,6 +197,56 @@ def test_a_grid_has_shares_and_no_chances():
     assert entry["conditions"]["low"]["share"] == pytest.approx(2 / 3) and "interval" not in entry["conditions"]["low"]
     assert entry["conditions"]["low"]["unproven"] == 3 and entry["results"]["y"]["error"] is None
     assert "mean" not in entry["results"]["y"]
+
+
+def test_undecided_cases_count_either_way_in_lower_and_upper_shares():
+    """Of x = 0.1, 0.2 ... 0.9 with ± 0.15 the limit 0.5 leaves 0.4, 0.5 and 0.6 open: 3 to 6 of 9 are below."""
+    study = Study(scene="s", parameters={"x": [n / 10 for n in range(1, 10)]}, conditions={"low": "y < 0.5"})
+    (entry,) = told(study, lambda v: v["x"], 0.15)
+    chance = entry["conditions"]["low"]
+    assert [chance[key] for key in ("true", "false", "undecided")] == [3, 3, 3]
+    assert chance["lower"] == pytest.approx(3 / 9) and chance["upper"] == pytest.approx(6 / 9)
+    assert chance["lower"] <= chance["share"] <= chance["upper"] and chance["share"] == pytest.approx(4 / 9)
+    (row,) = rows_of_conditions(entry).rows
+    assert row[1] == "44.44 %, from 33.33 to 66.67 %" and "3 undecided" in row[4]
+
+
+def test_arithmetic_of_results_is_undecided_within_what_their_errors_make_of_it():
+    """2 y − 1 < 0 is decided where |y − 0.5| > ±, as y < 0.5 is; x y at x = 3 has three times the ±."""
+    given = {"plain": "y < 0.5", "scaled": "2*y - 1 < 0", "product": "x*y < 1.5"}
+    study = Study(scene="s", parameters={"x": [3.0], "z": [n / 10 for n in range(1, 10)]}, conditions=given)
+    (entry,) = told(study, lambda v: v["z"], 0.15)
+    found = [entry["conditions"][name] for name in given]
+    assert all([one[key] for key in ("true", "false", "undecided")] == [3, 3, 3] for one in found)
+
+
+def test_a_draw_that_is_not_sampled_counts_with_its_error():
+    """Behind the horizon and without an ensemble: with ± 0.3 only 0.1 and 0.9 are decided, and none without ±."""
+    study = Study(scene="s", parameters={"x": [0.1, 0.4, 0.6, 0.9]}, conditions={"low": "y < 0.5"})
+    for error, expected in ((0.3, [1, 1, 2]), (None, [0, 0, 4])):
+        (entry,) = told(study, lambda v: v["x"], lambda v, error=error: error, statistical="y")
+        chance = entry["conditions"]["low"]
+        assert [chance[key] for key in ("true", "false", "undecided")] == expected and chance["statistical"] == 4
+
+
+def test_an_undecided_flag_is_undecided_and_a_bound_decides():
+    study = Study(scene="s", parameters={"x": [0.0, 1.0]}, conditions={"held": "y > 0.5"})
+    (entry,) = told(study, lambda v: 1.0, 1.0, **{"y least": lambda v: v["x"], "y most": 1.0})
+    chance = entry["conditions"]["held"]
+    assert [chance[key] for key in ("true", "false", "undecided", "unproven")] == [1, 0, 1, 0]
+    (entry,) = told(study, lambda v: 1.0, lambda v: None, **{"y least": lambda v: v["x"], "y most": np.inf})
+    assert entry["conditions"]["held"]["unproven"] == 0
+
+
+def test_verdicts_are_counted():
+    study = Study(scene="s", parameters={"x": [0.1, 0.2, 0.6]})
+    verdicts = {"y verdict": lambda v: "wide" if v["x"] < 0.5 else None}
+    (entry,) = told(study, lambda v: v["x"], 0.1, **verdicts)
+    assert entry["results"]["y"]["verdicts"] == {"wide": 2, "none": 1}
+    spread = rows_of_spread(entry)
+    assert spread.columns[-1] == "verdict" and spread.rows[0][-1] == "2 wide, 1 none"
+    (plain,) = told(study, lambda v: v["x"], 0.1)
+    assert "verdict" not in rows_of_spread(plain).columns
 
 
 # Sobol's indices

@@ -591,3 +591,32 @@ if __name__ == "__main__":
     else:
         crew = Here if sys.argv[5] == "solved" else lambda: MadeUp(0.05)
         kill_often(int(sys.argv[3]), pathlib.Path(sys.argv[2]), int(sys.argv[4]), crew)
+
+
+# Verdicts
+
+
+def test_a_row_has_the_verdict_on_each_result(tmp_path):
+    """As the run of the case has it, empty where that has none; the rows of a file read back to the same."""
+    folder = tmp_path / "study"
+    found = refweb.sweep(arms(), {FORCE: [0.5, 1.0]}, folder, executor=Here(), progress=False)
+    for force, row in zip((0.5, 1.0), found.rows, strict=True):
+        alone = refweb.run(arms(load=[{"node": 1, "force": [0.0, 0.0, force]}]), progress=False)
+        assert {name: row[f"{name} verdict"] for name in alone.results} == {
+            name: result.verdict for name, result in alone.results.items()
+        }
+        assert "determined" in row.values()
+    assert case_rows.read(folder / case_rows.NAME) == [
+        {column: row.get(column) for column in found.columns} for row in found.rows
+    ]
+    again = refweb.sweep(arms(), {FORCE: [0.5, 1.0, 2.0]}, folder, executor=Here(), progress=False)
+    assert [row["max_tension verdict"] for row in again.rows] == ["determined"] * 3
+
+
+def test_a_run_without_a_verdict_leaves_its_cell_empty():
+    entry = {"value": 1.0, "error": 0.1, "unit": "m", "time": 0.0, "where": None}
+    given = {"status": "solved", "message": "", "results": {"a": entry, "b": {**entry, "verdict": None}}}
+    cells = cases.cells_of(given)
+    assert "a verdict" not in cells and cells["b verdict"] is None
+    assert case_rows.results_among(cells) == [case_rows.Named("a", "m"), case_rows.Named("b", "m")]
+    assert set(case_rows.result_cells(cells)) == set(cells)

@@ -66,6 +66,8 @@ def judged(solution, name):
     covered = f"{throw['covered']['value']:.2f}"
     if (error := throw["covered"].get("error")) is not None:
         covered += f" ± {error:.2f}"
+    undecided = [flag for flag in ("inside", "closed") if throw[flag]["value"] is None]
+    doubt = f", of which ± leaves {' and '.join(undecided)} undecided" if undecided else ", which ± leaves no doubt of"
     passages = "; ".join(f"lines through {what}: {told}" for what, told in passed.items())
     if solution.lines:
         passages += (
@@ -89,11 +91,11 @@ def judged(solution, name):
         Verdict(
             f"The net holds the {name}.",
             "holds",
-            f"the centre of the {name} is inside, the mouth is closed, the net covers {covered} of all directions, the "
-            f"largest stress is {solution.utilisation[0]:.2f} of the strength: numbers of one motion of many, found in "
-            f"{solver['nsteps']} steps, {solution.cost['cpu_s'] - solution.cost['compile_s']:.0f} s of CPU time with "
-            "the twin",
-            throw["inside"]["value"] and throw["closed"]["value"],
+            f"the centre of the {name} is inside, the mouth is closed{doubt}, the net covers {covered} of all "
+            f"directions, the largest stress is {solution.utilisation[0]:.2f} of the strength: numbers of one motion "
+            f"of many, found in {solver['nsteps']} steps, "
+            f"{solution.cost['cpu_s'] - solution.cost['compile_s']:.0f} s of CPU time with the twin",
+            throw["inside"]["drawn"] and throw["closed"]["drawn"],
         ),
     ]
     return rows, verdicts

@@ -64,7 +64,8 @@ def case(quick):
             "The probability that the net holds the stage.",
             "holds",
             f"{k} of {n} draws hold: {100.0 * k / n:.0f} %, between {100.0 * low:.0f} and {100.0 * high:.0f} % "
-            f"(95 %); draws in which the twin does not agree, or tells nothing, which are statistical: {statistical}",
+            f"(95 %); draws that ± leaves undecided: {held['undecided']}, and of which the twin tells nothing: "
+            f"{statistical}",
             0.0 < low <= k / n <= high <= 1.0,
         ),
         Verdict(

@@ -132,6 +132,36 @@ class Stress(Line):
         return tension / net.area
 
 
+class StressShare(Line):
+    """Stress over a limit of it, largest of all lines: what the margin of safety and the utilisation are made of.
+
+    Parameters
+    ----------
+    over : {"strength", "allowed"}
+        The limit, an attribute of `refweb.net.net.Net`.
+    """
+
+    def __init__(self, over):
+        from .observe import Observe
+
+        super().__init__(Observe(name=over, quantity="stress"))
+        self._over = over
+
+    def of(self, state):
+        """The largest of all lines."""
+        shares = state.element_tension * self.scale(state.system.net)
+        at = int(shares.argmax())
+        return Value(float(shares[at]), int(state.system.net.line[at]))
+
+    def scale(self, net):
+        """Inverse of the tension at the limit [1/N], 0 where there is no limit, shape (cells,)."""
+        return 1.0 / (net.area * getattr(net, self._over))
+
+    def bound(self, tension, net):
+        """Error bound of tension over that at the limit [1], shape (cells,)."""
+        return tension * self.scale(net)
+
+
 class Strain(Line):
     """Engineering strain."""
 
