@@ -233,6 +233,7 @@ def print_trust(report):
         rows.append(("runs" * (n == 0), f"{run['text']}: {ended}" + (f", {run['message']}" if run["message"] else "")))
     given, spent = report["budget"]["given"], report["budget"]["spent"]
     rows.append(("cost", f"{spent:.2f} s CPU" + (f" of a budget of {given:g} s" if given is not None else "")))
+    rows += [("warning", text) for text in report["warnings"]]
     _box(f"{report['scene']}: what the results are worth", rows)
 
 

@@ -307,6 +307,7 @@ def report(solution):
         "scene": solution.scene.title,
         "results": results,
         "runs": solution.further,
+        "warnings": solution.warnings,
         "horizon": solution.horizon,
         "budget": {"given": solution.scene.accuracy.budget, "spent": spent},
     }
