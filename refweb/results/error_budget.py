@@ -224,15 +224,8 @@ def judge(solution, scene, system, price=None, asked=None):
             if mesh_only is None:
                 touch = first_touch(scene, system, named[name])
                 mesh_only = touch is not None and 0.0 < total.value <= TOUCH * touch
-            made[name] = with_verdict(total, _remedies(total, solution, price), mesh_only)
-            if (spread := further.get("spread")) is not None and made[name].verdict in (WIDE, STATISTICAL):
-                text = "over runs from starts side by side"
-                mean = readable(spread["mean"], spread["deviation"], result.unit)
-                made[name] = made[name]._replace(
-                    verdict=STATISTICAL, verdict_text=f"{mean} {text}; {_remedies(total, solution, price)[STATISTICAL]}"
-                )
-            if solution.divergence is not None and made[name].verdict == WIDE:
-                made[name] = _of_chaos(made[name], solution.divergence, solution.horizon)
+            total = with_verdict(total, _remedies(total, solution, price), mesh_only)
+            made[name] = _of_chaos(total, solution, further.get("spread"))
         return made
 
     if static:
@@ -240,10 +233,8 @@ def judge(solution, scene, system, price=None, asked=None):
             step["results"] = judged(step["results"])
     else:
         solution.reduced = judged(solution.reduced)
+        solution.findings += _warnings(solution, named, known=bool(asked))
     _judge_utilisation(solution, scene, system, reasons, asked.get(UTILISATION, {}))
-    if static:
-        return
-    solution.findings += _warnings(solution, named, known=bool(asked))
 
 
 def _judge_utilisation(solution, scene, system, reasons, further):
@@ -307,14 +298,20 @@ def _of_model(result):
     }[largest]
 
 
-def _of_chaos(result, divergence, horizon):
-    """A result that is wide in a run and twin that grow apart exponentially."""
-    if result.time < divergence.lost:
+def _of_chaos(result, solution, spread):
+    """The result, statistical where it is wide as the motion is chaotic.
+
+    That is where runs from starts side by side have a ``spread``, or run and twin grow apart exponentially.
+    """
+    divergence, remedy = solution.divergence, _remedies(result, solution, None)[STATISTICAL]
+    if spread is not None and result.verdict in (WIDE, STATISTICAL):
+        mean = readable(spread["mean"], spread["deviation"], result.unit)
+        text = f"{mean} over runs from starts side by side; {remedy}"
+    elif divergence is not None and result.verdict == WIDE and result.time >= divergence.lost:
+        text = f"run and step refinement grow apart with {divergence.growth:.3g} 1/s and leave no digit from t = "
+        text += f"{divergence.lost:.3g} s on; refweb trust finds mean and spread"
+    else:
         return result
-    text = (
-        f"run and step refinement grow apart with {divergence.growth:.3g} 1/s and leave no digit from t = "
-        f"{divergence.lost:.3g} s on; refweb trust finds mean and spread"
-    )
     return result._replace(verdict=STATISTICAL, verdict_text=text)
 
 
