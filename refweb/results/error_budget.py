@@ -208,12 +208,13 @@ def judge(solution, scene, system, price=None, asked=None):
     price : callable, optional
         ``price(share)``, the CPU time [s] that errors take which are to fall by a factor.
     asked : dict, optional
-        Errors by result of further runs: ``parts``, ``reasons`` and ``mesh_only``, see `refweb.studies.further_runs`.
+        Errors by result of further runs, of the last load step in statics: ``parts``, ``reasons``, ``mesh_only`` and
+        ``spread``, see `refweb.studies.further_runs`.
     """
     static, reasons, asked = scene.solve.kind == "static", reasons_of(scene, system, solution), asked or {}
     named = {o.name: o for o in scene.observables}
 
-    def judged(results):
+    def judged(results, asked):
         made = {}
         for name, result in results.items():
             further = asked.get(name, {})
@@ -230,9 +231,9 @@ def judge(solution, scene, system, price=None, asked=None):
 
     if static:
         for step in solution.steps:
-            step["results"] = judged(step["results"])
+            step["results"] = judged(step["results"], asked if step is solution.steps[-1] else {})
     else:
-        solution.reduced = judged(solution.reduced)
+        solution.reduced = judged(solution.reduced, asked)
         solution.findings += _warnings(solution, named, known=bool(asked))
     _judge_utilisation(solution, scene, system, reasons, asked.get(UTILISATION, {}))
 

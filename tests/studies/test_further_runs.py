@@ -40,6 +40,13 @@ def test_the_error_of_smoothing_holds_the_law_without():
         assert off > 1e-3 * abs(found.value) and off <= found.error < 8.0 * off
 
 
+def test_further_runs_tell_of_the_last_load_step_alone():
+    hung = solved(CABLES["level"], 1, 16).scene
+    steps = hung.replace(solve=refweb.Static(load_steps=(0.5, 1.0))).trust(progress=False).steps
+    assert all(found.parts["elements"] == OPEN for found in steps[0]["results"].values())
+    assert all(isinstance(found.parts["elements"], float) for found in steps[1]["results"].values())
+
+
 def bounced(stiffness, duration=0.1, **accuracy):
     """A ball of 1 kg that comes at 1 m/s to a line which both ends hold, and leaves it: nothing else moves."""
     ball = refweb.Body(name="ball", radius=0.1, mass=1.0, position=(0.0, 0.0, -0.12), velocity=(0.0, 0.0, 1.0))
