@@ -50,7 +50,8 @@ MIRRORS = {
     "effects/self_contact/line_line_penalty": "effects/test_self_contact.py",
     "effects/self_contact/line_line_friction": "effects/test_self_contact.py",
     "effects/contact/line_body_friction": "effects/test_contact_losses.py effects/test_contact.py",
-    "effects/contact_solver": "effects/test_contact_losses.py effects/test_attached_contact_losses.py effects/test_contact.py",
+    "effects/contact_solver": "effects/test_contact_losses.py effects/test_attached_contact_losses.py "
+    "effects/test_contact.py",
     "effects/contact/body_body_penalty": "effects/test_between_bodies.py",
     "effects/contact/bodies": "effects/test_between_bodies.py",
     "effects/contact/pair_overlap": "effects/test_between_bodies.py",
