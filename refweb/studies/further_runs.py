@@ -201,7 +201,8 @@ class FurtherRuns:
     def _mesh_only(self, observable):
         """Tell if a force of contact is that of a first touch; None where that is not to be told.
 
-        It falls with the mass of a node, and grows with the root of the stiffness.
+        It falls with the mass of a node, and grows with the root of the stiffness; both have to be seen where both have
+        been run. A force that grows with the stiffness alone has a limit of elements, and depends on the model.
         """
         from ..results.error_budget import first_touch
 
@@ -213,7 +214,7 @@ class FurtherRuns:
         finer, stiffer = ([b / max(a, 1e-300) for a, b in itertools.pairwise(of)] for of in values)
         if not finer and not stiffer:
             return None
-        return bool((stiffer and min(stiffer) > GROWS) or (finer and max(finer) < FALLS))
+        return bool((not stiffer or min(stiffer) > GROWS) and (not finer or max(finer) < FALLS))
 
 
 FINER = ("twice the elements", "four times the elements")
