@@ -34,9 +34,9 @@ LESS = 0.1
 """Smoothing that is compared with, over that of the scene."""
 MEMBERS, QUANTILE = 8, 2.5
 """Number of runs of an ensemble, and how many standard deviations 95 in 100 more runs are from its mean at most."""
-FALLS, GROWS = 0.8, 1.5
-"""Factors on a force of contact, with twice the elements and with 4 times the stiffness, below and above which it is
-that of a first touch: that has 0.71 and 2."""
+FALLS, GROWS = (0.62, 0.79), 1.5
+"""Factors on a force of contact that is that of a first touch: with twice the elements 0.71, here within 12 in 100, for
+what falls faster comes to its limit with the next elements; with 4 times the stiffness 2, here that much or more."""
 
 
 class Spent(Exception):
@@ -214,7 +214,8 @@ class FurtherRuns:
         finer, stiffer = ([b / max(a, 1e-300) for a, b in itertools.pairwise(of)] for of in values)
         if not finer and not stiffer:
             return None
-        return bool((not stiffer or min(stiffer) > GROWS) and (not finer or max(finer) < FALLS))
+        falls = not finer or (finer[-1] > FALLS[0] and max(finer) < FALLS[1])
+        return bool(falls and (not stiffer or min(stiffer) > GROWS))
 
 
 FINER = ("twice the elements", "four times the elements")
