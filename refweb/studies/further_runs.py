@@ -8,8 +8,8 @@ is left of the budget is not begun, and one that is seen to is ended. A part of 
 Two runs are held against each other by their result, and by the mean difference of the observable before, as a run and
 its twin are, see `refweb.dynamics.twin_error`: results may agree by chance.
 
-``python -m validation trust`` holds ± and verdicts against far finer elements, stiffer contact and shorter steps. ± holds
-the truth of 99.8 in 100 of 628 results of 100 random impacts, and of 98.7 in 100 of 230 results of 30 small nets that
+``python -m validation trust`` holds ± and verdicts against far finer elements, stiffer contact and shorter steps. ±
+holds the truth of 99.8 in 100 of 628 results of 100 random impacts, and of 98.7 in 100 of 230 results of 30 small nets that
 are thrown at a sphere. In the median it is 2.4 and 3.9 times what is off, and no result that is called determined is
 off by more than its digits allow. The three results of captures that are not held are forces of contact, two peaks and
 a mean. Of 13 peaks it is said that they have no limit, and none of them converges with 1, 2, 4 and 8 elements. Of 19
