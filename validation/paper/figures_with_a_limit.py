@@ -7,8 +7,9 @@ time: they belong to the mesh, and another mesh of the same web has others.
 
 Here the three webs of ``triangle-impact``, ``square-impact`` and ``hexagon-impact`` are hit by a ball of 1 kg at 1 m/s,
 and by one of 0.1 kg at 10 m/s, which has the same momentum, 1 kg m/s. With the light ball the stresses of figure 17
-cross between 0.5 and 2 kg m/s, see [the webs hit](#webs_hit). Lines have 1, 2, 4 and 8 elements, and contact has the stiffness of the scenes
-and 16 times that. What a quantity converges to is its value at the most elements. Its ± is the sum of three changes:
+cross between 0.5 and 2 kg m/s, see [the webs hit](#webs_hit). Lines have 1, 2, 4 and 8 elements, and contact has the
+stiffness of the scenes and 16 times that. What a quantity converges to is its value at the most elements. Its ± is the
+sum of three changes:
 
 - elements: the last change, or half of the change before where that is larger, for the last two may agree by chance;
 - stiffness of contact: the change at 16 times the stiffness, with lines in 4 elements;
@@ -332,7 +333,7 @@ def _verdicts(impacts, masses):
 
 def _curves(impacts, counts):
     masses = list(dict.fromkeys(mass for _, mass in impacts))
-    page, plot = plots.axes("", ["value over that at the most elements"] + [""] * (len(masses) - 1), len(masses), 3.4)
+    page, plot = plots.axes("", ["value over that at the most elements"] + [""] * (len(masses) - 1), len(masses), 3.8)
     plot = np.atleast_1d(plot)
     for ax, mass in zip(plot, masses, strict=True):
         for (name, (words, *_)), colour in zip(QUANTITIES.items(), plots.COLOURS, strict=False):
@@ -344,5 +345,5 @@ def _curves(impacts, counts):
         ax.set_xticks(counts, [str(n) for n in counts])
         ax.set_title(f"{mass:g} kg", fontsize="medium")
     page.supxlabel("elements per line (triangle solid, square dashed, hexagon dotted)", fontsize="medium")
-    page.legend(*plot[0].get_legend_handles_labels(), frameon=False, loc="outside upper center", ncols=3)
+    page.legend(*plot[0].get_legend_handles_labels(), frameon=False, loc="outside upper center", ncols=2)
     return page
