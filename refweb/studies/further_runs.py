@@ -7,6 +7,12 @@ is left of the budget is not begun, and one that is seen to is ended. A part of 
 
 Two runs are held against each other by their result, and by the mean difference of the observable before, as a run and
 its twin are, see `refweb.dynamics.twin_error`: results may agree by chance.
+
+``python -m validation trust`` holds ± and verdicts against far finer elements, stiffer contact and shorter steps. ±
+holds the truth of 99.8 in 100 of 628 results of 100 random impacts, and of 98.2 in 100 of 228 results of 30 small nets
+that are thrown at a sphere. In the median it is 2.4 and 3.9 times what is off, and no result that is called determined
+is off by more than its digits allow. The four results of captures that are not held are forces of contact, three peaks
+and a mean.
 """
 
 from __future__ import annotations
@@ -47,9 +53,10 @@ APART = 1e-6
 """Difference of the starts of an ensemble, over the shortest element: no real net is known better."""
 LOST = 5
 """Number of digits that a small difference has to cost until a result that is wide counts as chaotic."""
-FALLS, GROWS = 0.8, 1.5
+FALLS, GROWS = 0.85, 1.5
 """Factors on a force of contact, with twice the elements and with 4 times the stiffness, below and above which it is
-that of a first touch: that has 0.71 and 2."""
+that of a first touch: that has 0.71 and 2. Finer elements bring it down to what the web as a whole pushes back, stiffer
+contact drives it up without end: whoever refines both finds no limit."""
 
 
 class Spent(Exception):
@@ -227,7 +234,8 @@ class FurtherRuns:
     def _mesh_only(self, observable):
         """Tell if a force of contact is that of a first touch; None where that is not to be told.
 
-        It falls with the mass of a node, and grows with the root of the stiffness.
+        It falls with the mass of a node, and grows with the root of the stiffness; both have to be seen where both have
+        been run. A force that grows with the stiffness alone depends on the model.
         """
         touch = first_touch(self.scene, self.simulation.system, observable)
         if touch is None or not self.solution.results[observable.name].value > 0.0:
@@ -237,7 +245,7 @@ class FurtherRuns:
         finer, stiffer = ([b / max(a, 1e-300) for a, b in itertools.pairwise(of)] for of in values)
         if not finer and not stiffer:
             return None
-        return bool((stiffer and min(stiffer) > GROWS) or (finer and max(finer) < FALLS))
+        return bool((not finer or finer[0] < FALLS) and (not stiffer or min(stiffer) > GROWS))
 
 
 FINER = ("twice the elements", "four times the elements")

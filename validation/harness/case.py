@@ -49,6 +49,7 @@ CASES = {
         "length_area",
         "webs_under_load",
         "webs_hit",
+        "figures_with_a_limit",
         "open_parameters",
     ),
     "statics": (
@@ -84,7 +85,7 @@ CASES = {
         "capture_in_orbit",
         "odds_of_capture",
     ),
-    "methods": ("cross_validation", "coverage", "work_precision", "price_of_modelling"),
+    "methods": ("cross_validation", "coverage", "trust", "work_precision", "price_of_modelling"),
     "hard_cases": ("hard_cases",),
 }
 """Parts of the report, each a folder, and the names of their cases, in the order of the report."""

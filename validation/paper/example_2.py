@@ -37,6 +37,10 @@ RATES = (20.0, 40.0)
 """Drags [1/s]."""
 STEP = 1.6e-5
 """Half of the stable step [s]."""
+PEAKS = [
+    refweb.Observe(name="contact_force", quantity="reaction", body="ring", reduce="max"),
+    refweb.Observe(name="max_tension", quantity="tension", reduce="max"),
+]
 
 
 @functools.cache
@@ -48,6 +52,7 @@ def hit(step, shift=0.0, rate=0.0, duration=0.6):
         effects.append(refweb.Damping(rate=rate))
     scene = base.replace(
         effects=effects,
+        observe=[*base.observe, *PEAKS],
         solve=refweb.Dynamic(duration=duration, step_size=step),
         output=refweb.Output(interval=1e-3, frames=1),
         accuracy=refweb.Accuracy(error="none"),

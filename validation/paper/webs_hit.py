@@ -31,6 +31,14 @@ HEAVY, LIGHT, FAST = 1.0, 0.1, 0.05
 RADIUS, STIFFNESS = 0.1, 1e5
 DURATION = 0.45
 """Until a ball of 1 kg at 1 m/s has left any of the webs [s]."""
+OBSERVE = [
+    refweb.Observe(name="deflection", quantity="displacement", reduce="max"),
+    refweb.Observe(name="max_stress", quantity="stress", reduce="max"),
+]
+OBSERVE_BALL = [
+    refweb.Observe(name="contact_force", quantity="reaction", body="ball", reduce="max"),
+    refweb.Observe(name="ball_speed", quantity="velocity", body="ball", component="z"),
+]
 
 
 def scene(mesh, momentum, mass, radius=RADIUS, subdivide=1, sticks=False, contact=STIFFNESS, frames=200):
@@ -50,7 +58,7 @@ def scene(mesh, momentum, mass, radius=RADIUS, subdivide=1, sticks=False, contac
         solve=refweb.Dynamic(duration=duration, safety=0.25 if mass < 0.3 else 0.5),
         output=refweb.Output(interval=duration / 200, frames=frames),
         accuracy=refweb.Accuracy(error="none"),
-        observe=[one for one in base.observe if not (sticks and one.body)],
+        observe=OBSERVE if sticks else OBSERVE + OBSERVE_BALL,
     )
 
 
