@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import brentq, lsq_linear
 
 import refweb
+from refweb.dynamics import schedule
 from refweb.effects.self_contact import line_line_damping, line_line_friction, line_line_penalty, search, table
 from refweb.effects.self_contact.pair import (
     DAMPING,
@@ -28,6 +29,7 @@ from refweb.net import discretisation
 from refweb.net.web import Web
 from refweb.registry import INTEGRATORS
 from refweb.results.summary_text import on_run
+from validation.methods import trust
 
 RADIUS, STIFFNESS = 0.1, 100.0
 REST = np.zeros((4, 3))
@@ -1122,3 +1124,17 @@ def test_rows_one_by_one_are_the_rows_of_one_call(monkeypatch):
     assert other.nsteps == course.nsteps and np.abs(course.x).max() > 1e-2
     for one in (other, loaded):
         np.testing.assert_allclose(one.x, course.x, atol=1e-12)
+
+
+def test_a_chosen_stiffness_does_not_depend_on_the_machine(monkeypatch):
+    """A contact that is too soft is found at the end of a block, whose rows are as many as the machine is fast."""
+    _, scene = next(trust.scenes("capture", 9))
+    scene = scene.replace(accuracy=refweb.Accuracy(error="none"))
+    monkeypatch.setattr(schedule, "BLOCK", 1e9)
+    found = []
+    for most in (1, 3, 1000):
+        monkeypatch.setattr(schedule, "MOST_ROWS", most)
+        solution = refweb.run(scene)
+        assert any("repeated with stiffness" in text for text in solution.warnings)
+        found.append((solution.lines["stiffness"], *(result.value for result in solution.results.values())))
+    assert found[0] == found[1] == found[2]

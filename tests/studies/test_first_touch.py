@@ -1,4 +1,4 @@
-"""A force of contact has no limit where it is that of a first touch: whoever refines elements and contact finds none."""
+"""A force of contact that is that of a first touch has no limit: whoever refines elements and contact finds none."""
 
 import pytest
 

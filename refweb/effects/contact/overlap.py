@@ -50,8 +50,9 @@ Of a net of 16 × 16 cells that is thrown at a box of 500 kg this costs as many 
 times softer; 0.1 costs 2.4 times as many."""
 NOTED = 0.03
 """Overlap over the size of the body above which it is told: results may move with it."""
-STIFFER = 4.0
-"""Least factor of a stiffness that is chosen anew: an overlap that is found too deep may still be growing."""
+STIFFER = 25.0
+"""Factor of a stiffness that is chosen anew in dynamics: energy that reaches the overlap that is allowed comes to `AIM`
+of it then. How deep the overlap is says less, for it may still be growing when it is looked at."""
 DEEPER = 1.1
 """Factor on the overlap at the start up to which a deeper one is no matter of stiffness."""
 ALONG, TOLD = 0.29, 0.05
@@ -79,7 +80,8 @@ def rounded_up(value):
 
 def too_soft(deepest, where, limit, names):
     """The `PenetrationError` of a contact deeper than ``limit`` [m], whose stiffness was chosen for some bodies."""
-    stiffer = rounded_up(max(deepest.enough, STIFFER * deepest.stiffness))
+    factor = STIFFER * deepest.stiffness
+    stiffer = rounded_up(factor if deepest.moving else max(deepest.enough, factor))
     return PenetrationError(
         f"{where} with stiffness = {deepest.stiffness:g}, {limit:.3g} m are allowed; repeated with stiffness = "
         f"{stiffer:g}",

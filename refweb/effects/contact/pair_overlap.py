@@ -68,6 +68,11 @@ class DeepestPair(NamedTuple):
         return min(body.thickness for body in self.bodies)
 
     @property
+    def moving(self):
+        """True: bodies that push each other come with energy."""
+        return True
+
+    @property
     def in_core(self):
         """True if one is in the core of the other."""
         return self.overlap > CORE * self.thickness

@@ -24,7 +24,7 @@ from ...findings import Finding
 AIM = 0.8
 """Overlap that a stiffness is named for, over the radius."""
 STIFFER = 4.0
-"""Least factor of a stiffness that is chosen anew: an overlap that is found too deep may still be growing."""
+"""Factor of a stiffness that is chosen anew: how deep an overlap is says little while it may still be growing."""
 POWER = 2.5
 """Power of an overlap that the energy of lines that cross goes with."""
 PRESCRIBED = "the motion of both is prescribed, and no stiffness of [self_contact] holds them"
@@ -187,7 +187,7 @@ class Passage:
             )
         enough = float(f"{self._enough(overlap, elements, v):.2g}")
         if self._chosen:
-            enough = max(enough, STIFFER * self._stiffness)
+            enough = STIFFER * self._stiffness if v is not None else max(enough, STIFFER * self._stiffness)
             raise PenetrationError(
                 f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}, with "
                 f"stiffness = {self._stiffness:.3g}; repeated with stiffness = {enough:g}",
