@@ -74,7 +74,7 @@ def test_mean_and_deviation_of_an_ensemble(monkeypatch):
     """
     rate, beside = np.sqrt(2.0 * 7e3 * 1e-3), np.array([3.0, -1.0, 4.0, 1.0, -5.0]) * 1e-9
 
-    def start(simulation, seed, size):
+    def start(simulation, seed, size=None):
         x = np.zeros((simulation.system.rows, 3))
         x[1, 1] = beside[seed - 1]
         return Start(x, None)
