@@ -248,6 +248,7 @@ def print_comparison(comparison):
         differing = [difference for difference in row["differences"] if difference is not None]
         apart = differing[-1] if len(folders) == 2 else max(differing) - min(differing)
         said = "agree" if row["agree"] else "differ"
+        said = "means nothing" if row["meaningless"] is not None else said
         if row["agree"] is None:
             said = "only in " + next(f for f, value in zip(folders, row["values"], strict=True) if value is not None)
         difference = "" if len(differing) < 2 else readable(apart, None, row["unit"])
@@ -270,7 +271,8 @@ def print_comparison(comparison):
         rows.append(("scenes", grid))
     else:
         rows.append(("scenes", "are the same"))
-    _box("the results agree" if comparison["agree"] else "the results differ", rows)
+    some = " where they can be compared" * any(row["meaningless"] is not None for row in comparison["results"])
+    _box(f"the results agree{some}" if comparison["agree"] else f"the results differ{some}", rows)
 
 
 def _compared(value):

@@ -48,7 +48,7 @@ def on_tension(largest, dynamic):
 
 
 def on_margin(summary, scene, dynamic):
-    """(Name, sentence) of the margin of safety and of the line that breaks first."""
+    """(Name, sentence) of the margin of safety and of the line that is stressed most."""
     margin: dict[str, Any] | None = summary.get("margin")
     if margin is None:
         lacking = "the run has no strength: give [cable] strength [Pa], or that of [cable.groups]"
@@ -70,7 +70,9 @@ def on_margin(summary, scene, dynamic):
     if (given := summary.get("utilisation")) and given["value"] > used["value"]:  # in statics that of the last step
         used = given
     share = f"its stress reaches {_percent(used['value'], used.get('error'))} of its strength"
-    yield "breaks first", f"line {used['line']}: {share}"
+    if broken := summary.get("breaks"):
+        share += f"; line {broken[0]['line']} broke at t = {broken[0]['time']:.6g} s"
+    yield "would break first", f"line {used['line']}: {share}"
 
 
 def _percent(value, error):
@@ -81,12 +83,12 @@ def _percent(value, error):
 
 
 def decision(margin, error):
-    """(Lower, upper end, verdict) of a margin, of the ± of its stress [Pa]; "holds", "breaks" or "undecided"."""
+    """(Lower, upper end, verdict) of a margin, of the ± of its stress [Pa]; "holds", "does not hold" or "undecided"."""
     stress, allowed = margin["stress"], margin["allowed"]
     error = error or 0.0
     lower = allowed / (stress + error) - 1.0
     upper = allowed / (stress - error) - 1.0 if stress > error else math.inf
-    return lower, upper, "holds" if lower > 0.0 else "breaks" if upper < 0.0 else "undecided"
+    return lower, upper, "holds" if lower > 0.0 else "does not hold" if upper < 0.0 else "undecided"
 
 
 def _decided(margin, error):

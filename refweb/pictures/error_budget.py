@@ -6,7 +6,7 @@ from ..results.error_budget import ALLOWED, OPEN, PARTS, WORDS
 from .sheet import COLOURS, LETTERS, Panel, legend, sheet
 
 MOST = 1.0
-"""± over the value at which bars are cut."""
+"""± over the value to which longer bars are shrunk, with all their parts."""
 
 
 def draw(results, title):
@@ -18,9 +18,10 @@ def draw(results, title):
         for row, name in enumerate(reversed(names)):
             result, left = results[name], 0.0
             size = abs(result.value) or 1.0
+            shrunk = min(1.0, MOST * size / result.error) if result.error else 1.0
             for part, colour in zip(PARTS, COLOURS, strict=False):
                 if isinstance(share := result.parts[part], float) and share > 0.0:
-                    width = min(share / size, MOST - left)
+                    width = shrunk * share / size
                     axes.barh(row, 100.0 * width, left=100.0 * left, color=colour, height=0.6)
                     left, used = left + width, used | {part}
             missing = [WORDS[part] for part in PARTS if result.parts[part] == OPEN]

@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 from ..findings import Finding
-from ..net.tension_laws import SMOOTH
+from ..net.tension_laws import LINEAR, SMOOTH
 from .solution import Result
 from .strength import ALIKE, UTILISATION, of_observable
 from .units import readable
@@ -47,6 +47,8 @@ SMOOTHED = 1.32
 """What smoothing leaves of a result over what is found by a tenth of it, as if errors went with η.
 
 Where they go with √η, as of nets that are flat and slack, a tenth leaves √0.1 of them."""
+ZERO = 1e-14
+"""Value with its ± over the size of such results in a net, below which it is zero but for rounding."""
 MOST_DIGITS = 12
 """Most digits that are named."""
 TOUCH = 4.0
@@ -73,15 +75,25 @@ def reasons_of(scene, system, solution):
             reasons["elements"] = "straight elements that are loaded at their ends alone are exact"
     else:
         reasons["rounding"] = "part of that of time steps: both runs round differently"
+    if scene.cable.subdivide == scene.cable.order == 1 and (system.net.laws == LINEAR).all():
+        reasons["elements"] = "lines that push have one element each: in several they would be chains"
     touching = [entry["overlap"] for table in (solution.bodies, solution.pairs) for entry in table.values()]
     touching += [solution.lines["overlap"]] if solution.lines else []
     if not touching:
         reasons["contact_stiffness"] = "no contact in the scene"
     elif not any(touching):
         reasons["contact_stiffness"] = "nothing touches"
-    if not (system.net.laws == SMOOTH).any():
-        reasons["smoothing"] = "the cable law has none"
+    static = scene.solve.kind == "static"
+    if not (system.net.laws == SMOOTH).any() and (static or not any(map(rubs, scene.effects))):
+        reasons["smoothing"] = "neither the cable law nor friction has any"
     return reasons
+
+
+def rubs(effect):
+    """Tell if an effect is contact with friction, whose force is smooth in the velocity of slip."""
+    friction = getattr(effect, "friction", None)
+    others = (getattr(body, "friction", None) for body in getattr(effect, "bodies", {}).values())
+    return hasattr(effect, "slip_velocity") and any((friction or 0.0, *(value or 0.0 for value in others)))
 
 
 def with_parts(result, static, reasons):
@@ -111,7 +123,20 @@ def digits_of(value, error):
     return max(0, min(MOST_DIGITS, math.floor(math.log10(abs(value) / error) + 1e-9))) if value else 0
 
 
-def with_verdict(result, remedies, mesh_only=False):
+def scales_of(system):
+    """Sizes by unit that results of a system have, below `ZERO` of which they are zero."""
+    net = system.net
+    axial = float(net.line_data.ea.max())
+    energy = float((net.line_data.ea * net.line_data.natural_length).sum())
+    return {
+        "m": float(np.ptp(net.points, axis=0).max()),
+        "N": axial,
+        "Pa": float((net.line_data.ea / net.area).max()),
+        "J": energy,
+    }
+
+
+def with_verdict(result, remedies, mesh_only=False, scales=None):
     """The result with its verdict and a sentence on that.
 
     Parameters
@@ -122,6 +147,8 @@ def with_verdict(result, remedies, mesh_only=False):
         Sentence by verdict on what makes ± smaller, or on what to ask instead.
     mesh_only : bool
         Whether finer elements are known not to converge.
+    scales : dict of str to float, optional
+        Sizes by unit, see `scales_of`.
     """
     value, error = abs(result.value), result.error
     missing = [WORDS[part] for part, state in result.parts.items() if state == OPEN]
@@ -132,6 +159,8 @@ def with_verdict(result, remedies, mesh_only=False):
         )
     if error is None or not math.isfinite(error):
         return result._replace(verdict=None, verdict_text="its error is not known")
+    if value + error <= ZERO * (scales or {}).get(result.unit, 0.0):
+        return result._replace(verdict=DETERMINED, verdict_text="zero but for rounding", digits=MOST_DIGITS)
     if error <= ALLOWED * value or error == 0.0:
         digits = digits_of(value, error)
         plural = "s" * (digits != 1)
@@ -212,7 +241,7 @@ def judge(solution, scene, system, price=None, asked=None):
         ``spread``, see `refweb.studies.further_runs`.
     """
     static, reasons, asked = scene.solve.kind == "static", reasons_of(scene, system, solution), asked or {}
-    named = {o.name: o for o in scene.observables}
+    named, scales = {o.name: o for o in scene.observables}, scales_of(system)
 
     def judged(results, asked):
         made = {}
@@ -225,7 +254,7 @@ def judge(solution, scene, system, price=None, asked=None):
             if mesh_only is None:
                 touch = first_touch(scene, system, named[name])
                 mesh_only = touch is not None and 0.0 < total.value <= TOUCH * touch
-            total = with_verdict(total, _remedies(total, solution, price), mesh_only)
+            total = with_verdict(total, _remedies(total, solution, price), mesh_only, scales)
             made[name] = _of_chaos(total, solution, further.get("spread"))
         return made
 
@@ -280,6 +309,9 @@ def _remedies(result, solution, price):
         cost = f", for some {price(share):.2g} s of CPU time"
     horizon = next((time for k, time in reversed(solution.horizon.get("digits", ())) if time is not None), None)
     until = f" at t < {horizon:.3g} s" if horizon else ""
+    if solution.scene.solve.kind == "static":
+        wide = "that is what the residual and rounding leave of it"
+        return {WIDE: wide, STATISTICAL: "", NO_LIMIT: "", MODEL: _of_model(result).partition(", or ask")[0]}
     return {
         WIDE: f"[accuracy] digits = 1 makes it smaller{cost}",
         STATISTICAL: f"ask for a result{until}, for a mean (average), or for quantiles of many runs (refweb sweep)",
@@ -295,25 +327,25 @@ def _of_model(result):
     return {
         "elements": "[cable] subdivide = 2 makes it smaller, or ask for its mean over a longer time (average)",
         "contact_stiffness": "give [contact] the stiffness of the real surface, or a larger one",
-        "smoothing": "lower [cable] smoothing, or take the tension-only law",
+        "smoothing": "lower the smoothing of the cable law, or the slip_velocity of friction",
     }[largest]
 
 
 def _of_chaos(result, solution, spread):
-    """The result, statistical where it is wide as the motion is chaotic.
+    """The result with mean and spread where it is statistical, and statistical where run and twin grow apart.
 
-    That is where runs from starts side by side have a ``spread``, or run and twin grow apart exponentially.
+    It stays wide where time steps are the largest part of ±, and runs from starts side by side say otherwise.
     """
     divergence, remedy = solution.divergence, _remedies(result, solution, None)[STATISTICAL]
-    if spread is not None and result.verdict in (WIDE, STATISTICAL):
+    if spread is not None and result.verdict == STATISTICAL:
         mean = readable(spread["mean"], spread["deviation"], result.unit)
         text = f"{mean} over runs from starts side by side; {remedy}"
-    elif divergence is not None and result.verdict == WIDE and result.time >= divergence.lost:
+        return result._replace(verdict_text=text)
+    if spread is None and divergence is not None and result.verdict == WIDE and result.time >= divergence.lost:
         text = f"run and step refinement grow apart with {divergence.growth:.3g} 1/s and leave no digit from t = "
         text += f"{divergence.lost:.3g} s on; refweb trust finds mean and spread"
-    else:
-        return result
-    return result._replace(verdict=STATISTICAL, verdict_text=text)
+        return result._replace(verdict=STATISTICAL, verdict_text=text)
+    return result
 
 
 def _warnings(solution, named, known):

@@ -28,8 +28,9 @@ import numpy as np
 from ..dynamics.budget import steps_with_twin
 from ..dynamics.twin_error import largest_mean
 from ..errors import InputError, SolverError
+from ..net.tension_laws import SMOOTH
 from ..registry import EFFECTS, INTEGRATORS, name_of
-from ..results.error_budget import ALLOWED, SMOOTHED, first_touch, reasons_of
+from ..results.error_budget import ALLOWED, SMOOTHED, first_touch, reasons_of, rubs
 from ..results.files import write_atomically, write_text
 from ..results.solution import as_history
 from ..results.strength import UTILISATION
@@ -47,6 +48,8 @@ STIFFER = (4.0, 16.0)
 """Stiffness of contact that is compared with, over that of the scene."""
 LESS = 0.1
 """Smoothing that is compared with, over that of the scene."""
+SLOWER = 0.25
+"""Slip velocity of friction that is compared with, over that of the scene."""
 MEMBERS, QUANTILE = 8, 2.5
 """Number of runs of an ensemble, and how many standard deviations 95 in 100 more runs are from its mean at most."""
 APART = 1e-6
@@ -177,23 +180,43 @@ class FurtherRuns:
             self.solution.horizon["ensemble"] = ensemble(self.simulation, MEMBERS, tell, APART)
 
     def _chaotic(self, observable):
-        """Tell if small differences have grown so much before a result that more steps hardly make its ± smaller."""
+        """Tell if small differences have grown so much that more steps hardly make ± smaller, or that nothing is left.
+
+        What counts is the time of the result, of a peak the end of the run: a motion beside it may have a higher one
+        later.
+        """
         result = self.solution.results[observable.name]
-        lost = lost_digits(self.solution.horizon, result.time)
+        time = result.time if observable.reduce == "final" else np.inf
+        lost = lost_digits(self.solution.horizon, time)
         return lost >= LOST and result.error is not None and result.error > ALLOWED * abs(result.value) or lost == 12
 
     def findings(self):
         """Errors by result, as far as these runs tell: ``parts``, ``reasons`` and ``mesh_only``."""
         errors: dict = {o.name: self._found_of(o) for o in self.scene.observables}
-        return errors | {UTILISATION: {"parts": self._parts_of(UTILISATION)}}
+        used = {"parts": self._parts_of(UTILISATION)}
+        if self.solution.utilisation is not None and (horizon := self.solution.horizon):
+            if lost_digits(horizon, np.inf) < 12:
+                used = self._without_chance(used)
+            elif (mean := horizon.get("ensemble", {}).get(UTILISATION)) is not None:
+                used["parts"]["chance"] = self._chance(self.solution.utilisation.value, mean)
+        return errors | {UTILISATION: used}
+
+    def _without_chance(self, entry):
+        """An entry of `findings` of a result that small differences leave as it is."""
+        parts = {**entry["parts"], "chance": "none"}
+        return {**entry, "parts": parts, "reasons": {"chance": "small differences at the start leave its digits"}}
+
+    def _chance(self, value, mean):
+        """Error of a value by chance, from mean and deviation of an ensemble."""
+        return abs(value - mean["mean"]) + QUANTILE * mean["deviation"]
 
     def _parts_of(self, name):
         """Errors of a result by part of the model; of the utilisation, which has no history, by its largest value."""
         parts = {}
-        for part, texts in (("elements", FINER), ("contact_stiffness", STIFFNESS), ("smoothing", (SMOOTHER,))):
+        for part, texts, factor in TELLING:
             texts = [text for text in texts if text in self._compared]
             if texts and name in self._compared[None][0]:
-                parts[part] = self._left(name, texts, SMOOTHED / (1.0 - LESS) / MARGIN if part == "smoothing" else 2.0)
+                parts[part] = parts.get(part, 0.0) + self._left(name, texts, factor)
         return parts
 
     def _found_of(self, observable):
@@ -204,10 +227,9 @@ class FurtherRuns:
         if not horizon:
             return entry
         if not self._chaotic(observable):
-            parts["chance"] = "none"
-            reasons["chance"] = "small differences at the start leave its digits"
-        elif (mean := horizon.get("ensemble", {}).get(name)) is not None:
-            parts["chance"] = abs(self.solution.results[name].value - mean["mean"]) + QUANTILE * mean["deviation"]
+            return self._without_chance(entry)
+        if (mean := horizon.get("ensemble", {}).get(name)) is not None:
+            parts["chance"] = self._chance(self.solution.results[name].value, mean)
             entry["spread"] = mean
         return entry
 
@@ -250,7 +272,15 @@ class FurtherRuns:
 
 FINER = ("twice the elements", "four times the elements")
 STIFFNESS = tuple(f"{times:g} times the stiffness of contact" for times in STIFFER)
-SMOOTHER, HORIZON, ENSEMBLE = "a tenth of the smoothing", "two starts side by side", f"{MEMBERS} starts side by side"
+SMOOTHER, SLIP = "a tenth of the smoothing", "a quarter of the slip velocity of friction"
+TELLING = (
+    ("elements", FINER, 2.0),
+    ("contact_stiffness", STIFFNESS, 2.0),
+    ("smoothing", (SMOOTHER,), SMOOTHED / (1.0 - LESS) / MARGIN),
+    ("smoothing", (SLIP,), 1.0 / (1.0 - SLOWER)),
+)
+"""Parts of the error, the runs that tell of each, and what a single one leaves over the change that it makes."""
+HORIZON, ENSEMBLE = "two starts side by side", f"{MEMBERS} starts side by side"
 
 
 def variants(scene, system, solution, single):
@@ -269,14 +299,31 @@ def variants(scene, system, solution, single):
             stiffer = plain.with_stiffness({name: times * value for name, value in given.items()}).replace(chosen=())
             price = single * (times**0.5 if explicit else 1.5)
             yield Variant("contact_stiffness", text, stiffer, price, STIFFNESS[0] if n else None)
-    if "smoothing" not in reasons and not static:
+    if not static and (system.net.laws == SMOOTH).any():
         from ..statics.smoothing_error import less_smooth
 
         groups = {name: less_smooth(group) for name, group in scene.cable.groups.items()}
         cable = replace(less_smooth(scene.cable), groups=groups)
         yield Variant("smoothing", SMOOTHER, plain.replace(cable=cable), single)
+    if not static and (effects := slower_slip(scene)) is not None:
+        yield Variant("smoothing", SLIP, plain.replace(effects=effects), single)
     if not static:
         yield Variant("chance", HORIZON, None, 2.0 * single)
+
+
+def slower_slip(scene):
+    """Effects of a scene with `SLOWER` of the slip velocity of all friction; None without any."""
+    effects, any_friction = [], False
+    for effect in scene.effects:
+        if name_of(EFFECTS, effect) in ("contact", "self_contact") and rubs(effect):
+            bodies = getattr(effect, "bodies", {})
+            slower = {
+                n: replace(b, slip_velocity=SLOWER * b.slip_velocity) for n, b in bodies.items() if b.slip_velocity
+            }
+            changed = {"bodies": {**bodies, **slower}} if slower else {}
+            effect, any_friction = replace(effect, slip_velocity=SLOWER * effect.slip_velocity, **changed), True
+        effects.append(effect)
+    return effects if any_friction else None
 
 
 def stiffness_of(scene, system):

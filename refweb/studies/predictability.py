@@ -13,6 +13,7 @@ import numpy as np
 
 from ..dynamics.initial_state import Start
 from ..dynamics.schedule import blocks
+from ..results.strength import UTILISATION
 
 PERTURBATION = 1e-12
 """Largest difference of an unknown at the start, over the natural length of the shortest element."""
@@ -97,8 +98,10 @@ def ensemble(simulation, count, tell, size=PERTURBATION):
         course = integrator.start(*_beside(simulation, seed, size).motion)
         for block in blocks(integrator, course, simulation.schedule):
             table = watch.table(block.history)
-        values.append([result.value for result in watch.results(course, table[-1]).values()])
+        values_found = {name: result.value for name, result in watch.results(course, table[-1]).items()}
+        if (used := watch.utilisation(course)) is not None:
+            values_found[UTILISATION] = used[0]
+        values.append(list(values_found.values()))
         tell("ensemble", seed / count)
-    mean, deviation = np.mean(values, axis=0), np.std(values, axis=0, ddof=1)
-    names = [o.name for o in simulation.scene.observables]
+    mean, deviation, names = np.mean(values, axis=0), np.std(values, axis=0, ddof=1), list(values_found)
     return {n: {"mean": float(m), "deviation": float(d)} for n, m, d in zip(names, mean, deviation, strict=True)}

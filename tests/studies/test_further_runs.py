@@ -154,3 +154,62 @@ def test_refusals(given, message, capsys):
     assert main(["trust", "square-load", *given]) == 2
     said = capsys.readouterr().err
     assert message in said and said.count("\n") == 1
+
+
+def upright(speed, **changes):
+    """A mass on a bar that stands on a support, in gravity: the least push lays it down."""
+    return refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [0, 0, 1]], lines=[[0, 1]], supports=[0]),
+        cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=1.0),
+        effects=[
+            refweb.PointMass(node=1, mass=0.1),
+            refweb.Gravity(acceleration=(0, 0, -9.81)),
+            refweb.Velocity(node=1, value=(0.0, 0.0, speed)),
+        ],
+        observe=[refweb.Observe(name="lowest", quantity="position", node=1, component="z", reduce="min")],
+        solve=refweb.Dynamic(duration=15.0),
+        output=refweb.Output(interval=0.05),
+        **changes,
+    )
+
+
+def test_a_peak_before_the_horizon_may_be_exceeded_behind_it():
+    """It stands for 15 s where nothing pushes it, and swings through its lowest place where anything does."""
+    found = upright(0.05).trust(progress=False).results["lowest"]
+    assert found.value > 0.9 and found.verdict == "statistical" and found.error > 1.9
+
+
+def test_steps_that_are_too_long_are_no_chance():
+    """A double pendulum is wide by its time steps; digits that are asked for are found."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0.5]], lines=[[0, 1], [1, 2]], supports=[0]),
+        cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=0.0),
+        effects=[refweb.PointMass(node=[1, 2], mass=0.1), refweb.Gravity(acceleration=(0, 0, -9.81))],
+        observe=[refweb.Observe(name="x", quantity="position", node=2, component="x")],
+        solve=refweb.Dynamic(duration=15.0),
+        output=refweb.Output(interval=0.05),
+    )
+    found = scene.trust(progress=False).results["x"]
+    assert found.verdict == "wide" and "digits = 1" in found.verdict_text
+    digits = refweb.run(scene.replace(accuracy=refweb.Accuracy(digits=1))).results["x"]
+    assert digits.error <= 0.05 * abs(digits.value) and abs(found.value - digits.value) <= found.error
+
+
+def test_friction_that_creeps_is_off_by_its_slip_velocity():
+    """Two masses stay on a plate whose friction is above the pull along it; that friction is smooth lets them creep."""
+    plate = refweb.Body(name="plate", shape="box", size=(4, 4, 0.2), position=(0, 0, -0.11), fixed=True)
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[-0.2, 0, 0], [0.2, 0, 0]], lines=[[0, 1]], supports=[]),
+        cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=0.0),
+        effects=[
+            refweb.PointMass(node=[0, 1], mass=0.1),
+            refweb.Gravity(acceleration=(0.0, 2.0, -9.81)),
+            plate,
+            refweb.Contact(stiffness=2e3, friction=0.5, damping=20.0),
+        ],
+        observe=[refweb.Observe(name="slip", quantity="displacement", node=0, component="y")],
+        solve=refweb.Dynamic(duration=2.0),
+        output=refweb.Output(interval=0.02),
+    )
+    found = scene.trust(progress=False).results["slip"]
+    assert found.value > 1e-3 and found.parts["smoothing"] >= found.value and found.verdict == "depends on the model"

@@ -92,7 +92,11 @@ class Place(Nodal):
         if limits is None:
             return None
         shift = float((self.vectors(state) - state.position)[rows[0], axis])
-        return tuple(float(limit) + shift for limit in limits)
+        value = float(
+            self.vectors(state)[rows[0], axis]
+        )  # which rounding may leave beside limits that are next to equal
+        ends = sorted(float(limit) + shift for limit in limits)
+        return min(ends[0], value), max(ends[1], value)
 
 
 class Displacement(Place):
