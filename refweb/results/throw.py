@@ -135,6 +135,9 @@ class Throw(Table):
         for name in (*self.numbers, *(["side"] if self.target is not None else [])):
             tells = refined is not None and settled.get(name, end) < known
             errors[name] = _error_of(name, values, half, refined, factor) if tells else None
+        if errors.get("closed") is not None and twin is not None:
+            column = 1 + names.index(self.area)
+            errors["closed"] += float(factor * _mean_difference(rows[:, [0, column]], twin[0][:, [0, column]]))
         if errors.get("covered") is not None and not _decided(values, errors):
             errors["covered"] += abs(1.0 - 2.0 * values["covered"])
         why = {"reason": NO_TWIN}
@@ -183,6 +186,16 @@ class Throw(Table):
             "covered": covered(outline, nodes, centre, depth > 0.0),
             "side": side_of_mouth(outline, nodes, centre),
         }
+
+
+def _mean_difference(rows, refined):
+    """Root mean square of the difference of two columns (time, value) in the second half of the time.
+
+    At the end alone two runs may agree by chance.
+    """
+    count = min(len(rows), len(refined))
+    late = (rows[:count, 0] == refined[:count, 0]) & (rows[:count, 0] >= 0.5 * rows[count - 1, 0])
+    return np.sqrt(np.mean((rows[:count, 1] - refined[:count, 1])[late] ** 2)) if late.any() else 0.0
 
 
 def _every_other(count):
@@ -280,5 +293,5 @@ def solid_angle(outline, centre):
 
 def covered(outline, nodes, centre, inside):
     """Share of directions from a centre that a net covers, see `Throw`."""
-    share = solid_angle(outline, centre) / (4.0 * np.pi)
+    share = min(solid_angle(outline, centre) / (4.0 * np.pi), 1.0)  # the fan of a folded outline may count twice
     return 1.0 - share if inside and side_of_mouth(outline, nodes, centre) > 0.0 else share
