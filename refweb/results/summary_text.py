@@ -37,6 +37,8 @@ def rows_of_results(results, dynamic):
 def verdict_of(result):
     """Verdict of a result in a few words: "determined, 3 digits", "wide"; without one how many digits ± leaves."""
     verdict, digits = result.get("verdict"), result.get("digits")
+    if verdict == DETERMINED and digits == 0:
+        return f"{verdict}, {result['verdict_text']}"
     count = "" if digits is None else f"{digits} digit{'s' * (digits != 1)}"
     return ", ".join(filter(None, [verdict, count]))
 

@@ -54,6 +54,13 @@ def test_verdicts(value, parts, verdict, digits):
     assert verdict is None or verdict in VERDICTS
 
 
+def test_what_is_zero_but_for_rounding_has_no_digits():
+    made = summed(Result(3e-17, None, "m", 0.0, None, parts={**ALL, "time": 1e-16}, reasons={}))
+    found = with_verdict(made, {}, scales={"m": 1.0})
+    assert (found.verdict, found.digits, found.verdict_text) == ("determined", 0, "zero but for rounding")
+    assert with_verdict(made, {}, scales={"m": 1e-6}).verdict == "wide"
+
+
 def test_a_number_of_the_mesh_has_no_limit_whatever_its_error():
     made = summed(Result(1.0, None, "N", 0.0, None, parts={**ALL, "time": 1e-9}, reasons={}))
     assert with_verdict(made, {}, mesh_only=True).verdict == "no limit"
