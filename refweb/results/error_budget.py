@@ -159,7 +159,7 @@ def with_verdict(result, remedies, mesh_only=False, scales=None):
         )
     if error is None or not math.isfinite(error):
         return result._replace(verdict=None, verdict_text="its error is not known")
-    if value + error <= ZERO * (scales or {}).get(result.unit, 0.0):
+    if error > 0.0 and value + error <= ZERO * (scales or {}).get(result.unit, 0.0):
         return result._replace(verdict=DETERMINED, verdict_text="zero but for rounding", digits=0)
     if error <= ALLOWED * value or error == 0.0:
         digits = digits_of(value, error)
