@@ -20,4 +20,4 @@ def run(arguments):
     simulation_of(scene, system, Solution(scene))
     print_scene(scene, system)
     for finding in notices(scene, system):
-        print(f"warning: {finding.text}")
+        print(f"{finding.severity}: {finding.text}")
