@@ -40,6 +40,8 @@ SHIPPED_SCENES = pathlib.Path(__file__).parent / "scenes"
 """Folder of the scenes shipped with refweb."""
 MAX_HISTORY_ROWS = 10_000_000
 """Largest number of history rows."""
+SHORTEST_INTERVAL, ROWS_OF_LONG_RUNS = 1e-3, 1000
+"""Time between history rows of short runs [s], and number of rows of long ones, where no interval is given."""
 
 
 @table
@@ -134,7 +136,7 @@ class Scene:
                 raise InputError(f"[accuracy] {key} = {quote(value)} has no meaning in statics: leave it out")
         if not dynamic and self.event:
             raise InputError(f"[[event]] {quote(self.event[0].name)} has no meaning in statics: leave it out")
-        interval = (output.interval or min(1e-3, solve.duration)) if dynamic else None
+        interval = (output.interval or default_interval(solve)) if dynamic else None
         frames = output.frames or (10 if dynamic else 1)
         object.__setattr__(self, "output", Output(interval=interval, frames=frames))
         object.__setattr__(self, "accuracy", self.accuracy or Accuracy())
@@ -342,6 +344,14 @@ class Scene:
     def trust(self, budget=None, out=None, force=False, progress=True):
         """Find all parts of the error of each result, and its verdict, see `refweb.trust`."""
         return load("refweb.runner:trust")(self, budget, out, force, progress)
+
+
+def default_interval(solve):
+    """Time between history rows where none is given [s]: 1 ms, of runs above 1 s a thousandth of the duration.
+
+    It is not shorter than a step that is given, as steps end at rows, and not longer than the duration.
+    """
+    return min(max(SHORTEST_INTERVAL, solve.duration / ROWS_OF_LONG_RUNS, solve.step_size or 0.0), solve.duration)
 
 
 def file_of(source):

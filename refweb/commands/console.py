@@ -76,6 +76,11 @@ def print_scene(scene, system):
             from ..dynamics.breakpoints import remarks_on_corners
 
             corners = [("corners", finding.text) for finding in remarks_on_corners(scene.replace(solve=solve), system)]
+    rows = []
+    if solve.kind == "dynamic":
+        from ..dynamics.schedule import Counts
+
+        rows = [("rows", Counts.of(scene).text(scene))]
     if solve.kind == "dynamic" and INTEGRATORS[solve.method].knob == "safety":
         from ..dynamics.expected_cost import expected_cost
 
@@ -92,6 +97,7 @@ def print_scene(scene, system):
             *_stiffness(scene, system),
             ("solve", how),
             *steps,
+            *rows,
             *corners,
         ],
     )

@@ -122,7 +122,7 @@ class _Columns:
                     raise ValueError
                 values.append(empty if not text and empty is not None else int(text) if integer else float(text))
             except ValueError:
-                kind = "a outside number" if integer else "a number"
+                kind = "a whole number" if integer else "a number"
                 problems.add(f"{self.at(number)}: {key} = {quote(text)} must be {kind}")
                 values.append(-1)
         try:
