@@ -38,6 +38,11 @@ CLASSES_OF_PARTS = {
 """Classes of the other parts of a scene."""
 SHIPPED_SCENES = pathlib.Path(__file__).parent / "scenes"
 """Folder of the scenes shipped with refweb."""
+SHIPPED_STUDIES = pathlib.Path(__file__).parent / "sweeps" / "shipped"
+"""Folder of the studies shipped with refweb."""
+IS_STUDY = (
+    "is a study, many runs of one scene, and not a scene: refweb sweep {0} runs it, refweb info {0} says what it varies"
+)
 MAX_HISTORY_ROWS = 10_000_000
 """Largest number of history rows."""
 SHORTEST_INTERVAL, ROWS_OF_LONG_RUNS = 1e-3, 1000
@@ -193,6 +198,8 @@ class Scene:
         if folder is not None:
             given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body", "fold"])
         known = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS, *EFFECTS]
+        if "web" not in given and {"scene", "parameters"} <= given.keys():
+            raise InputError(IS_STUDY.format(file or "STUDY"))
         for key in given:
             if key not in known:
                 raise InputError(f"{_as_given(key, given[key])}: unknown table or key, {nearest(key, known)}")
@@ -366,6 +373,8 @@ def file_of(source):
     if os.path.isdir(source):
         hint = f": name {short(str(path))}/scene.toml" if os.path.isfile(path / "scene.toml") else ""
         raise InputError(f"{short(str(source))}: is a folder, not a scene file{hint}")
+    if (SHIPPED_STUDIES / f"{path.stem}.toml").is_file():
+        raise InputError(f"{short(str(source))}: {IS_STUDY.format(path.stem)}")
     raise InputError(f"{short(str(source))}: no such file and no shipped scene, {nearest(path.stem, known)}")
 
 

@@ -530,8 +530,8 @@ MUTANTS = [
     # The command line
     Mutant(
         "__main__",
-        'print("refweb: interrupted", file=sys.stderr)\n        return 130',
-        'print("refweb: interrupted", file=sys.stderr)\n        return 1',
+        "interruption.args)]), file=sys.stderr)\n        return 130",
+        "interruption.args)]), file=sys.stderr)\n        return 1",
     ),
     Mutant(
         "scene",
@@ -548,7 +548,7 @@ MUTANTS = [
     # Values by path, new scenes and comparisons
     Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),
     Mutant("reference/paths", "return {**value_here, key: _put", "return {key: _put"),
-    Mutant("commands/new", "os.path.relpath(folder / value, target)", "os.path.relpath(folder / value, folder)"),
+    Mutant("commands/new", "os.path.relpath(folder / name, target)", "os.path.relpath(folder / name, folder)"),
     Mutant("pages/packed", "[changes >> 8, changes & 0xFF]", "[changes & 0xFF, changes >> 8]"),
     Mutant("pages/packed", "size = written.nbytes + -written.nbytes % 4", "size = written.nbytes"),
     Mutant(

@@ -323,6 +323,18 @@ def shipped():
     return {path.stem: path for path in sorted(SHIPPED_STUDIES.glob("*.toml"))}
 
 
+def is_study(source):
+    """True for a study file, and for the name of a shipped study that no file and no shipped scene has."""
+    path = pathlib.Path(source)
+    if not path.is_file():
+        return path.name.removesuffix(".toml") in shipped() and len(path.parts) == 1
+    try:
+        given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except (ValueError, OSError, RecursionError):
+        return False
+    return "web" not in given and {"scene", "parameters"} <= given.keys()
+
+
 def load(source) -> Study:
     """The study of a TOML file, or of the name of a study shipped with refweb.
 

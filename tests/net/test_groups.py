@@ -246,6 +246,13 @@ def test_the_first_line_of_a_group_that_snaps_taut():
         scene(groups={"b": refweb.Group(slackness=0.1)}).replace(web=mixed).build()
 
 
+def test_no_groups():
+    """None is no groups, as an empty table is, of a cable and of names of nodes."""
+    keys = dict(modulus=1.0, area=1.0, density=1.0)
+    assert refweb.Cable(groups=None, **keys) == refweb.Cable(groups={}, **keys) == refweb.Cable(**keys)
+    assert refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], names=None).web().names == {}
+
+
 def test_thrust_along_the_line_of_a_group():
     """Of the lines of a group the one that ends at the node is pulled."""
     web = refweb.Window(mesh="square", rows=2, columns=2, side=1.0)
