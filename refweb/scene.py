@@ -373,7 +373,7 @@ def file_of(source):
     if os.path.isdir(source):
         hint = f": name {short(str(path))}/scene.toml" if os.path.isfile(path / "scene.toml") else ""
         raise InputError(f"{short(str(source))}: is a folder, not a scene file{hint}")
-    if (SHIPPED_STUDIES / f"{path.stem}.toml").is_file():
+    if path.stem in (study.stem for study in SHIPPED_STUDIES.glob("*.toml")):
         raise InputError(f"{short(str(source))}: {IS_STUDY.format(path.stem)}")
     raise InputError(f"{short(str(source))}: no such file and no shipped scene, {nearest(path.stem, known)}")
 

@@ -16,6 +16,7 @@ def run(arguments):
     from ..solution import Solution
     from ..sweeps.study import is_study
     from .console import print_scene
+    from .doubts import doubts_on
 
     if is_study(arguments.scene):
         if arguments.values:
@@ -23,8 +24,8 @@ def run(arguments):
         print_study(arguments.scene)
         return
     scene = scene_of(arguments).settled()
-    system = scene.build()
-    simulation_of(scene, system, Solution(scene))
+    system, solution = scene.build(), Solution(scene)
+    simulation_of(scene, system, solution)
     print_scene(scene, system)
-    for finding in notices(scene, system):
+    for finding in [*notices(scene, system), *solution.findings, *doubts_on(scene, system)]:
         print(f"{finding.severity}: {finding.text}")
