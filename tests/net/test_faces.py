@@ -69,6 +69,14 @@ def test_edges_of_a_vtk_surface(tmp_path, name):
     assert len(web.points) == ball.n_points and len(web.lines) == ball.n_points + ball.n_cells - 2
 
 
+def test_edges_of_pixels(tmp_path):
+    """Cells of an image, whose corners VTK counts row by row: two squares have seven sides, and no diagonals."""
+    pyvista = pytest.importorskip("pyvista")
+    pyvista.ImageData(dimensions=(3, 2, 1)).cast_to_unstructured_grid().save(tmp_path / "net.vtu")
+    web = File(path="net.vtu").web(tmp_path)
+    assert web.natural_length.tolist() == [1.0] * 7 and len(web.points) == 6
+
+
 SURFACE = """$MeshFormat
 2.2 0 8
 $EndMeshFormat
