@@ -108,8 +108,8 @@ def read(path):
         return by_vtk(path)
     try:
         mesh = by_meshio(path, FORMATS[suffix])
-    except KeyError as error:  # a type of VTK that meshio has no name for
-        if suffix == ".vtk":
+    except KeyError as error:  # a type of VTK that meshio has no name for, or does not read
+        if suffix == ".vtk" or error.args == ("pixel",):
             return by_vtk(path)
         raise _unread(path, f"KeyError {error}") from None
     except InputError as error:
