@@ -181,13 +181,19 @@ def _table(path, known, names, problems):
     wanted = {name: names.get(name, name).strip().lower() for name in known}
     missing = [name for name in known if wanted[name] not in head and (known[name] or name in names)]
     others = [name for name, lower in zip(given, head, strict=True) if lower not in wanted.values()]
-    for name in others if missing else ():
-        problems.add(f"{path.name}: column {quote(name)} is unknown, {nearest(name, known)}")
+    if missing and others:
+        several = len(others) > 1
+        hint = f"known: {', '.join(known)}" if several else nearest(others[0], known)
+        listed = ", ".join(map(quote, others))
+        problems.add(f"{path.name}: column{'s' * several} {listed} {'are' if several else 'is'} unknown, {hint}")
     for name in missing:
         called = f", called {quote(names[name])} in columns," if name in names else ""
         problems.add(f"{path.name}: column {name}{called} is missing, the first row has {quote(','.join(given))}")
+    also = ", and first = 1 that numbers begin at 1" if "i" in missing else ""
     if any(name not in names for name in missing) and given:
-        problems.hint("columns = {" + ", ".join(f'{name} = "..."' for name in missing) + "} says what they are called")
+        problems.hint(
+            "columns = {" + ", ".join(f'{name} = "..."' for name in missing) + "} says what they are called" + also
+        )
     body = [(number, row) for number, row in rows[1:] if len(row) == len(head)]
     for number, row in rows[1:]:
         if len(row) != len(head):

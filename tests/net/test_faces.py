@@ -244,7 +244,8 @@ def test_all_that_is_wrong_is_said_at_once(tmp_path, capsys):
     ("keys", "message"),
     [
         ("", 'column i is missing, the first row has "a,b,q"; members.csv: column j is missing'),
-        ("", 'columns = {i = "...", j = "..."} says what they are called'),
+        ("", 'columns = {i = "...", j = "..."} says what they are called, and first = 1 that numbers begin at 1'),
+        ("", 'columns "a", "b", "q" are unknown, known: i, j, natural_length, group'),
         (
             'columns = { i = "a", j = "b" }',
             "line 3: nodes [2, 3] must be 0 … 2, counted from 0; first = 1 reads numbers",
