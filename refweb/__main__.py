@@ -15,6 +15,7 @@ import threading
 import warnings
 
 from .errors import InputError
+from .messages import nearest, short
 from .registry import COMMANDS, load
 
 THRESHOLDS = (50_000, 20, 100)
@@ -49,7 +50,10 @@ def main(arguments=None):
         if (reconfigure := getattr(stream, "reconfigure", None)) is not None:
             reconfigure(errors="replace")
     top = parser()
-    arguments = top.parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if given and not given[0].startswith("-") and given[0] not in COMMANDS:
+        top.error(f"{short(given[0])}: there is no such command, {nearest(given[0], COMMANDS)}")
+    arguments = top.parse_args(given)
     if arguments.version:
         from . import __version__
 
@@ -69,8 +73,8 @@ def main(arguments=None):
     except InputError as error:
         print(f"refweb: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print("refweb: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interruption:
+        print(": ".join(["refweb: interrupted", *map(str, interruption.args)]), file=sys.stderr)
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left in the buffer goes nowhere

@@ -38,8 +38,15 @@ CLASSES_OF_PARTS = {
 """Classes of the other parts of a scene."""
 SHIPPED_SCENES = pathlib.Path(__file__).parent / "scenes"
 """Folder of the scenes shipped with refweb."""
+SHIPPED_STUDIES = pathlib.Path(__file__).parent / "sweeps" / "shipped"
+"""Folder of the studies shipped with refweb."""
+IS_STUDY = (
+    "is a study, many runs of one scene, and not a scene: refweb sweep {0} runs it, refweb info {0} says what it varies"
+)
 MAX_HISTORY_ROWS = 10_000_000
 """Largest number of history rows."""
+SHORTEST_INTERVAL, ROWS_OF_LONG_RUNS = 1e-3, 1000
+"""Time between history rows of short runs [s], and number of rows of long ones, where no interval is given."""
 
 
 @table
@@ -134,7 +141,7 @@ class Scene:
                 raise InputError(f"[accuracy] {key} = {quote(value)} has no meaning in statics: leave it out")
         if not dynamic and self.event:
             raise InputError(f"[[event]] {quote(self.event[0].name)} has no meaning in statics: leave it out")
-        interval = (output.interval or min(1e-3, solve.duration)) if dynamic else None
+        interval = (output.interval or default_interval(solve)) if dynamic else None
         frames = output.frames or (10 if dynamic else 1)
         object.__setattr__(self, "output", Output(interval=interval, frames=frames))
         object.__setattr__(self, "accuracy", self.accuracy or Accuracy())
@@ -191,6 +198,8 @@ class Scene:
         if folder is not None:
             given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body", "fold"])
         known = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS, *EFFECTS]
+        if "web" not in given and {"scene", "parameters"} <= given.keys():
+            raise InputError(IS_STUDY.format(file or "STUDY"))
         for key in given:
             if key not in known:
                 raise InputError(f"{_as_given(key, given[key])}: unknown table or key, {nearest(key, known)}")
@@ -344,6 +353,14 @@ class Scene:
         return load("refweb.runner:trust")(self, budget, out, force, progress)
 
 
+def default_interval(solve):
+    """Time between history rows where none is given [s]: 1 ms, of runs above 1 s a thousandth of the duration.
+
+    It is not shorter than a step that is given, as steps end at rows, and not longer than the duration.
+    """
+    return min(max(SHORTEST_INTERVAL, solve.duration / ROWS_OF_LONG_RUNS, solve.step_size or 0.0), solve.duration)
+
+
 def file_of(source):
     """Path of a scene file, or of a scene shipped with refweb by its name; refused where there is neither."""
     if not isinstance(source, (str, os.PathLike)):
@@ -356,6 +373,8 @@ def file_of(source):
     if os.path.isdir(source):
         hint = f": name {short(str(path))}/scene.toml" if os.path.isfile(path / "scene.toml") else ""
         raise InputError(f"{short(str(source))}: is a folder, not a scene file{hint}")
+    if path.stem in (study.stem for study in SHIPPED_STUDIES.glob("*.toml")):
+        raise InputError(f"{short(str(source))}: {IS_STUDY.format(path.stem)}")
     raise InputError(f"{short(str(source))}: no such file and no shipped scene, {nearest(path.stem, known)}")
 
 

@@ -264,8 +264,8 @@ class Output(Table):
     Parameters
     ----------
     interval : float, optional
-        Time between history rows [s], 1e-3 by default or the duration if that is shorter; in statics the load steps are
-        the rows.
+        Time between history rows [s]; by default 1e-3, of runs longer than 1 s a thousandth of the duration, but not
+        below a ``step_size`` that is given nor above the duration. In statics the load steps are the rows.
     frames : int, optional
         A VTU every this many rows, the first and the last state always; 10 by default, in statics 1.
 

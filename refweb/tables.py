@@ -366,6 +366,8 @@ class Table:
             value = getattr(self, f.name)
             if value is None and f.default is None:
                 continue
+            if value is None and f.default_factory is not MISSING:
+                value = f.default_factory()
             object.__setattr__(self, f.name, checked(key_of(f), value, f))
         self.check()
 

@@ -30,7 +30,11 @@ LONGEST = 1800.0
 MIRRORS = {
     "compiled": "compiled/test_kernel.py compiled/test_pointers.py",
     "net/web": "net/test_webs.py",
-    "net/lattices": "net/test_webs.py",
+    "net/lattices": "net/test_webs.py net/test_window_sizes.py",
+    "net/faces": "net/test_faces.py",
+    "net/obj_file": "net/test_faces.py",
+    "net/csv_files": "net/test_faces.py net/test_mesh_files.py",
+    "commands/doubts": "commands/test_doubts.py",
     "net/single_cable": "net/test_webs.py",
     "net/discretisation": "net/test_elements.py system/test_orders.py",
     "net/elements": "net/test_elements.py system/test_orders.py",
@@ -94,7 +98,7 @@ MIRRORS = {
     "dynamics/test_events.py dynamics/test_dynamics.py",
     "dynamics/history": "dynamics/test_agreement_by_chance.py dynamics/test_dynamics.py results/test_remarks.py",
     "dynamics/initial_state": "dynamics/test_starts.py",
-    "dynamics/schedule": "dynamics/test_one_row.py dynamics/test_dynamics.py",
+    "dynamics/schedule": "dynamics/test_one_row.py dynamics/test_default_rows.py dynamics/test_dynamics.py",
     "dynamics/simulation": "test_faults.py dynamics/test_dynamics.py dynamics/test_starts.py",
     "dynamics/integrators/central_difference": "dynamics/test_dynamics.py",
     "dynamics/integrators/explicit_loop": "dynamics/test_dynamics.py dynamics/test_impact.py",
@@ -151,7 +155,7 @@ MIRRORS = {
     "commands/new": "commands/test_new.py",
     "commands": "commands/test_cli.py commands/test_values.py",
     "__main__": "commands/test_cli.py",
-    "scene": "test_scene.py",
+    "scene": "test_scene.py dynamics/test_default_rows.py",
     "solution": "dynamics/test_starts.py",
 }
 """Test files of a file or a folder, that with the longest name that fits; ``{}`` is the name of the file."""
@@ -200,6 +204,16 @@ MUTANTS = [
     Mutant("net/web", "len(points) + self.components()[0])", "len(points) + 1)"),
     Mutant("net/web", "for axis in (1, 0, 2):", "for axis in (0, 1, 2):"),
     Mutant("net/web", "np.roll(self.points[hull, :2], -1, axis=0)", "np.roll(self.points[hull, :2], 1, axis=0)"),
+    Mutant("net/lattices", "inner & (count < 2)", "inner & (count < 1)"),
+    Mutant("net/lattices", "round(min((length / self.side - more) / pitch", "round(min((length / self.side) / pitch"),
+    Mutant("net/faces", "np.roll(corners, -1, axis=1)", "np.roll(corners, -2, axis=1)"),
+    Mutant("net/faces", "cells[:, [0, 1, 3, 2]]", "cells[:, [0, 1, 2, 3]]"),
+    Mutant("net/obj_file", "else count + corner", "else count + corner - 1"),
+    Mutant("net/csv_files", "np.column_stack(pairs) - first", "np.column_stack(pairs)"),
+    Mutant("commands/doubts", "0.5 * high**2 * np.sin(turned)", "high**2 * np.sin(turned)"),
+    Mutant("commands/doubts", "distances[0] > 0.0", "distances[0] < 0.0"),
+    Mutant("scene", "min(max(SHORTEST_INTERVAL, ", "min(min(SHORTEST_INTERVAL, "),
+    Mutant("dynamics/schedule", "((rows - 1) % scene.output.frames != 0)", "(rows % scene.output.frames != 0)"),
     Mutant("net/lattices", "3 * layers * layers - 3 * layers + 1", "3 * layers * layers + 3 * layers + 1"),
     Mutant("net/lattices", "if cells > _MOST_CELLS:", "if cells >= _MOST_CELLS:"),
     Mutant("net/lattices", '"hexagon": (45, 40)', '"hexagon": (44, 40)'),
@@ -531,8 +545,8 @@ MUTANTS = [
     # The command line
     Mutant(
         "__main__",
-        'print("refweb: interrupted", file=sys.stderr)\n        return 130',
-        'print("refweb: interrupted", file=sys.stderr)\n        return 1',
+        "interruption.args)]), file=sys.stderr)\n        return 130",
+        "interruption.args)]), file=sys.stderr)\n        return 1",
     ),
     Mutant(
         "scene",
@@ -549,7 +563,7 @@ MUTANTS = [
     # Values by path, new scenes and comparisons
     Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),
     Mutant("reference/paths", "return {**value_here, key: _put", "return {key: _put"),
-    Mutant("commands/new", "os.path.relpath(folder / value, target)", "os.path.relpath(folder / value, folder)"),
+    Mutant("commands/new", "os.path.relpath(folder / name, target)", "os.path.relpath(folder / name, folder)"),
     Mutant("pages/packed", "[changes >> 8, changes & 0xFF]", "[changes & 0xFF, changes >> 8]"),
     Mutant("pages/packed", "size = written.nbytes + -written.nbytes % 4", "size = written.nbytes"),
     Mutant(

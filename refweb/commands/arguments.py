@@ -1,5 +1,6 @@
 """Arguments that several verbs have, and what they print as JSON."""
 
+import contextlib
 import json
 
 
@@ -41,3 +42,30 @@ def print_json(content):
 def add_force(parser):
     """Leave to replace results."""
     parser.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")
+
+
+@contextlib.contextmanager
+def resumable(folder):
+    """Say of a run that is interrupted how it goes on; ``folder`` is its result folder, None for none."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if folder is None:
+            raise
+        import pathlib
+
+        from ..results.folder import read_summary, remedy
+
+        folder = pathlib.Path(folder)
+        begun = (read_summary(folder) or {}).get("status") == "interrupted"
+        raise KeyboardInterrupt(*([remedy(folder)] if begun else [])) from None
+
+
+def print_study(source):
+    """Print what a study runs, without running it; refuses what `refweb sweep` refuses."""
+    from ..sweeps.study import load
+    from ..sweeps.sweep import prepared
+    from .console import print_sweep_begins
+
+    print_sweep_begins(prepared(load(source))[0])
+    print(f"a study, many runs of one scene: refweb sweep {source} runs it")

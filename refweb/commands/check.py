@@ -1,6 +1,7 @@
 """Check a scene without solving it; writes nothing."""
 
-from .arguments import add_scene, add_values, scene_of
+from ..errors import InputError
+from .arguments import add_scene, add_values, print_study, scene_of
 
 
 def add_arguments(parser):
@@ -10,14 +11,21 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Refuse what a run would refuse, else print what it would solve, and what a run would warn of before."""
+    """Refuse what a run would refuse, else print what it would solve and warn of before; studies as well."""
     from ..runner import notices, simulation_of
     from ..solution import Solution
+    from ..sweeps.study import is_study
     from .console import print_scene
+    from .doubts import doubts_on
 
+    if is_study(arguments.scene):
+        if arguments.values:
+            raise InputError(f"--set has no meaning for {arguments.scene}: it is a study, which has [parameters]")
+        print_study(arguments.scene)
+        return
     scene = scene_of(arguments).settled()
-    system = scene.build()
-    simulation_of(scene, system, Solution(scene))
+    system, solution = scene.build(), Solution(scene)
+    simulation_of(scene, system, solution)
     print_scene(scene, system)
-    for finding in notices(scene, system):
-        print(f"warning: {finding.text}")
+    for finding in [*notices(scene, system), *solution.findings, *doubts_on(scene, system)]:
+        print(f"{finding.severity}: {finding.text}")

@@ -67,7 +67,9 @@ def print_scene(scene, system):
         knob = INTEGRATORS[solve.method].knob
         step = f"{knob} {getattr(solve, knob):g}" if solve.step_size is None else f"step {solve.step_size:g} s"
         how += f"{solve.duration:g} s, {step}, output interval {scene.output.interval:g} s"
-    counts, sizes = on_web(web_of(system))
+    web = web_of(system)
+    counts, sizes = on_web(web)
+    sizes += "; " + " × ".join(f"{size:.4g}" for size in web["extent"]) + " m along x, y and z"
     corners, steps = [], []
     if solve.kind == "dynamic" and len(system.corners):
         from ..dynamics.schedule import FEW_CORNERS
@@ -76,6 +78,11 @@ def print_scene(scene, system):
             from ..dynamics.breakpoints import remarks_on_corners
 
             corners = [("corners", finding.text) for finding in remarks_on_corners(scene.replace(solve=solve), system)]
+    rows = []
+    if solve.kind == "dynamic":
+        from ..dynamics.schedule import Counts
+
+        rows = [("rows", Counts.of(scene).text(scene))]
     if solve.kind == "dynamic" and INTEGRATORS[solve.method].knob == "safety":
         from ..dynamics.expected_cost import expected_cost
 
@@ -92,6 +99,7 @@ def print_scene(scene, system):
             *_stiffness(scene, system),
             ("solve", how),
             *steps,
+            *rows,
             *corners,
         ],
     )

@@ -1,11 +1,11 @@
-"""Print the content of a scene or a result folder."""
+"""Print the content of a scene, a study or a result folder."""
 
 import json
 import pathlib
 
 from ..errors import InputError
 from ..registry import COMMANDS, load
-from .arguments import add_json, print_json
+from .arguments import add_json, print_json, print_study
 
 
 def add_arguments(parser):
@@ -17,10 +17,13 @@ def add_arguments(parser):
 def run(arguments):
     """Print what is there."""
     from ..scene import shipped
+    from ..sweeps.study import is_study
 
     folder = pathlib.Path(arguments.source)
     if folder.is_dir() and ((folder / "run.json").exists() or str(folder) not in shipped()):
         _folder(folder, arguments.json)
+    elif is_study(arguments.source):
+        _study(arguments.source, arguments.json)
     else:
         _scene(arguments.source, arguments.json)
 
@@ -44,6 +47,16 @@ def _folder(folder, as_json):
         raise InputError(f"{folder}/run.json: cannot be read: {error}") from None
     except (KeyError, TypeError, IndexError, AttributeError):
         raise InputError(f"{folder}/run.json: is not what a run of refweb writes") from None
+
+
+def _study(source, as_json):
+    if not as_json:
+        print_study(source)
+        return
+    from ..sweeps.study import load
+
+    study = load(source).to_dict()
+    print_json({"study": {key: value for key, value in study.items() if key != "folder"}})
 
 
 def _scene(source, as_json):

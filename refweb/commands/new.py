@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import tomllib
 
 from ..errors import InputError, in_file
@@ -82,72 +83,130 @@ quantity = "reaction"
 body = "ball"
 reduce = "max"
 """
-PATHS = ("web.path", "web.lines", "solve.start")
+
+KEYS = ("path", "lines", "positions", "file", "start", "scene")
 """Keys whose texts may be paths, which start at the folder of the scene."""
 
 
 def add_arguments(parser):
     """The name, and what it begins with."""
     parser.add_argument("name", metavar="NAME", help="the scene file is NAME.toml")
-    parser.add_argument("--from", dest="source", metavar="SCENE", help="begin with a copy of this scene, file or name")
+    parser.add_argument(
+        "--from", dest="source", metavar="SCENE", help="begin with a copy of this scene or study, file or name"
+    )
     parser.add_argument("--force", action="store_true", help="replace the file if it exists")
 
 
 def run(arguments):
     """Refuse to overwrite, write the file, say how to run it."""
+    from ..sweeps.study import is_study
+
     target = pathlib.Path(arguments.name.removesuffix(".toml") + ".toml")
     if not target.parent.is_dir():
         raise InputError(f"{short(str(target))}: there is no folder {short(str(target.parent))}")
     if target.is_dir() or (target.exists() and not arguments.force):
         force = "" if target.is_dir() else ", or use --force to replace it"
         raise InputError(f"{short(str(target))}: already exists: choose another name{force}")
-    from ..results.files import write_text
+    text, copies = scene_text(target, arguments.source)
+    for source, copy in copies.items():
+        if copy.exists() and not arguments.force and (copy.is_dir() or copy.read_bytes() != source.read_bytes()):
+            raise InputError(
+                f"{short(str(copy))}: already exists, and is another file than that of the scene: choose another "
+                "folder, or use --force to replace it"
+            )
+    from ..results.files import write_atomically, write_text
 
-    write_text(target, scene_text(target, arguments.source))
-    print(f"{target} is written: refweb check {target}, refweb run {target}")
+    for source, copy in copies.items():
+        write_atomically(copy, lambda name, source=source: shutil.copyfile(source, name))
+    write_text(target, text)
+    beside = f", with {', '.join(copy.name for copy in copies.values())}" if copies else ""
+    if arguments.source is not None and is_study(arguments.source):
+        print(f"{target} is written: refweb check {target}, refweb sweep {target}")
+        return
+    print(f"{target} is written{beside}: refweb check {target}, refweb run {target}")
 
 
 def scene_text(target, source=None):
-    """The text of a scene file ``target``: that of another one with the title of this, or `START`."""
-    from ..reference.paths import with_value
-    from ..scene import Scene, file_of
+    """Text of a scene file ``target``, and the copies that it needs, of files by their paths.
 
+    The text is that of another scene or study with the title of this, or `START`. Files of a shipped scene come along;
+    those of other scenes stay where they are, and their paths lead there.
+    """
+    from ..scene import SHIPPED_SCENES, Scene, file_of
+    from ..sweeps.study import Study, is_study, load
+
+    study = source is not None and is_study(source)
     if source is None:
-        text, folder, name = START, target.parent, target.name
+        path, text = target, START
+    elif study:
+        path = load(source).folder / f"{pathlib.Path(source).stem}.toml"
+        text = path.read_bytes().decode("utf-8-sig")
     else:
         path = file_of(source)
         Scene.load(path)
-        text, folder, name = path.read_bytes().decode("utf-8-sig"), path.parent, path.name
-    given = wanted = tomllib.loads(text)
-    changes = _moved(given, folder, target.parent)
+        text = path.read_bytes().decode("utf-8-sig")
+    given = tomllib.loads(text)
+    copied = path.parent == SHIPPED_SCENES
+    changes = {} if copied or source is None else _moved(given, path.parent, target.parent)
+    wanted = _with_paths(given, lambda name: changes.get(name, name))
     if "title" in given:
-        changes["title"] = target.stem
-    for path, value in changes.items():
-        wanted, text = with_value(wanted, path, value), _with_text(text, path, value)
+        wanted["title"] = target.stem
+        text = _with_text(text, ("title",), given["title"], target.stem)
+    for old, new in changes.items():
+        text = _with_text(text, KEYS, old, new)
     with in_file(target.name):
-        if tomllib.loads(text) != wanted:
-            keys = " and ".join(changes)
-            raise InputError(f"{keys} of {name} cannot be changed in place: copy the file by hand")
+        if _with_paths(tomllib.loads(text), lambda name: name) != wanted:
+            keys = " and ".join([*_keys_of(given, changes), *(["title"] if "title" in given else [])])
+            raise InputError(f"{keys} of {path.name} cannot be changed in place: copy the file by hand")
+        if study:
+            Study(**{"title": target.stem, **wanted, "folder": target.parent})
+            return text, {}
         Scene.from_dict({"title": target.stem, **wanted}, target.parent)
-    return text
+    return text, {path.parent / name: target.parent / name for name in _paths(given)} if copied else {}
+
+
+def _with_paths(given, change):
+    """The dict of a scene or a study with ``change(path)`` of each path in it."""
+    from ..registry import with_files
+    from ..settings import START_STATES
+
+    given = with_files(given, change)
+    solve = given.get("solve", {})
+    if isinstance(start := solve.get("start"), str) and start not in START_STATES:
+        given["solve"] = {**solve, "start": change(start)}
+    if "parameters" in given and given["scene"].endswith(".toml"):
+        given["scene"] = change(given["scene"])
+    return given
+
+
+def _paths(given):
+    """Relative paths of files in the dict of a scene."""
+    paths = []
+    _with_paths(given, lambda name: paths.append(name) or name)
+    return [name for name in dict.fromkeys(paths) if not os.path.isabs(name)]
+
+
+def _keys_of(given, names):
+    """Keys of tables of a scene that have one of some texts, ``web.path``."""
+    for table, content in given.items():
+        for entry in content if isinstance(content, list) else [content]:
+            if isinstance(entry, dict):
+                yield from (f"{table}.{key}" for key, value in entry.items() if key in KEYS and str(value) in names)
 
 
 def _moved(given, folder, target):
-    """Values by path of what is a relative path from one folder, as seen from another."""
-    from ..settings import START_STATES
-
-    moved = {}
-    for path in PATHS:
-        table, key = path.split(".")
-        value = given[table].get(key)
-        if isinstance(value, str) and value not in START_STATES and folder.resolve() != target.resolve():
-            if not os.path.isabs(value):
-                moved[path] = pathlib.Path(os.path.relpath(folder / value, target)).as_posix()
-    return moved
+    """Relative paths in the dict of a scene by those that lead to the same files from another folder."""
+    if folder.resolve() == target.resolve():
+        return {}
+    return {name: pathlib.Path(os.path.relpath(folder / name, target)).as_posix() for name in _paths(given)}
 
 
-def _with_text(text, path, value):
-    """A scene file with another text at a path, where the key begins a line and its text ends on it; else as it is."""
-    key = path.rpartition(".")[2]
-    pattern = rf"""(?m)^([ \t]*{key}[ \t]*=[ \t]*)("(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
-    return re.sub(pattern, lambda line: line[1] + json.dumps(value, ensure_ascii=False), text)
+def _with_text(text, keys, old, new):
+    """A scene file with another text in place of an old one, of keys that begin a line or follow a brace or a comma."""
+    words = re.compile(rf"""(?m)((?:^|[{{,])[ \t]*(?:{"|".join(keys)})[ \t]*=[ \t]*)("(?:[^"\\\n]|\\.)*"|'[^'\n]*')""")
+
+    def change(match):
+        same = tomllib.loads(f"value = {match[2]}")["value"] == old
+        return match[1] + json.dumps(new, ensure_ascii=False) if same else match[0]
+
+    return words.sub(change, text)

@@ -1,5 +1,7 @@
 """Continue a dynamic run that was killed, interrupted or failed."""
 
+from .arguments import resumable
+
 
 def add_arguments(parser):
     """The folder of the run."""
@@ -12,6 +14,6 @@ def run(arguments):
     from ..results.progress import followed
     from .console import print_scene, print_solution
 
-    with followed(True) as tell:
+    with resumable(arguments.folder), followed(True) as tell:
         solution = runner.resume(arguments.folder, progress=tell, announce=print_scene)
     print_solution(solution, arguments.folder)

@@ -3,7 +3,7 @@
 import pathlib
 
 from ..errors import InputError
-from .arguments import add_force, add_scene, add_values, scene_of
+from .arguments import add_force, add_scene, add_values, resumable, scene_of
 
 
 def add_arguments(parser):
@@ -30,7 +30,7 @@ def run(arguments):
             raise InputError(f"--horizon has no meaning for {arguments.scene}: it is static, leave it out")
         scene = scene.replace(accuracy=replace(scene.accuracy, horizon=True))
     out = pathlib.Path(arguments.out if arguments.out is not None else slug(scene.title))
-    with followed(True) as tell:
+    with resumable(out), followed(True) as tell:
         solution = runner.run(scene, out=out, force=arguments.force, progress=tell, announce=print_scene)
     print_solution(solution, out)
 

@@ -2,7 +2,7 @@
 
 import pathlib
 
-from .arguments import add_force, add_scene, add_values, scene_of
+from .arguments import add_force, add_scene, add_values, resumable, scene_of
 
 
 def add_arguments(parser):
@@ -25,7 +25,7 @@ def run(arguments):
 
     scene, out = scene_of(arguments), arguments.out
     options = {"budget": arguments.budget, "out": out, "force": arguments.force}
-    with followed(True) as tell:
+    with resumable(out), followed(True) as tell:
         solution = trust(scene, progress=tell, announce=print_scene, **options)
     show(report(solution))
     if out is not None:

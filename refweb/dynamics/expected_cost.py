@@ -12,6 +12,7 @@ from ..registry import INTEGRATORS
 from ..results.units import prefixed
 from .budget import steps_with_twin
 from .method_choice import step_price
+from .schedule import Counts
 
 TELLING = 0.95
 """Share of a step below which that where all is touched is told as well."""
@@ -102,7 +103,9 @@ def expected_cost(scene, system):
         shortest = solve.duration / scene.output.interval
         steps = [max(solve.duration / rule.step, shortest) for rule in rules]
     each = len(integrator.drifts) * steps_with_twin(scene)
+    written = Counts.of(scene).seconds(len(system.net.cells))
     prices = [steps[0] * each * step_price(system), steps[-1] * each * step_price(system, touched=True)]
+    prices = [price + written for price in prices]
     counts = " to ".join(dict.fromkeys(f"{n:.2g}" for n in steps))
     seconds = " to ".join(dict.fromkeys(f"{price:.2g}" for price in prices))
     twin = " with step refinement" if scene.accuracy.error == "twin" else ""

@@ -3,53 +3,118 @@
 from __future__ import annotations
 
 import csv
+import difflib
 
 import numpy as np
 
 from ..errors import InputError
+from ..findings import NOTE, WARNING, Finding
 from ..messages import nearest, quote
 from .web import Web
 
 POINTS = {"x": True, "y": True, "z": True, "name": False, "support": False}
 LINES = {"i": True, "j": True, "natural_length": False, "group": False}
 """Columns of both, and whether they must be there."""
+NAMES = (*POINTS, *LINES)
+"""Names of all columns."""
+LISTED = 5
+"""Number of problems that a message lists; of more it tells how many."""
+ALIKE = 0.75
+"""Likeness above which a column may be a misspelt one."""
 
 
-def web_of(points, lines):
-    """The `Web` of the paths of its points and of its lines."""
-    nodes, ends = _table(points, POINTS), _table(lines, LINES)
-    places = np.column_stack([nodes.numbers(key) for key in "xyz"])
-    pairs = np.column_stack([ends.numbers(key, integer=True) for key in "ij"])
+def web_of(points, lines, columns=None, first=0):
+    """The `Web` of the paths of its points and of its lines.
+
+    Parameters
+    ----------
+    points, lines : path-like
+        Both files.
+    columns : dict of str to str, optional
+        Columns in the files by the names that they have in `NAMES`.
+    first : int
+        Number of the first point in the columns i and j.
+
+    Raises
+    ------
+    InputError
+        For files that are not there or hold no rows; for wrong columns, cells and node numbers, of which the message
+        lists the first `LISTED`.
+    """
+    columns, problems = columns or {}, Problems()
+    nodes, ends = (_table(path, known, columns, problems) for path, known in ((points, POINTS), (lines, LINES)))
+    places = [nodes.numbers(key, problems) for key in "xyz"]
+    pairs = [ends.numbers(key, problems, integer=True) for key in "ij"]
+    rim = nodes.numbers("support", problems, empty=0.0)
+    length = ends.numbers("natural_length", problems)
+    _check_ends(ends, pairs, len(nodes), first, problems)
+    problems.refuse()
     names = {}
     for number, name in enumerate(nodes.columns.get("name", ())):
         if name:
             names.setdefault(name, []).append(number)
-    rim = np.flatnonzero(nodes.numbers("support", empty=0.0)) if "support" in nodes.columns else ()
-    length = ends.numbers("natural_length") if "natural_length" in ends.columns else None
-    for number, pair in enumerate(pairs):
-        if not 0 <= pair.min() <= pair.max() < len(places):
-            raise InputError(f"{ends.at(number)}: nodes {pair.tolist()} must be 0 … {len(places) - 1}, counted from 0")
-    return Web(places, pairs, length, rim=rim, kind="file", names=names, groups=ends.columns.get("group"))
+    return Web(
+        np.column_stack(places),
+        np.column_stack(pairs) - first,
+        length,
+        rim=() if rim is None else np.flatnonzero(rim),
+        kind="file",
+        names=names,
+        groups=ends.columns.get("group"),
+        notes=[finding for table in (nodes, ends) for finding in table.notes()],
+    )
 
 
 def places_of(path):
     """Positions [m] in the columns x, y and z of a file, shape (rows, 3)."""
-    columns = _table(path, dict.fromkeys("xyz", True))
-    return np.column_stack([columns.numbers(key) for key in "xyz"])
+    problems = Problems()
+    columns = _table(path, dict.fromkeys("xyz", True), {}, problems)
+    for name in columns.others:
+        problems.add(f"{path.name}: column {quote(name)} is unknown, {nearest(name, 'xyz')}")
+    places = [columns.numbers(key, problems) for key in "xyz"]
+    problems.refuse()
+    return np.column_stack(places)
+
+
+class Problems:
+    """Problems of files, told at once."""
+
+    def __init__(self):
+        self._texts, self._hints = [], []
+
+    def add(self, text):
+        """Add one."""
+        self._texts.append(text)
+
+    def hint(self, text):
+        """Add a remedy that stands behind them."""
+        self._hints.append(text)
+
+    def refuse(self):
+        """Raise an `InputError` that lists the first `LISTED`, if there are any."""
+        if self._texts:
+            more = len(self._texts) - LISTED
+            counted = [f"and {more} problem{'s' * (more > 1)} more"] if more > 0 else []
+            raise InputError("; ".join([*self._texts[:LISTED], *counted, *self._hints]))
 
 
 class _Columns:
-    """Columns of a CSV file as texts, by name."""
+    """Columns of a CSV file as texts, by name; ``others`` are the names of those that a web does not have."""
 
-    def __init__(self, path, columns, rows):
-        self.path, self.columns, self._rows = path, columns, rows
+    def __init__(self, path, columns, rows, others=(), known=()):
+        self.path, self.columns, self._rows, self.others, self._known = path, columns, rows, others, known
+
+    def __len__(self):
+        return len(self._rows)
 
     def at(self, number):
         """Name of a row in messages."""
         return f"{self.path.name}, line {self._rows[number]}"
 
-    def numbers(self, key, integer=False, empty=None):
-        """A column as numbers."""
+    def numbers(self, key, problems, integer=False, empty=None):
+        """A column as numbers, None where there is none; what is no number is added to the problems."""
+        if key not in self.columns:
+            return None
         values = []
         for number, text in enumerate(self.columns[key]):
             try:
@@ -58,12 +123,49 @@ class _Columns:
                 values.append(empty if not text and empty is not None else int(text) if integer else float(text))
             except ValueError:
                 kind = "a whole number" if integer else "a number"
-                raise InputError(f"{self.at(number)}: {key} = {quote(text)} must be {kind}") from None
-        return np.array(values, dtype=np.int64 if integer else np.float64)
+                problems.add(f"{self.at(number)}: {key} = {quote(text)} must be {kind}")
+                values.append(-1)
+        try:
+            return np.array(values, dtype=np.int64 if integer else np.float64)
+        except OverflowError:
+            return np.array([min(max(value, -(2**62)), 2**62) for value in values])
+
+    def notes(self):
+        """Findings on columns that are left alone; a warning of those that may be misspelt."""
+        if not self.others:
+            return
+        listed = ", ".join(map(quote, self.others))
+        text = f"{self.path.name}: column{'s' * (len(self.others) > 1)} {listed} left alone"
+        free, severity = [name for name in self._known if name not in self.columns], NOTE
+        for column in self.others:
+            for name in difflib.get_close_matches(column, free, n=1, cutoff=ALIKE):
+                text += f'; if {quote(column)} is {name}, give columns = {{{name} = "{column}"}}'
+                severity = WARNING
+        yield Finding("mesh-file", text, "web", severity)
 
 
-def _table(path, known):
-    """The `_Columns` of a file."""
+def _check_ends(ends, pairs, count, first, problems):
+    """Add to the problems node numbers that no point has."""
+    if count == 0 or any(column is None for column in pairs):
+        return
+    numbers = np.column_stack(pairs)
+    wrong = np.flatnonzero(((numbers < first) | (numbers >= first + count)).any(axis=1))
+    outside = [number for number in wrong if all(_is_whole(ends.columns[key][number]) for key in "ij")]
+    for number in outside:
+        problems.add(
+            f"{ends.at(number)}: nodes {numbers[number].tolist()} must be {first} … {first + count - 1}, counted from "
+            f"{first}"
+        )
+    if outside and first == 0 and numbers.min() == 1 and numbers.max() == count:
+        problems.hint("first = 1 reads numbers that begin at 1")
+
+
+def _is_whole(text):
+    return text.lstrip("+-").isdigit()
+
+
+def _table(path, known, names, problems):
+    """The `_Columns` of a file; ``names`` are those of columns that have other names in it."""
     if not path.is_file():
         raise InputError(f"there is no file {path}")
     try:
@@ -72,19 +174,31 @@ def _table(path, known):
             rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(map(str.strip, row))]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path.name} is not a text of rows with commas: {error}") from None
-    head = [name.lower() for name in rows[0][1]] if rows else []
-    for name in head:
-        if name not in known:
-            raise InputError(f"{path.name}: column {quote(name)} is unknown, {nearest(name, known)}")
-    for name, needed in known.items():
-        if needed and name not in head:
-            raise InputError(f"{path.name}: column {name} is missing, the first row has {quote(','.join(head))}")
+    given = rows[0][1] if rows else []
+    head = [name.lower() for name in given]
     if len(set(head)) < len(head):
-        raise InputError(f"{path.name}: a column is listed twice in {quote(','.join(head))}")
+        problems.add(f"{path.name}: a column is listed twice in {quote(','.join(given))}")
+    wanted = {name: names.get(name, name).strip().lower() for name in known}
+    missing = [name for name in known if wanted[name] not in head and (known[name] or name in names)]
+    others = [name for name, lower in zip(given, head, strict=True) if lower not in wanted.values()]
+    if missing and others:
+        several = len(others) > 1
+        hint = f"known: {', '.join(known)}" if several else nearest(others[0], known)
+        listed = ", ".join(map(quote, others))
+        problems.add(f"{path.name}: column{'s' * several} {listed} {'are' if several else 'is'} unknown, {hint}")
+    for name in missing:
+        called = f", called {quote(names[name])} in columns," if name in names else ""
+        problems.add(f"{path.name}: column {name}{called} is missing, the first row has {quote(','.join(given))}")
+    also = ", and first = 1 that numbers begin at 1" if "i" in missing else ""
+    if any(name not in names for name in missing) and given:
+        problems.hint(
+            "columns = {" + ", ".join(f'{name} = "..."' for name in missing) + "} says what they are called" + also
+        )
+    body = [(number, row) for number, row in rows[1:] if len(row) == len(head)]
     for number, row in rows[1:]:
         if len(row) != len(head):
-            raise InputError(f"{path.name}, line {number} has {len(row)} cells, the first row {len(head)}")
-    columns = {name: [row[at] for _, row in rows[1:]] for at, name in enumerate(head)}
-    if len(rows) < 2:
-        raise InputError(f"{path.name} has no rows below its first")
-    return _Columns(path, columns, [number for number, _ in rows[1:]])
+            problems.add(f"{path.name}, line {number} has {len(row)} cells, the first row {len(head)}")
+    if rows and len(rows) < 2:
+        problems.add(f"{path.name} has no rows below its first")
+    columns = {name: [row[head.index(column)] for _, row in body] for name, column in wanted.items() if column in head}
+    return _Columns(path, columns, [number for number, _ in body], others, known)

@@ -14,11 +14,13 @@ Groups of lines, beside ``rim``, ``anchors`` and ``inner`` of `refweb.net.groups
 ``diagonals`` ``rising`` and ``falling``
 ``ring-K``    of layers: the outline of the innermost K layers, K = 1 … N
 ``spokes``    of layers: lines between two meshes of one layer, most from ring to ring
+``rim``       of windows: the outline of the inner web, of ``inner`` as well
+``corners``   of windows: lines of this ``rim`` that end where the inner web has its corners
 ============= =========================================================================
 
 Webs have those that have lines: squares ``rows`` and ``columns``, triangles no ``columns`` but for links at the rim,
-hexagons no ``rows`` but for these. Ends that are held stand at the ends of links: webs of the paper's rule have no
-``rim``, and the links are their ``anchors``. In a web of layers the outline is held, its ``rim``; where a line cuts off
+hexagons no ``rows`` but for these. Ends that are held stand at the ends of links: the paper's webs have no ``rim``, and
+the links are their ``anchors``. In a web of layers the outline is held, its ``rim``; where a line cuts off
 a corner of a triangle, both of its nodes are on that as well, and ``ring-N`` is the outline alone.
 """
 
@@ -40,6 +42,12 @@ PAPER = {"triangle": (29, 23), "square": (40, 40), "hexagon": (45, 40)}
 SMALLEST = {"triangle": (2, 1), "square": (2, 2), "hexagon": (2, 3)}
 #: x and y of the lattice point (1, 1), in sides.
 STEP = {"triangle": (0.5, sqrt(3) / 2), "square": (1.0, 1.0), "hexagon": (sqrt(3) / 2, 0.5)}
+#: Width and height of a window in sides: (a, b) and (c, d) of a × columns + b and c × rows + d.
+EXTENT = {
+    "triangle": ((1.0, 2.0), (sqrt(3) / 2, 2.0 - sqrt(3) / 2)),
+    "square": ((1.0, 0.0), (1.0, 0.0)),
+    "hexagon": ((sqrt(3), -sqrt(3)), (1.5, -0.5)),
+}
 #: Area of a mesh of side 1.
 AREA = {"triangle": sqrt(3) / 4, "square": 1.0, "hexagon": 3 * sqrt(3) / 2}
 
@@ -130,7 +138,7 @@ def _window(mesh, rows, columns, side, kind):
     if mesh == "triangle":
         odd = np.arange(rows - 1) % 2
         polygons = np.concatenate([_rows(columns - 1 + odd, 1 - odd, _UP), _rows(columns - odd, 1 + odd, _DOWN)])
-        nodes, lines, *_ = _tessellation(polygons)
+        nodes, lines, _, sides = _tessellation(polygons)
         points = _placed(nodes, mesh, side)
         outward = [
             (np.flatnonzero(nodes[:, axis] == end), axis, sign)
@@ -148,12 +156,35 @@ def _window(mesh, rows, columns, side, kind):
             polygons = _rows(np.full(rows, columns), 0 * odd, _SQUARE, (1, 1))
         else:
             polygons = _rows(columns - odd, odd, _HEXAGON, (2, 3))
-        nodes, lines, frame, _ = _tessellation(polygons)
+        nodes, lines, frame, sides = _tessellation(polygons)
         used, inner = np.unique(lines[~frame], return_inverse=True)
         rim = np.flatnonzero(np.isin(used, lines[frame]))
         points = _placed(nodes[used], mesh, side)
         lines = inner.reshape(-1, 2)
-    return Web(points, lines, rim=rim, kind=kind, cells=len(polygons), groups=_directions(points, lines))
+        sides = np.where(frame, -1, np.cumsum(~frame) - 1)[sides]
+    groups = _directions(points, lines)
+    if kind == "window":
+        groups |= _outline(points, lines, rim, sides)
+    return Web(points, lines, rim=rim, kind=kind, cells=len(polygons), groups=groups)
+
+
+def _outline(points, lines, ends, sides):
+    """Groups ``rim`` and ``corners`` of a window.
+
+    ``ends`` are the nodes at the ends of links, and ``sides`` the line of each side of each polygon, −1 for none.
+    """
+    inner = ~np.isin(lines, ends).any(axis=1)
+    complete = ((sides >= 0) & inner[sides]).all(axis=1)
+    count = np.bincount(sides[complete].ravel(), minlength=len(lines))
+    rim = np.flatnonzero(inner & (count < 2))
+    if not len(rim):
+        return {}
+    nodes = np.unique(lines[rim])
+    try:
+        corners = nodes[Web(points[nodes], [[0, 1]]).corners]
+    except InputError:  # all on one line, which has its ends alone
+        corners = nodes[np.bincount(np.searchsorted(nodes, lines[rim]).ravel()) == 1]
+    return {"rim": rim, "corners": rim[np.isin(lines[rim], corners).any(axis=1)]}
 
 
 @table
@@ -205,8 +236,9 @@ class Paper(Table):
 class Window(Table):
     """A web by the rule of `Paper`, at any size: closed inner web, every outermost node linked to a fixed end.
 
-    Groups of lines: ``anchors``, the links at the rim; ``inner``, all others; of these and of links ``rows``,
-    ``columns``, ``rising``, ``falling`` and ``diagonals``, see `refweb.net.lattices`.
+    Groups of lines: ``anchors``, the links at the rim; ``inner``, all others; ``rim``, the outline of the inner web,
+    and ``corners``, the lines of it that end at its corners; of inner lines and of links ``rows``, ``columns``,
+    ``rising``, ``falling`` and ``diagonals``, see `refweb.net.lattices`.
 
     Parameters
     ----------
@@ -216,6 +248,9 @@ class Window(Table):
         Cells for squares, and for hexagons, whose every second row has one cell less; for triangles rows of inner
         nodes and nodes in the first of them, every second row having one node more. An even number of rows ends with
         a row of the second kind.
+    width, height : float
+        In place of columns and rows: size along x and along y, with links [m]. There are as many cells as come nearest
+        to it, at least the fewest that there may be; ``refweb check`` prints the size that the web has.
     side : float
         Length of each line [m].
 
@@ -223,7 +258,7 @@ class Window(Table):
     ------
     InputError
         For sizes at which nothing hangs together, of rows below 2, and of columns below 2, of triangles 1, of hexagons
-        3; and for rows × columns above a million.
+        3; for rows × columns above a million; and unless either columns or width is given, and rows or height.
 
     Examples
     --------
@@ -237,21 +272,44 @@ class Window(Table):
 
     kind: str = choice("window", default="window")
     mesh: str = choice(*MESHES)
-    rows: int = integer()
-    columns: int = integer()
+    rows: int | None = integer(default=None)
+    columns: int | None = integer(default=None)
+    width: float | None = real(default=None, above=0, unit="m")
+    height: float | None = real(default=None, above=0, unit="m")
     side: float = real(above=0, unit="m")
 
     def check(self):
         """Refuse sizes at which nothing hangs together, and more than a million cells."""
-        for name, smallest in zip(("rows", "columns"), SMALLEST[self.mesh], strict=True):
-            if getattr(self, name) < smallest:
-                raise InputError(f'{name} = {getattr(self, name)} must be ≥ {smallest} for mesh = "{self.mesh}"')
-        if self.rows * self.columns > _MOST_CELLS:
-            raise InputError(f"rows × columns = {self.rows * self.columns} must be ≤ {_MOST_CELLS}")
+        for name, size in (("rows", "height"), ("columns", "width")):
+            cells, length = getattr(self, name), getattr(self, size)
+            if cells is None and length is None:
+                raise InputError(f"{name} is missing: give {name} = ..., or {size} = ... [m]")
+            if cells is not None and length is not None:
+                raise InputError(f"{size} = {length:g} and {name} = {cells} both say how large it is: leave one out")
+        counts = rows, columns = self.counts
+        for name, count, smallest in zip(("rows", "columns"), counts, SMALLEST[self.mesh], strict=True):
+            if getattr(self, name) is not None and count < smallest:
+                raise InputError(f'{name} = {count} must be ≥ {smallest} for mesh = "{self.mesh}"')
+        if rows * columns > _MOST_CELLS:
+            raise InputError(f"rows × columns = {rows * columns} must be ≤ {_MOST_CELLS}")
+
+    @property
+    def counts(self):
+        """Numbers of rows and of columns, those given or the nearest to height and width."""
+        counts = []
+        (per_column, more_columns), (per_row, more_rows) = EXTENT[self.mesh]
+        for given, length, pitch, more, smallest in (
+            (self.rows, self.height, per_row, more_rows, SMALLEST[self.mesh][0]),
+            (self.columns, self.width, per_column, more_columns, SMALLEST[self.mesh][1]),
+        ):
+            if given is None and length is not None:
+                given = max(smallest, round(min((length / self.side - more) / pitch, 1e9)))
+            counts.append(given)
+        return tuple(counts)
 
     def web(self, base=None):
         """The `refweb.net.web.Web`; its cells count the sectors between links as `Paper` does."""
-        return _window(self.mesh, self.rows, self.columns, self.side, "window")
+        return _window(self.mesh, *self.counts, self.side, "window")
 
 
 @table

@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..accepted import accepts, by_name
 from ..errors import InputError
 from ..findings import Finding
-from ..messages import quote
-from ..tables import Table, choice, table, text
+from ..messages import nearest, quote
+from ..tables import Table, boolean, choice, field, integer, table, text
+from .csv_files import NAMES
+from .faces import CORNERS, decided, group_names
 from .groups import members
 from .web import Web
 
@@ -19,9 +22,22 @@ HARMLESS = ("vertex", "poly_vertex")
 """Cells that a web leaves alone."""
 
 
+@accepts(by_name({"type": "string", "pattern": r"\S"}))
+def _columns(name, value):
+    """A table of names of columns."""
+    if not isinstance(value, dict):
+        raise InputError(f'{name} = {quote(value)} must be a table of names of columns, such as {{i = "from"}}')
+    for key, column in value.items():
+        if not isinstance(column, str) or not column.strip():
+            raise InputError(f"{name}.{key} = {quote(column)} must be the name of a column in the file")
+    return dict(value)
+
+
 @table
 class File(Table):
-    """A web from a VTK file (.vtu, .vtp, .vtk of any version), a Gmsh file (.msh 2.2 or 4.1) or two CSV files.
+    """A web from a VTK, Gmsh, OBJ or STL file, or from two CSV files.
+
+    Files end with .vtu, .vtp or .vtk of any version, .msh of 2.2 or 4.1, .obj, .stl or .csv.
 
     VTK: cells are lines or polylines; of curved lines the ends count, and vertices do no harm. Taken where present:
     cell data ``natural_length`` [m], which a polyline shares out by distance, ``group`` (numbers or texts) and
@@ -34,8 +50,13 @@ class File(Table):
     points named ``support`` are supports. An element in several curves is one line of several groups. Nodes that no
     line uses and no point names are left out.
 
+    Faces: a file that has faces and no lines, such as a surface of STL, gives the edges of its faces as lines, each
+    once; a note says so. Groups of faces, physical surfaces of Gmsh among them, are groups of their edges. Points that
+    no line uses are left out then. OBJ: rows ``l`` are lines, rows ``f`` faces, and ``g`` begins a group.
+
     CSV: ``path`` has the points, with columns x, y, z [m] and, if wanted, name and support (not 0); ``lines`` has the
-    columns i, j, node numbers from 0, and, if wanted, natural_length [m] and group.
+    columns i, j, node numbers from 0, and, if wanted, natural_length [m] and group. ``columns`` and ``first`` read
+    files that have other names and numbers. Other columns are left alone, and a note names them.
 
     Groups by the web's supports, ``rim``, ``anchors`` and ``inner``, come with every web, see `refweb.net.groups`.
 
@@ -45,11 +66,18 @@ class File(Table):
         The file, relative to the scene's folder.
     lines : str, optional
         With CSV the file of the lines.
+    edges : bool, optional
+        Whether edges of faces are lines: "true" takes them beside the lines of the file, "false" takes its lines alone.
+        By default they are where the file has no lines; a file of both is refused without this key.
+    columns : dict of str to str, optional
+        With CSV the names of columns that have other names: ``columns = {i = "from", j = "to"}``.
+    first : int, optional
+        With CSV the number of the first point in the columns i and j, 0 by default.
 
     Raises
     ------
     InputError
-        From ``web``, if the file cannot be read or is not a web.
+        For columns that a web does not have; from ``web``, if the file cannot be read or is not a web.
 
     Notes
     -----
@@ -66,6 +94,15 @@ class File(Table):
     kind: str = choice("file", default="file")
     path: str = text()
     lines: str | None = text(default=None)
+    edges: bool | None = boolean(default=None)
+    columns: dict | None = field(_columns, default=None)
+    first: int | None = integer(default=None, at_least=0)
+
+    def check(self):
+        """Refuse columns that a web does not have."""
+        for key in self.columns or ():
+            if key not in NAMES:
+                raise InputError(f"columns.{key} is no column of a web, {nearest(key, NAMES)}")
 
     def web(self, base=None):
         """The `Web`; ``base`` is the folder that a relative path starts from."""
@@ -73,20 +110,28 @@ class File(Table):
         if csv != (self.lines is not None):
             has = f"lines = {quote(self.lines)} has no meaning with" if self.lines else "lines is missing beside"
             raise InputError(f"{has} path = {quote(self.path)}: CSV has points and lines in two files")
+        for key in ("edges",) if csv else ("columns", "first"):
+            if (value := getattr(self, key)) is not None:
+                kinds = "of mesh files, not of CSV" if csv else "of CSV files"
+                raise InputError(f"{key} = {quote(value)} is a key {kinds}: leave it out beside {quote(self.path)}")
         try:
             if self.lines is not None:
                 from .csv_files import web_of
 
-                return web_of(folder / self.path, folder / self.lines)
+                return web_of(folder / self.path, folder / self.lines, self.columns or {}, self.first or 0)
             from .mesh_readers import read
 
-            return _web_of(read(folder / self.path))
+            return _web_of(read(folder / self.path), self.edges)
         except InputError as error:
             raise InputError(f"path = {quote(self.path)}: {error}") from None
 
 
 def remarks(web):
-    """Warnings of what a file often holds by mistake: lines that are there twice, and nodes at one place unjoined."""
+    """Findings on a web of a file: how it was read, and what files often hold by mistake.
+
+    The latter are lines that are there twice, and nodes at one place that no line joins.
+    """
+    yield from web.notes
     ends = np.sort(web.lines, axis=1)
     pairs, of, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     for pair in np.flatnonzero(count > 1)[:1]:
@@ -114,9 +159,11 @@ def remarks(web):
         )
 
 
-def _web_of(mesh):
-    """The web of a `refweb.net.mesh_readers.Mesh`."""
+def _web_of(mesh, edges=None):
+    """The web of a `refweb.net.mesh_readers.Mesh`; ``edges`` is the key of that name."""
     _check_cells(mesh)
+    unused = any(block.kind in CORNERS for block in mesh.blocks)
+    mesh, edge_groups, notes = decided(mesh, edges)
     points = np.asarray(mesh.points)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise InputError(f"points of shape {points.shape} must have the shape (nodes, 3)")
@@ -124,7 +171,7 @@ def _web_of(mesh):
     count = sum(len(block.cells) for block in mesh.lines)
     length, group = _joined("natural_length", mesh.lines), _joined("group", mesh.lines)
     length = _numbers("natural_length", length, count)
-    groups = _group_names(group, count)
+    groups = group_names(group, count)
     support = _numbers("support", mesh.point_data.get("support"), len(points))
     moved = mesh.point_data.get("displacement")
     if moved is not None and length is not None and support is not None and np.shape(moved) == points.shape:
@@ -134,15 +181,23 @@ def _web_of(mesh):
     if length is not None:
         length = length[of] * share
     groups = None if groups is None else [groups[i] for i in of]
+    if edge_groups:
+        first = len(lines) - len(mesh.blocks[-1].cells)
+        joined = {} if groups is None else members(groups, len(lines))
+        for name, number in edge_groups.items():
+            joined[name] = np.union1d(joined.get(name, np.zeros(0, dtype=np.int64)), first + number).astype(np.int64)
+        groups = joined
     if mesh.groups is not None:
-        members_ = {} if groups is None else members(groups, len(lines))
+        named = {} if groups is None else dict(members(groups, len(lines)))
+        for name, cells in mesh.groups.items():
+            named[name] = [*named.get(name, ()), *cells]
         once, order = _merged(lines, mesh)
         lines, length = lines[once], None if length is None else length[once]
-        groups = {name: np.unique(order[list(cells)]) for name, cells in {**members_, **mesh.groups}.items()}
+        groups = {name: np.unique(order[list(cells)]) for name, cells in named.items()}
     broken = np.zeros(0, dtype=np.int64) if broken is None or mesh.groups is not None else np.flatnonzero(broken[of])
     rim = mesh.supports if support is None else np.flatnonzero(support)
-    members_: dict = dict(kind="file", groups=groups, broken=broken)
-    mask = _kept(mesh, lines, rim, len(points))
+    members_: dict = dict(kind="file", groups=groups, broken=broken, notes=notes)
+    mask = _kept(mesh, lines, rim, len(points), unused)
     if mask is None:
         return Web(points, lines, length, rim=rim, names=mesh.names, **members_)
     new = np.cumsum(mask) - 1
@@ -150,12 +205,13 @@ def _web_of(mesh):
     return Web(points[mask], new[lines], length, rim=new[rim], names=names, **members_)
 
 
-def _kept(mesh, lines, rim, count):
+def _kept(mesh, lines, rim, count, unused):
     """Mask of the nodes that the web keeps, bool of shape (nodes,), None for all.
 
-    Nodes within curved lines are not, and of Gmsh those that no line uses and no physical point names.
+    Nodes within curved lines are not, and of Gmsh and where there are faces, ``unused``, those that no line uses and
+    no physical point names.
     """
-    mask = np.full(count, mesh.groups is None)
+    mask = np.full(count, mesh.groups is None and not unused)
     curved = [block.cells[:, 2:] for block in mesh.lines if INNER.get(block.kind)]
     if (mask.all() and not curved) or lines.min() < 0 or lines.max() >= count:  # the web refuses such lines
         return None
@@ -172,8 +228,8 @@ def _check_cells(mesh):
     counts = {}
     for block in mesh.blocks:
         counts[block.kind] = counts.get(block.kind, 0) + len(block.cells)
-    unsupported = sorted(set(counts) - set(INNER) - {"polyline", *HARMLESS})
-    if unsupported or not mesh.lines:
+    unsupported = set(counts) - set(INNER) - {"polyline", *HARMLESS, *CORNERS}
+    if unsupported or not (mesh.lines or any(counts.get(kind) for kind in CORNERS)):
         text = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())) or "no"
         raise InputError(f"it holds {text} cells: a web has only lines; {mesh.remedy}")
 
@@ -220,19 +276,3 @@ def _numbers(name, values, count):
     if values.size != count or values.dtype.kind not in "biuf" or not np.isfinite(values).all():
         raise InputError(f"{name} of shape {values.shape} must be {count} finite numbers")
     return values.reshape(count).astype(np.float64)
-
-
-def _group_names(values, count):
-    """Group of each line as text: 2 and 2.0 read "2"."""
-    if values is None:
-        return None
-    values = np.asarray(values)
-    if values.size != count:
-        raise InputError(f"group of shape {values.shape} must have one entry for each of {count} lines")
-
-    def text(value):
-        if isinstance(value, bytes):
-            return value.decode(errors="replace")
-        return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
-
-    return tuple(map(text, values.reshape(count).tolist()))

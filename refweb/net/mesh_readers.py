@@ -16,12 +16,13 @@ from .. import memory
 from ..errors import InputError
 from ..messages import quote
 
-FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".vtp": None, ".msh": "gmsh"}
+FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".vtp": None, ".msh": "gmsh", ".obj": "obj", ".stl": "stl"}
 """Formats of meshes by the end of their name, as meshio calls them; None for what VTK alone reads."""
 LINES = ("line", "line3", "line4", "polyline")
 REMEDIES = {
     ".msh": "in Gmsh give the curves physical groups and save these alone, Mesh.SaveAll = 0, or mesh by `gmsh -1`",
-    "": "extract the edges of surfaces, in ParaView by Extract Edges, in pyvista by mesh.extract_all_edges()",
+    ".obj": "write rows l 1 2 of lines, or rows f 1 2 3 of faces",
+    "": "extract the edges of solids, in ParaView by Extract Edges, in pyvista by mesh.extract_all_edges()",
 }
 """What to do with a file that has other cells."""
 BY_VTK = """
@@ -41,11 +42,15 @@ np.savez(sys.argv[2], **found)
 
 
 class Block(NamedTuple):
-    """Cells of one kind with as many nodes: their nodes, shape (cells, nodes), and what is known of each by name."""
+    """Cells of one kind with as many nodes: their nodes, shape (cells, nodes), and what is known of each by name.
+
+    ``members`` are the cells of each physical group of Gmsh, for faces.
+    """
 
     kind: str
     cells: np.ndarray
     data: dict
+    members: dict = {}
 
 
 class Mesh(NamedTuple):
@@ -88,18 +93,29 @@ def read(path):
     if not path.is_file():
         raise InputError(f"there is no file {path}")
     suffix = path.suffix.lower()
+    if suffix == ".geo":
+        raise InputError(
+            f"{path.name} is a geometry and no mesh: `gmsh -1 {path.name}` makes the mesh {path.stem}.msh of it, which "
+            "path may name"
+        )
     if suffix not in FORMATS:
-        known = ", ".join([*FORMATS, ".csv"])
+        known = ", ".join([*list(FORMATS)[:4], ".csv", *list(FORMATS)[4:]])
         raise InputError(f"format {quote(path.suffix)} must be one of {known}: use meshio convert")
     memory.check(memory.READING * path.stat().st_size, f"the {path.stat().st_size / 1e6:.3g} MB of {path.name}")
+    if suffix == ".obj":
+        return _of_obj(path)
     if FORMATS[suffix] is None or _asks_for_vtk(path, suffix):
         return by_vtk(path)
     try:
         mesh = by_meshio(path, FORMATS[suffix])
-    except KeyError as error:  # a type of VTK that meshio has no name for
-        if suffix == ".vtk":
+    except KeyError as error:  # a type of VTK that meshio has no name for, or does not read
+        if suffix == ".vtk" or error.args == ("pixel",):
             return by_vtk(path)
         raise _unread(path, f"KeyError {error}") from None
+    except InputError as error:
+        if suffix == ".vtk" and "Unknown section" in str(error):  # normals and others
+            return by_vtk(path)
+        raise
     if suffix == ".msh":
         return _of_gmsh(mesh)
     blocks = [
@@ -189,6 +205,22 @@ def by_vtk(path):
     return Mesh(arrays["points"], blocks, point_data, REMEDIES[""])
 
 
+def _of_obj(path):
+    """The `Mesh` of an OBJ file: lines and faces by their number of corners, in the order of the file."""
+    from .obj_file import read_obj
+
+    points, lines, faces, *groups = read_obj(path)
+    cells = [
+        *(("polyline", *of) for of in zip(lines, groups[0], strict=True)),
+        *(("polygon", *of) for of in zip(faces, groups[1], strict=True)),
+    ]
+    blocks = []
+    for (kind, _), alike in itertools.groupby(cells, lambda cell: (cell[0], len(cell[1]))):
+        _, corners, names = zip(*alike, strict=True)
+        blocks.append(Block(kind, np.array(corners, dtype=np.int64), {"group": np.array(names)}))
+    return Mesh(points, blocks, {}, REMEDIES[".obj"])
+
+
 def _of_gmsh(mesh):
     """The `Mesh` of a Gmsh file, with its physical groups."""
     named = {(int(dim), int(tag)): name for name, (tag, dim) in mesh.field_data.items()}
@@ -197,10 +229,7 @@ def _of_gmsh(mesh):
         tags = {key: mesh.cell_data[key][i] for key in ("gmsh:physical", "gmsh:geometrical") if key in mesh.cell_data}
         data = {key: mesh.cell_data[key][i] for key in ("natural_length", "group") if key in mesh.cell_data}
         data |= {"entity": tags["gmsh:geometrical"]} if "gmsh:geometrical" in tags else {}
-        blocks.append(Block(block.type, block.data, data))
-        dim = 0 if block.type == "vertex" else 1
-        if block.type != "vertex" and block.type not in LINES:
-            continue
+        dim = 0 if block.type == "vertex" else 1 if block.type in LINES else 2
         members = {}
         for tag in np.unique(tags.get("gmsh:physical", [])):
             if tag:
@@ -209,6 +238,9 @@ def _of_gmsh(mesh):
         for name, sets in mesh.cell_sets.items():
             if not name.startswith("gmsh:") and sets[i] is not None and len(sets[i]):
                 members.setdefault(name, set()).update(np.asarray(sets[i]).tolist())
+        blocks.append(Block(block.type, block.data, data, members if dim == 2 else {}))
+        if dim == 2:
+            continue
         for name, cells in members.items():
             if dim:
                 groups.setdefault(name, []).extend(first + c for c in sorted(cells))

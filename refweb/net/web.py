@@ -44,6 +44,8 @@ class Web:
         Whether natural lengths are data of their own and not distances; by default whether ``natural_length`` is given.
     broken : sequence of int
         Lines that are broken and carry nothing, as an attribute increasing int64.
+    notes : sequence of refweb.findings.Finding
+        Remarks on how it was read from a file.
 
     Raises
     ------
@@ -65,6 +67,7 @@ class Web:
     groups: Several = None
     length_given: bool | None = None
     broken: Several = ()
+    notes: Several = ()
 
     def __post_init__(self):
         points = np.array(self.points, dtype=np.float64, order="C")

@@ -12,6 +12,7 @@ import json
 import os
 import pathlib
 import re
+import shlex
 import shutil
 
 import numpy as np
@@ -24,11 +25,11 @@ from .vtu import meshes, write_mesh
 from .vtu_file import quoted
 
 RESULT_FILES = re.compile(
-    r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif"
+    r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|(run|trust)\.json|web\.pvd|(web|cost|trust)\.png|web\.gif"
     r"|plot\.(png|svg|pdf)|report\.html|sheet\.html|web_in_paraview\.py"
     r"|frames/[^/]+_\d{6,}\.vtu|(frames/)?\.refweb-[^/]+"
 )
-"""Files that a run writes, and that ``--force`` removes."""
+"""Files that refweb writes into a result folder under names of its own; ``--force`` removes these and no others."""
 
 TABLES = ("history.csv", "modes.csv", "results.csv")
 """Names of the table that a run, or a study of many, writes."""
@@ -85,7 +86,7 @@ def so_far(folder, summary):
     if summary.get("kind") == "sweep":
         text = _rows(folder)
     if alive is False:
-        return {**summary, "status": "killed", "message": f"its process is dead; {text}; {_remedy(folder)}"}
+        return {**summary, "status": "killed", "message": f"its process is dead; {text}; {remedy(folder)}"}
     return {**summary, "message": f"{text}; {'its process is alive' if alive else 'whether it is alive is not known'}"}
 
 
@@ -99,11 +100,12 @@ def _rows(folder):
     return f"it has written {max(count, 0)} row{'s' * (count != 1)}"
 
 
-def _remedy(folder):
+def remedy(folder):
+    """Say how a run that has not come to its end goes on."""
     if (folder / "results.csv").exists():
         return "refweb sweep with the same study and --out goes on with what is missing"
     if (folder / "checkpoint.npz").exists():
-        return f"refweb resume {folder} continues it"
+        return f"refweb resume {shlex.quote(str(folder))} continues it"
     return "refweb run --force starts it again"
 
 

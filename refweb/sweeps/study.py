@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import pathlib
 import tomllib
 from dataclasses import field as plain_field
@@ -321,6 +322,18 @@ def _plain(parameter):
 def shipped():
     """Paths of the studies shipped with refweb, by name."""
     return {path.stem: path for path in sorted(SHIPPED_STUDIES.glob("*.toml"))}
+
+
+def is_study(source):
+    """True for a study file, and for the name of a shipped study that no file and no shipped scene has."""
+    path = pathlib.Path(source)
+    if not os.path.isfile(path):  # False of a name that no file can have
+        return path.name.removesuffix(".toml") in shipped() and len(path.parts) == 1
+    try:
+        given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except (ValueError, OSError, RecursionError):
+        return False
+    return "web" not in given and {"scene", "parameters"} <= given.keys()
 
 
 def load(source) -> Study:

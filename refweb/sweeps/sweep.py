@@ -81,11 +81,7 @@ def sweep(
         raise InputError(f"workers = {workers} has no meaning with an executor, which has its own: leave one out")
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers = {quote(workers)} must be a whole number ≥ 1")
-    study, base = _asked(scene, parameters, options)
-    cases = cases_of(study, base)
-    study_run = Sweep(study, cases, str(base.given.get("title", study.scene)))
-    study_run.reasons = _reasons(study, cases)
-    _check(study, base, cases)
+    study_run, base = prepared(scene, parameters, options)
     kept = Kept(out, study_run) if out is not None else Kept(None, study_run)
     study_run.path = kept.path
     study_run.gather(kept.rows)
@@ -103,6 +99,16 @@ def sweep(
     finally:
         kept.summary()
     return study_run
+
+
+def prepared(scene, parameters=None, options=None):
+    """The `Sweep` of what `sweep` is given before it is run, and the scene that it begins with; refuses wrong input."""
+    study, base = _asked(scene, parameters, options or {})
+    cases = cases_of(study, base)
+    study_run = Sweep(study, cases, str(base.given.get("title", study.scene)))
+    study_run.reasons = _reasons(study, cases)
+    _check(study, base, cases)
+    return study_run, base
 
 
 def _asked(scene, parameters, options):

@@ -162,6 +162,19 @@ def test_force_removes_only_what_a_run_wrote(here, capsys):
     assert len(json.loads((here / "out" / "run.json").read_text())["steps"]) == 1
 
 
+def test_force_leaves_what_the_user_put_there(here, capsys):
+    assert main(["run", WEB, "--out", "out"]) == 0
+    mine = ("photo.png", "web-2.png", "web.jpg", "plots.pdf", "scene.toml.old", "frames/photo.png", "pictures/web.png")
+    for name in mine:
+        (here / "out" / name).parent.mkdir(exist_ok=True)
+        (here / "out" / name).write_text("mine")
+    for name in ("trust.json", "trust.png", "report.html"):
+        (here / "out" / name).write_text("of the run before")
+    assert main(["run", WEB, "--out", "out", "--force"]) == 0
+    assert all((here / "out" / name).read_text() == "mine" for name in mine)
+    assert not {"out/trust.json", "out/trust.png", "out/report.html"} & set(files(here))
+
+
 def test_failed_run_keeps_its_folder(here, capsys):
     """A web without supports takes no load."""
     free = SCENE.replace("[solve]", "[supports]\nnodes = []\n\n[solve]").replace("[1, 2, 3]", "[0, 2]")
@@ -274,6 +287,10 @@ def test_slug():
 def test_no_command_and_wrong_ones(capsys):
     assert main([]) == 2 and "usage: refweb" in capsys.readouterr().out
     assert main(["--version"]) == 0 and refweb.__version__ in capsys.readouterr().out
+    with pytest.raises(SystemExit) as leaving:
+        main(["chek", "scene.toml"])
+    assert leaving.value.code == 2
+    assert 'chek: there is no such command, did you mean "check"?' in capsys.readouterr().err
     for arguments in (["frob"], ["run"], ["picture", "a", "--frame", "x"]):
         with pytest.raises(SystemExit) as leaving:
             main(arguments)

@@ -89,6 +89,73 @@ kind = "static"
     assert not (here / "third.toml").exists()
 
 
+@pytest.mark.parametrize("name", ["capture-satellite", "spin-deployment", "falling-net", "catenary"])
+def test_files_of_a_shipped_scene_come_along(here, capsys, name):
+    """All files that it names, byte for byte, and its text with another title alone: the copy passes the check."""
+    named = set(re.findall(r'"([\w-]+\.(?:obj|csv))"', SHIPPED[name]))
+    assert main(["new", "mine", "--from", name]) == 0
+    assert {path.name for path in here.iterdir()} == {"mine.toml", *named}
+    assert all((here / file).read_bytes() == (SHIPPED_SCENES / file).read_bytes() for file in named)
+    title = tomllib.loads(SHIPPED[name])["title"]
+    assert (here / "mine.toml").read_text(encoding="utf-8") == SHIPPED[name].replace(f'"{title}"', '"mine"')
+    assert all(file in capsys.readouterr().out for file in sorted(named)[:1])
+    refweb.Scene.load("mine.toml").build()
+
+
+def test_files_that_come_along_replace_no_others(here, capsys):
+    (here / "satellite.obj").write_text("mine")
+    assert main(["new", "mine", "--from", "capture-satellite"]) == 2
+    assert "satellite.obj: already exists, and is another file" in capsys.readouterr().err
+    assert [path.name for path in here.iterdir()] == ["satellite.obj"] and (
+        here / "satellite.obj"
+    ).read_text() == "mine"
+    assert main(["new", "mine", "--from", "capture-satellite", "--force"]) == 0
+    assert main(["new", "again", "--from", "capture-satellite"]) == 0  # the same file is there
+
+
+def test_a_copy_of_a_scene_with_bodies_from_files_leads_to_them(here):
+    """Of two bodies with files of their own each path leads where it led."""
+    (here / "there").mkdir()
+    body = '[[body]]\nname = "{0}"\nshape = "mesh"\nfile = "{0}.obj"\nposition = [0, 0, {1}]\nfixed = true\n'
+    text = START.partition("[[body]]")[0] + body.format("near", 1) + body.format("far", 2)
+    text += "[contact]\nstiffness = 1e4\n[solve]\nkind = 'static'\n"
+    (here / "there" / "two.toml").write_text(text, encoding="utf-8")
+    assert main(["new", "copy", "--from", "there/two.toml"]) == 0
+    bodies = tomllib.loads((here / "copy.toml").read_text(encoding="utf-8"))["body"]
+    assert [body["file"] for body in bodies] == ["there/near.obj", "there/far.obj"]
+
+
+# Studies
+
+
+@pytest.mark.parametrize("name", sorted(studies()))
+def test_info_check_and_new_know_studies(here, capsys, name):
+    """Number of cases, by the lists and counts of the file; a copy is a study of the same cases."""
+    given = tomllib.loads(studies()[name].read_text(encoding="utf-8"))
+    for arguments in (["info", name], ["check", name]):
+        assert main(arguments) == 0
+        out = capsys.readouterr().out
+        assert given["title"] in out and f"refweb sweep {name} runs it" in out
+        assert all(path in " ".join(out.split()) for path in given["parameters"])
+    assert main(["info", name, "--json"]) == 0
+    assert '"parameters"' in capsys.readouterr().out
+    assert main(["new", "odds", "--from", name]) == 0
+    assert "refweb check odds.toml, refweb sweep odds.toml" in capsys.readouterr().out
+    assert tomllib.loads((here / "odds.toml").read_text(encoding="utf-8")) == {**given, "title": "odds"}
+    assert main(["check", "odds.toml"]) == 0
+
+
+def test_a_study_is_not_run_as_a_scene(here, capsys):
+    assert main(["run", "odds-of-capture"]) == 2
+    assert "odds-of-capture: is a study, many runs of one scene" in capsys.readouterr().err
+    (here / "mine.toml").write_text('scene = "square-impact"\n[parameters]\n"solve.safety" = [0.5, 0.4]\n')
+    assert main(["modes", "mine.toml"]) == 2
+    assert "mine.toml: is a study" in (said := capsys.readouterr().err) and "refweb sweep mine.toml runs it" in said
+    assert main(["check", "odds-of-capture", "--set", "solve.duration=1"]) == 2
+    assert "--set has no meaning for odds-of-capture" in capsys.readouterr().err
+    assert main(["info", "odds-of-captur"]) == 2 and "no such file" in capsys.readouterr().err
+
+
 def test_new_does_not_overwrite(here, capsys):
     (here / "net.toml").write_text("mine")
     (here / "folder.toml").mkdir()

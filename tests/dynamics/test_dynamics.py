@@ -667,7 +667,7 @@ def test_interrupted(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(refweb.Scene, "load", lambda source: scene(0.5, 1e-4, 3, error="twin"))
     assert main(["run", "any.toml", "--out", "out"]) == 130
-    assert "interrupted" in capsys.readouterr().err
+    assert "refweb: interrupted: refweb resume out continues it\n" in capsys.readouterr().err
     folder = tmp_path / "out"
     summary, (_, history) = read_json(folder), read_history(folder)
     assert summary["status"] == "interrupted" and summary["message"] == f"interrupted after t = {history[-1, 0]:.6g} s"

@@ -74,7 +74,7 @@ def test_spoilt_web_files(tmp_path, capsys, suffix, seed):
 
 FOUR = np.array([[0, 0, 0], [1, 0, 0], [2, 0.1, 0], [2, 1, 1 / 3]])
 WRONG_WEBS = {
-    "wrong cells": (net(cells=[("triangle", [[0, 1, 2]])]), "it holds 1 triangle cells: a web has only lines"),
+    "wrong cells": (net(cells=[("tetra", [[0, 1, 2, 3]])]), "it holds 1 tetra cells: a web has only lines"),
     "not a number": (net(FOUR * [1, np.nan, 1]), "points[0] = [0.0, nan, 0.0] must be finite"),
     "endless": (net(FOUR + [np.inf, 0, 0]), "points[0] = [inf, 0.0, 0.0] must be finite"),
     "coinciding": (net(FOUR[[0, 0, 2, 3]]), "lines[0] = [0, 1] has no length: its nodes coincide"),

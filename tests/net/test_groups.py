@@ -44,8 +44,9 @@ def test_links_of_a_window_of_squares(rows, columns):
     x, y, _ = (web.points[web.lines[:, 1]] - web.points[web.lines[:, 0]]).T
     assert not y[web.find_lines("rows")].any() and not x[web.find_lines("columns")].any()
     assert sorted([*web.find_lines("anchors"), *web.find_lines("inner")]) == list(range(len(web.lines)))
+    paper = refweb.Paper(mesh="square", cable_length=201.4).web()
     with pytest.raises(InputError, match="no line of this web joins two nodes of its rim"):
-        web.find_lines("rim")
+        paper.find_lines("rim")
 
 
 @pytest.mark.parametrize("mesh", ["triangle", "hexagon"])
@@ -244,6 +245,13 @@ def test_the_first_line_of_a_group_that_snaps_taut():
     mixed = refweb.Inline(**{**web.to_dict(), "groups": {"a": [0, 1], "b": [1]}})
     with pytest.raises(InputError, match="these lines have slackness 0 … 0.1, and snap taut at different strains"):
         scene(groups={"b": refweb.Group(slackness=0.1)}).replace(web=mixed).build()
+
+
+def test_no_groups():
+    """None is no groups, as an empty table is, of a cable and of names of nodes."""
+    keys = dict(modulus=1.0, area=1.0, density=1.0)
+    assert refweb.Cable(groups=None, **keys) == refweb.Cable(groups={}, **keys) == refweb.Cable(**keys)
+    assert refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], names=None).web().names == {}
 
 
 def test_thrust_along_the_line_of_a_group():

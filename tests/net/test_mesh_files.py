@@ -107,7 +107,7 @@ def test_gmsh(tmp_path, text):
     assert web.find("tip").tolist() == [2] and web.find("5").tolist() == [3]
 
 
-def test_surfaces_of_gmsh_are_refused_with_what_there_is(tmp_path):
+def test_lines_beside_surfaces_of_gmsh_are_refused_with_what_there_is(tmp_path):
     surface = OLD.replace("$Elements\n9", "$Elements\n10").replace("9 15 2 5 4 4\n", "9 15 2 5 4 4\n10 2 2 1 1 1 2 3\n")
     (tmp_path / "net.msh").write_text(surface)
     with pytest.raises(InputError, match=r"it holds 5 line, 1 triangle, 4 vertex cells: .* Mesh.SaveAll = 0"):
@@ -153,11 +153,12 @@ def test_vtk(tmp_path, name, polylines):
     assert web.find_lines("long").tolist() == [0, 1] and web.find_lines("short").tolist() == [2]
 
 
-def test_surfaces_and_damaged_files_of_vtk(tmp_path, capfd):
+def test_solids_and_damaged_files_of_vtk(tmp_path, capfd):
     pyvista = pytest.importorskip("pyvista")
+    pyvista.Box().triangulate().delaunay_3d().save(tmp_path / "ball.vtu")
+    with pytest.raises(InputError, match=r"it holds \d+ tetra cells: .* Extract Edges"):
+        File(path="ball.vtu").web(tmp_path)
     pyvista.Sphere().save(tmp_path / "ball.vtp")
-    with pytest.raises(InputError, match=r"it holds \d+ triangle cells: .* Extract Edges"):
-        File(path="ball.vtp").web(tmp_path)
     whole = (tmp_path / "ball.vtp").read_bytes()
     for part in (whole[:400], b"", b"<VTKFile>", whole[:300] + bytes(range(256))):
         (tmp_path / "ball.vtp").write_bytes(part)

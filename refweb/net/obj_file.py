@@ -1,0 +1,82 @@
+"""Points, lines and faces of OBJ files.
+
+Corners of faces have numbers of their own for texture and normals, ``f 1/4/2 ...``, of which the first alone says where
+they are; a negative number counts backwards from the last point above it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..messages import quote
+
+SIDES = {"l": (2, "a line needs two points"), "f": (3, "a face needs three points")}
+"""Least number of corners of each kind of element, and what to say of less."""
+NO_GROUP = ("off", "default", "all")
+"""Names that are no group: programs write them where they have none."""
+
+
+def read_obj(path):
+    """Read an OBJ file.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 3)
+        Positions, in the unit of the file.
+    lines, faces : list of list of int
+        Points of each polyline and around each face, from 0.
+    line_groups, face_groups : list of str
+        Group of each, which a row ``g NAME`` begins; "" for none.
+
+    Raises
+    ------
+    InputError
+        For what is no text, a point without three numbers, and an element of points that are not there.
+    """
+    points, group = [], ""
+    cells, names = {kind: [] for kind in SIDES}, {kind: [] for kind in SIDES}
+    try:
+        text = path.read_text(encoding="utf-8-sig", errors="strict")
+    except UnicodeDecodeError:
+        text = path.read_bytes().decode("latin-1")
+    for number, row in enumerate(text.replace("\\\n", " ").splitlines(), 1):
+        words = row.partition("#")[0].split()
+        if not words:
+            continue
+        if words[0] == "v":
+            points.append(_point(path, number, words))
+        elif words[0] in cells:
+            cells[words[0]].append(_corners(path, number, words, len(points)))
+            names[words[0]].append(group)
+        elif words[0] == "g":
+            group = next((word for word in words[1:] if word not in NO_GROUP), "")
+    if not points:
+        raise InputError(f"{path.name} has no points: is it an OBJ file, with rows v x y z?")
+    for corners in (*cells["l"], *cells["f"]):
+        if max(corners) >= len(points):
+            raise InputError(f"{path.name} has an element of point {max(corners) + 1}, must be 1 … {len(points)}")
+    return np.array(points), cells["l"], cells["f"], names["l"], names["f"]
+
+
+def _point(path, number, words):
+    try:
+        x, y, z = (float(word) for word in words[1:4])
+    except ValueError:
+        raise InputError(f"{path.name}, line {number}: {quote(' '.join(words))} must be v and three numbers") from None
+    return x, y, z
+
+
+def _corners(path, number, words, count):
+    """Points of an element, from 0; ``count`` are above it."""
+    try:
+        given = [int(word.partition("/")[0]) for word in words[1:]]
+    except ValueError:
+        given = [0]
+    if 0 in given or min(given, default=1) < -count:
+        name = quote(" ".join(words))
+        raise InputError(f"{path.name}, line {number}: {name} must name points from 1, or from -1 backwards")
+    limit, reason = SIDES[words[0]]
+    if len(given) < limit:
+        raise InputError(f"{path.name}, line {number}: {quote(' '.join(words))}: {reason}")
+    return [corner - 1 if corner > 0 else count + corner for corner in given]
