@@ -209,7 +209,7 @@ def _attempt(scene, out, tell, announce, clock, repeats, kept=None, summary=None
         if folder is not None:
             solution.path = folder.path.absolute()
         solution.cost["by_effect"] = _cpu_by_effect(system, solution)
-        solution.findings += simulation.remarks()
+        solution.findings = list(dict.fromkeys([*solution.findings, *simulation.remarks()]))  # a resumed run has some
         if folder is not None:
             folder.close()
             folder.summary(solution.summary())

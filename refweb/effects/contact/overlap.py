@@ -48,7 +48,7 @@ AIM = 0.2
 
 Of a net of 16 × 16 cells that is thrown at a box of 500 kg this costs as many steps as 0.8 does, whose contact is 16
 times softer; 0.1 costs 2.4 times as many."""
-NOTED = 0.03
+NOTED = 1.0 / 30.0
 """Overlap over the size of the body above which it is told: results may move with it."""
 STIFFER = 25.0
 """Factor of a stiffness that is chosen anew in dynamics: energy that reaches the overlap that is allowed comes to `AIM`
