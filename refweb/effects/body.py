@@ -113,9 +113,11 @@ class Body(Table):
     rounding : float, optional
         Radius of the edges of a box or a cylinder [m], > 0, by default 2 % of its smallest size.
     file : str
-        Of a mesh: STL, OBJ or VTP file of its closed surface, relative to the scene's folder.
+        Of a mesh: STL, OBJ or VTP file of its surface, relative to the scene's folder.
     scale : float
         Of a mesh: metres a unit of its file, > 0; 1 by default.
+    surface : {"file", "hull"}
+        Of a mesh: "hull" takes the convex hull of its surface in place of what the file has.
     grid : int, optional
         Of a mesh: number of cells along its longest side of the grid on which depth is known; by default 48, or as many
         as its thinnest wall asks for.
