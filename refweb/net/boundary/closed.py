@@ -209,6 +209,8 @@ def oriented(size, pairs, along):
     turned = np.zeros(size, dtype=bool)
     for first in np.unique(piece, return_index=True)[1]:
         order, before = breadth_first_order(graph, first, directed=False)
+        if len(order) == 1:
+            continue
         flips = np.asarray(differs[order[1:], before[order[1:]]]).ravel() == 2.0
         for t, flip in zip(order[1:].tolist(), flips.tolist(), strict=True):
             turned[t] = turned[before[t]] ^ flip
