@@ -104,6 +104,8 @@ SHAPES = {
     "cylinder": "refweb.net.shapes.cylinder:Cylinder",
     "capsule": "refweb.net.shapes.capsule:Capsule",
     "mesh": "refweb.net.shapes.mesh:Mesh",
+    "plane": "refweb.net.shapes.plane:Plane",
+    "terrain": "refweb.net.shapes.terrain:Terrain",
 }
 """Shapes of ``[[body]]``; how to write one says `refweb.net.rigid_body`."""
 

@@ -94,6 +94,8 @@ class Shape(Table):
         both ends and once in between.
     planar : bool
         Whether it turns about its third axis only, and looks the same then.
+    ground : bool
+        Whether its size says nothing of the depth of contact that is too much, as that of ground does not.
     error : float, optional
         Largest distance of the surface that lines feel from the one that is meant [m], where these differ.
     directions : tuple of str
@@ -103,6 +105,7 @@ class Shape(Table):
     free = False
     once = False
     planar = False
+    ground = False
     error: float | None = None
     directions: ClassVar[tuple] = ("axes", "axis", "normal")
 

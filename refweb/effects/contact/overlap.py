@@ -71,6 +71,12 @@ def allowed(body):
     return SHARE * size_of(body)
 
 
+def aim(net, body):
+    """Overlap that a stiffness is chosen for [m]: of ground as for a body as small as the shortest line."""
+    size = float(net.natural_length.min()) if body.shape.ground else math.inf
+    return AIM * min(allowed(body), SHARE * size)
+
+
 def rounded_up(value):
     """A number of two digits that is not smaller."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
@@ -335,7 +341,7 @@ def first_stiffness(system, body, exponent, load_steps=()):
     InputError
         For a body without end, whose size says nothing of an overlap.
     """
-    net, deep = system.net, AIM * allowed(body)
+    net, deep = system.net, aim(system.net, body)
     if not math.isfinite(deep):
         raise InputError(f'stiffness is missing for body "{body.name}", whose size is infinite: give stiffness = ...')
     lines = net.line_data.ea / (net.natural_length * exponent * deep ** (exponent - 1.0))
@@ -356,7 +362,7 @@ def first_between(system, bodies, exponent):
     energy by which they turn, and under the outer forces on all bodies that are free. v is their speed at the start
     with what they gain under outer forces until they meet.
     """
-    net, deep = system.net, AIM * min(map(allowed, bodies))
+    net, deep = system.net, min(aim(system.net, body) for body in bodies)
     if not math.isfinite(deep):
         named = " and ".join(f'"{body.name}"' for body in bodies)
         raise InputError(f"stiffness is missing for bodies {named}, whose size is infinite: give stiffness = ...")
@@ -364,7 +370,8 @@ def first_between(system, bodies, exponent):
     free = [body for body in bodies if not body.fixed]
     mass = 1.0 / sum(1.0 / net.mass[body.row] for body in free)
     falls = [np.zeros(3) if body.fixed else force[body.row] / net.mass[body.row] for body in bodies]
-    gap = np.linalg.norm(net.points[bodies[0].row] - net.points[bodies[1].row]) - sum(b.thickness for b in bodies)
+    first, second = sorted(bodies, key=lambda body: not body.shape.ground)
+    gap = _distances(net, first, net.points[[second.row]])[0] - sum(map(_reach, bodies))
     square = float(((v[bodies[0].row] - v[bodies[1].row]) ** 2).sum())
     square += 2.0 * float(np.linalg.norm(falls[0] - falls[1])) * max(float(gap), 0.0)
     turns = [body for body in free if body.turn is not None]
@@ -387,6 +394,20 @@ def _push(system, body, t):
     return float(np.linalg.norm(force[: system.net.nodes].sum(axis=0) if body.fixed else force[body.row]))
 
 
+def _distances(net, body, points):
+    """Distances of points (n, 3) from the middle of a body, or from ground [m], shape (n,)."""
+    away = points - net.points[body.row]
+    if not body.shape.ground:
+        return np.linalg.norm(away, axis=1)
+    depth, grown = body.shape.depth(), body.shape.grown()
+    return np.array([-depth(tuple(p), grown)[0] for p in (away @ body.axes.T).tolist()])
+
+
+def _reach(body):
+    """Distance at which a body is touched, of those of `_distances` [m]."""
+    return 0.0 if body.shape.ground else body.thickness
+
+
 def _energy(system, body):
     """½ μ v² of a web and a body that meet, and the energy by which that turns [J], see `first_stiffness`."""
     net, nodes = system.net, system.net.nodes
@@ -395,8 +416,8 @@ def _energy(system, body):
     if not len(free):
         free = np.arange(nodes)
     web, body_mass = float(net.mass[free].sum()), float(net.mass[body.row])
-    v, away = system.initial_velocity(), net.points[free] - net.points[body.row]
-    distance, speed = np.linalg.norm(away, axis=1), np.linalg.norm(v[free] - v[body.row], axis=1)
+    v = system.initial_velocity()
+    distance, speed = _distances(net, body, net.points[free]), np.linalg.norm(v[free] - v[body.row], axis=1)
     nearest = int(distance.argmin())
     v0 = float(speed[nearest]) if speed[nearest] > 0.0 else float(speed.max())
     fastest = 0.0
@@ -408,7 +429,7 @@ def _energy(system, body):
     falls = np.zeros(3) if body.fixed else force[body.row] / body_mass
     carried = fixed.any() and not body.fixed
     along = np.zeros(3) if carried or not web > 0.0 else force[free].sum(axis=0) / web
-    gained = 2.0 * float(np.linalg.norm(falls - along)) * max(float(distance[nearest]) - body.thickness, 0.0)
+    gained = 2.0 * float(np.linalg.norm(falls - along)) * max(float(distance[nearest]) - _reach(body), 0.0)
     mass = web if body.fixed else body_mass if fixed.any() else body_mass * web / (body_mass + web)
     turning = 0.0
     if body.turn is not None:

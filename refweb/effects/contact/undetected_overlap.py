@@ -84,7 +84,7 @@ class Silent:
 def _depth(body, body_b, places, x):
     """Depth of the skeleton of a body in another one [m]."""
     parts = body.shape.skeleton()
-    if parts is None:
+    if parts is None or not len(parts):
         return 0.0
     axes, its = (item.axes @ item.rotation(x).T for item in (body, body_b))
     points_in_b = (_along(parts) + body.offset) @ axes + places[body.row] - places[body_b.row]

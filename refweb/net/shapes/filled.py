@@ -141,11 +141,11 @@ class Filled(Shape):
         return self.solid.field.error
 
 
-def field_in(points, triangles, grid, winding=None):
-    """The field of the solid in a surface, of a grid that is fine enough for its walls."""
+def field_in(points, triangles, grid, winding=None, least=GRID):
+    """The field of the solid in a surface, of a grid that is fine enough for its walls; ``least`` cells by default."""
     from ..boundary.field import field_of
 
-    cells = grid or GRID
+    cells = grid or least
     while True:
         field = field_of(points, triangles, cells, winding=winding)
         if field.thickness >= WALL * field.spacing:
