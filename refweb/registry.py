@@ -224,7 +224,7 @@ def name_of(table, value):
     return next((name for name, reference in table.items() if reference == own_reference), None)
 
 
-FILES = {"web": ("path", "lines"), "body": ("file",), "fold": ("file",)}
+FILES = {"web": ("path", "lines"), "body": ("file", "heights"), "fold": ("file",)}
 """Keys of tables of a scene that are paths of files."""
 
 
