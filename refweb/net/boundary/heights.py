@@ -53,9 +53,7 @@ def _between(points):
     try:
         return Delaunay(points[:, :2]).simplices.astype(np.int64)
     except QhullError:
-        raise InputError(
-            f"its {len(points)} places lie on one line: ground needs three at least that do not"
-        ) from None
+        raise InputError(f"its {len(points)} places lie on one line: ground needs three at least that do not") from None
 
 
 def above_ground(points, triangles, bottom):

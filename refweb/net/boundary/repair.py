@@ -118,7 +118,9 @@ def _single(triangles):
     if twice.any():
         edges, _ = _edges(single)
         between = np.flatnonzero(twice)
-        inside = coo_matrix((np.ones(3 * len(between)), (np.repeat(np.arange(len(between)), 3), edges[between].ravel())))
+        inside = coo_matrix(
+            (np.ones(3 * len(between)), (np.repeat(np.arange(len(between)), 3), edges[between].ravel()))
+        )
         _, wall = connected_components(inside @ inside.T, directed=False)
         within = np.bincount(edges[between].ravel(), minlength=edges.max() + 1)
         beside = np.bincount(edges.ravel(), minlength=edges.max() + 1) - within

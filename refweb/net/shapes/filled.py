@@ -20,6 +20,7 @@ WALL = 2.0
 MOST = 4_000_000
 """Largest number of points of a grid that is chosen."""
 
+
 class Solid(NamedTuple):
     """Solid of a file, about the origin of the body.
 
