@@ -126,8 +126,8 @@ class Body(Table):
     thickness : float, optional
         Of terrain: depth of the ground below its lowest place [m], > 0; by default a quarter of its longest side.
     grid : int, optional
-        Of a mesh or terrain: number of cells along its longest side of the grid on which depth is known; by default 48, or as many
-        as its thinnest wall asks for.
+        Of a mesh or terrain: number of cells along its longest side of the grid on which depth is known; by default 48,
+        or as many as its thinnest wall asks for.
     orientation : sequence of 4 float, optional
         In place of ``axes`` or ``axis``: the quaternion (w, x, y, z), of any length but 0, of the rotation that takes
         x, y and z to the body's axes.

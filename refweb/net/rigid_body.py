@@ -33,12 +33,12 @@ A shape is a file with a class, whose fields are its keys in ``[[body]]``. This 
 A body is convex. Its depth is the distance from its surface there, and concave, with a gradient that nowhere jumps: the
 force is the slope of an energy. That is why edges are rounded, and a body is a core and the radius by which it has
 grown on all sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core is a box, whose half sizes may be 0, or
-round about its axis, ``depth`` and ``boundary`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is a
-capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move and turn sets
-``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its centre. One
-that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as `refweb.net.shapes.mesh` has. By
-its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`, it touches other bodies; where they are to touch,
-one without is refused. The line in ``SHAPES`` of ``refweb/registry.py``::
+round about its axis, ``depth`` and ``boundary`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is
+a capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move and turn
+sets ``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its
+centre. One that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as
+`refweb.net.shapes.filled` has. By its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`, it touches other
+bodies; where they are to touch, one without is refused. The line in ``SHAPES`` of ``refweb/registry.py``::
 
     "wall": "refweb.net.shapes.wall:Wall",
 """

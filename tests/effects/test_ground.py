@@ -104,6 +104,7 @@ def test_stiffness_on_a_plane_follows_from_the_shortest_line():
 def test_a_ball_rolls_down_a_slope():
     """5/7 g sin α, without slip, of bodies on ground; and a box on it rests."""
     angle = 0.3
+    turned = [[float(np.cos(angle)), 0.0, float(np.sin(angle))], [0.0, 1.0, 0.0]]
     scene = refweb.Scene.from_dict({
         "web": {"kind": "inline", "points": [[9, 0, 9], [9, 1, 9]], "lines": [[0, 1]], "supports": [0, 1]},
         "cable": {"law": "linear", "modulus": 1e7, "area": 1e-6, "density": 1000.0},
@@ -111,8 +112,8 @@ def test_a_ball_rolls_down_a_slope():
         "body": [
             {"name": "slope", "shape": "plane", "normal": slope_of(angle), "position": [0, 0, 0], "fixed": True},
             {"name": "ball", "radius": 0.1, "mass": 2.0, "position": [0.1 * x for x in slope_of(angle)]},
-            {"name": "box", "shape": "box", "size": [0.2, 0.2, 0.1], "mass": 1.0, "axes": [[np.cos(angle), 0, np.sin(angle)],
-             [0, 1, 0]], "position": [0.05 * slope_of(angle)[0], 1.0, 0.05 * slope_of(angle)[2]]},
+            {"name": "box", "shape": "box", "size": [0.2, 0.2, 0.1], "mass": 1.0, "axes": turned,
+             "position": [0.05 * slope_of(angle)[0], 1.0, 0.05 * slope_of(angle)[2]]},
         ],
         "contact": {"stiffness": 1e5, "friction": 0.6, "slip_velocity": 1e-3, "damping": 1.0, "between_bodies": True},
         "solve": {"kind": "dynamic", "duration": 0.5},

@@ -35,7 +35,7 @@ def reversed_(surface, *which):
 
 
 def weighed(*boxes):
-    """(volume, centre, inertia about it) of boxes by their corners and a sign each: ± V, ± V (b² + c²)/12 and Steiner."""
+    """(volume, centre, inertia about it) of boxes by their corners and a sign: ± V, ± V (b² + c²)/12 and Steiner."""
     volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
     for sign, low, high in boxes:
         low, high = np.array(low, dtype=float), np.array(high, dtype=float)
@@ -77,7 +77,7 @@ BESIDE = (HALF * [1, -1, -1], SIZE * [1.5, 0.5, 0.5])
 DIAGONAL = (HALF * [1, 1, -1], SIZE * [1.5, 1.5, 0.5])
 SHIFTED = (HALF * [1, 0, -0.5], SIZE * [1.5, 0.75, 0.5])
 CASES = {  # surface, the boxes whose union it is, the same with signs, whether weighed exactly, what is told
-    "hole": ((BOX[0], np.delete(BOX[1], 3, axis=0)), [ONE], None, True, r"open at 3 edges, in 1 holes .* 0.447 m across"),
+    "hole": ((BOX[0], np.delete(BOX[1], 3, axis=0)), [ONE], None, True, r"open at 3 edges, in 1 holes .* 0.447 m"),
     "no lid": ((BOX[0], BOX[1][2:]), [ONE], None, True, r"open at 4 edges, in 1 holes that were bridged"),
     "flipped": (reversed_(BOX, 3), [ONE], None, True, "1 of 12 triangles faced inward and were turned"),
     "hole and inward": (
@@ -85,12 +85,12 @@ CASES = {  # surface, the boxes whose union it is, the same with signs, whether 
     ),
     "doubled": ((BOX[0], np.vstack([BOX[1], BOX[1][3:4]])), [ONE], None, True, "1 triangles lay on others"),
     "doubled and flipped": ((BOX[0], np.vstack([BOX[1], BOX[1][3:4, ::-1]])), [ONE], None, True, "1 triangles lay on"),
-    "common edge": (joined(BOX, box_at(*DIAGONAL)), [ONE, DIAGONAL], None, True, "1 edges have more than two triangles"),
+    "common edge": (joined(BOX, box_at(*DIAGONAL)), [ONE, DIAGONAL], None, True, "1 edges have more than two"),
     "common wall": (joined(BOX, box_at(*BESIDE)), [ONE, BESIDE], None, True, "2 triangles lay on others"),
     "touching": (joined(BOX, box_at(*SHIFTED)), [ONE, SHIFTED], None, False, "the solid is the union of its parts"),
     "overlapping": (
         joined(BOX, box_at(*TWO)), [ONE, TWO], [(1, *ONE), (1, *TWO), (-1, np.zeros(3), HALF)], False,
-        r"triangles lie in other parts or pass through them: the solid is the union of its parts, its edges there within",
+        r"triangles lie in other parts or pass through them: the solid is the union of its parts, its edges",
     ),
     "overlapping, one inward, with a hole": (
         joined(reversed_(BOX, *range(12)), (box_at(*TWO)[0], np.delete(BOX[1], 11, axis=0))),

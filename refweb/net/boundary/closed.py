@@ -100,7 +100,7 @@ def closed(points, triangles):
         first, second = pairs[wrong[0]]
         edge = np.intersect1d(triangles[first], triangles[second])[:2]
         raise NotClosedError(
-            f"the surface has one side only, as a Möbius band, seen at the edge {_edge(points, *edge)}"
+            f"the surface has one side only, as a Möbius band, as seen at an edge {_edge(points, *edge)}"
         )
     triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
     size = np.ptp(points[triangles].reshape(-1, 3), axis=0).max()

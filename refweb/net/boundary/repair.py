@@ -83,10 +83,10 @@ def repaired(points, triangles, cells):
     triangles, doubled = _single(triangles)
     triangles, inverted, sheets, manifold = _outward(points, triangles)
     extended, lids, holes = _lids(points, triangles)
-    whole = np.vstack([triangles, lids])
-    winding = Winding(extended, whole)
-    spacing = float(np.ptp(extended[np.unique(whole)], axis=0).max()) / cells
-    corners, side, cut = _boundary(extended[whole], winding, spacing)
+    surface = np.vstack([triangles, lids])
+    winding = Winding(extended, surface)
+    spacing = float(np.ptp(extended[np.unique(surface)], axis=0).max()) / cells
+    corners, side, cut = _boundary(extended[surface], winding, spacing)
     summed = _of_sums(winding.sums())
     if not len(corners) or not summed.volume > 0.0:
         raise InputError(EMPTY)
@@ -94,8 +94,8 @@ def repaired(points, triangles, cells):
     faces = number.reshape(-1, 3)
     exact = moments(flat, faces)
     weighed = summed if cut.any() or abs(exact.volume - summed.volume) > SUMMED * summed.volume else exact
-    shown = _turned(whole, side)[(side != 0) | cut]
-    used, number = np.unique(shown, return_inverse=True)
+    remaining = _turned(surface, side)[(side != 0) | cut]
+    used, number = np.unique(remaining, return_inverse=True)
     remarks = [*_remarks(triangles, holes, doubled, inverted, manifold)]
     remarks += _of_inner(points[triangles], sheets, (side == 0)[: len(triangles)], spacing)
     return Repaired(extended[used], number.reshape(-1, 3), (flat, faces), weighed, winding, tuple(remarks))
@@ -109,7 +109,7 @@ def touches_itself(points, triangles, cells):
 
 
 def _single(triangles):
-    """(Triangles of which each is there once, number of others); walls between two parts that have one each are none."""
+    """(Triangles of which each is there once, number of others); of a wall that two parts have alike there is none."""
     _, first, of, count = np.unique(
         np.sort(triangles, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
     )
@@ -126,9 +126,9 @@ def _single(triangles):
         beside = np.bincount(edges.ravel(), minlength=edges.max() + 1) - within
         rim = within == 1
         open_ = (rim & ((beside == 0) | (beside % 2 == 1)))[edges[between]].any(axis=1)
-        keep = np.ones(len(single), dtype=bool)
-        keep[between] = np.isin(wall, wall[open_])
-        single = single[keep]
+        needed = np.ones(len(single), dtype=bool)
+        needed[between] = np.isin(wall, wall[open_])
+        single = single[needed]
     return single, doubled
 
 
@@ -154,8 +154,7 @@ def _outward(points, triangles):
     flip, flat = np.zeros(piece.max() + 1, dtype=bool), np.zeros(piece.max() + 1, dtype=bool)
     volume = np.zeros(len(flip))
     for n in range(len(flip)):
-        own = given[piece == n]
-        volume[n] = _volume(points, own)
+        volume[n] = _volume(points, given[piece == n])
         flat[n] = abs(volume[n]) <= FLAT * area[piece == n].sum() ** 1.5
     flip = np.where(flat, ~as_given, volume < 0.0)
     outward = np.where(flip[piece][:, None], given[:, ::-1], given)
@@ -186,11 +185,11 @@ def _volume(points, triangles):
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
 
-def _lies_in_others(points, triangles, own):
+def _lies_in_others(points, triangles, part):
     """Tell if a part without a rim lies in what other triangles enclose."""
-    if len(_rim(triangles[own])):
+    if len(_rim(triangles[part])):
         return False
-    return bool(Winding(points, triangles[~own]).inside(points[triangles[own]].mean(axis=1)).all())
+    return bool(Winding(points, triangles[~part]).inside(points[triangles[part]].mean(axis=1)).all())
 
 
 def _lids(points, triangles):
@@ -314,8 +313,8 @@ def _remarks(triangles, holes, doubled, inverted, manifold):
     """Faults of a surface, each a text."""
     if holes:
         yield (
-            f"the surface is open at {len(_rim(triangles))} edges, in {len(holes)} holes that were bridged, the largest "
-            f"{holes[0]:.3g} m across"
+            f"the surface is open at {len(_rim(triangles))} edges, in {len(holes)} holes that were bridged, the "
+            f"largest {holes[0]:.3g} m across"
         )
     if doubled:
         yield f"{doubled} triangles lay on others and were left out"
@@ -333,6 +332,6 @@ def _of_inner(corners, sheets, inner, spacing):
         yield f"{thin.sum()} triangles, {area[thin].sum():.3g} m², bound nothing: sheets without thickness are not felt"
     if (inner := inner & ~sheets).any():
         yield (
-            f"{inner.sum()} triangles lie in other parts or pass through them: the solid is the union of its parts, its "
-            f"edges there within {SMALL * spacing:.2g} m"
+            f"{inner.sum()} triangles lie in other parts or pass through them: the solid is the union of its parts, "
+            f"its edges there within {SMALL * spacing:.2g} m"
         )

@@ -142,11 +142,11 @@ class Filled(Shape):
         return self.solid.field.error
 
 
-def field_in(points, triangles, grid, winding=None, least=GRID):
-    """The field of the solid in a surface, of a grid that is fine enough for its walls; ``least`` cells by default."""
+def field_in(points, triangles, grid, winding=None, fewest=GRID):
+    """The field of the solid in a surface, of a grid that is fine enough for its walls; ``fewest`` cells by default."""
     from ..boundary.field import field_of
 
-    cells = grid or least
+    cells = grid or fewest
     while True:
         field = field_of(points, triangles, cells, winding=winding)
         if field.thickness >= WALL * field.spacing:

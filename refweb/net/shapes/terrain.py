@@ -91,6 +91,15 @@ class Terrain(Filled):
         except OSError as error:
             raise InputError(f"heights = {quote(self.heights)}: cannot be read: {error.strerror or error}") from None
 
+    def skeleton(self):
+        """Its edges that stand out, or none where there are too many: other bodies touch it by theirs."""
+        from ..skeleton import COLUMNS
+
+        try:
+            return super().skeleton()
+        except InputError:
+            return np.zeros((0, COLUMNS))
+
     def settle(self):
         """Read the file."""
         _ = self.solid
@@ -115,6 +124,6 @@ def _solid(path, content, scale, thickness, grid):
     sides = np.ptp(surface.points, axis=0)
     finest = 0.5 * (MOST / max(float(np.prod(sides / sides.max())), 1e-3)) ** (1.0 / 3.0)
     cells = int(np.clip(np.ceil(sides.max() / edge), GRID, max(finest, GRID)))
-    field = field_in(surface.points, surface.triangles, grid, least=cells)
+    field = field_in(surface.points, surface.triangles, grid, fewest=cells)
     convex = is_convex(surface.points, volume)
     return Solid(surface.points, surface.triangles, centre, volume, inertia, field, convex, ())
