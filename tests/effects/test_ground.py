@@ -275,3 +275,22 @@ def test_what_is_no_ground_is_refused(name, tmp_path):
 def test_keys_of_ground_are_checked(keys, message):
     with pytest.raises(refweb.InputError, match=message):
         refweb.Body(name="it", position=(0, 0, 0), **keys)
+
+
+def test_the_error_of_terrain_is_that_of_the_ground(tmp_path):
+    """None on a slope, whatever its rim; of waves it falls with the grid."""
+    slope = write_csv(tmp_path / "slope.csv", grid_of(lambda x, y: 0.2 * x - 0.1 * y))
+    assert refweb.Body(name="it", shape="terrain", heights=slope, position=(0, 0, 0), fixed=True).form.error < 1e-12
+    waves = write_csv(tmp_path / "waves.csv", grid_of(lambda x, y: 0.1 * np.sin(4 * x) * np.cos(3 * y), 41))
+    forms = [
+        refweb.Body(name="it", shape="terrain", heights=waves, grid=grid, position=(0, 0, 0), fixed=True).form
+        for grid in (24, 48, 96)
+    ]
+    errors = np.array([form.error for form in forms])
+    assert (errors[1:] < 0.6 * errors[:-1]).all() and errors[-1] < forms[-1].solid.field.error
+    rng = np.random.default_rng(4)
+    p = rng.uniform(-0.8, 0.8, (300, 2))
+    height = 0.1 * np.sin(4 * p[:, 0]) * np.cos(3 * p[:, 1])
+    found = forms[-1].solid.field.at(np.column_stack([p, height]))[0]
+    sagitta = 0.05**2 / 8 * 0.1 * (16 + 9 + 12)  # of triangles of 0.05 m, by the second derivatives
+    assert np.abs(found).max() < errors[-1] + sagitta

@@ -192,7 +192,7 @@ def field_of(points, triangles, cells, around=AROUND, known=None, winding=None):
     field = Field(numbers, h, shape, 0.0, 0.0)
     if known is not None:
         return replace(field, error=known.error, thickness=known.thickness)
-    error = np.abs(field.at(_on_surface(points, triangles))[0]).max()
+    error = np.abs(field.at(places_on(points, triangles))[0]).max()
     return replace(field, error=float(error), thickness=_thickness(field, points, triangles))
 
 
@@ -228,7 +228,7 @@ def _coefficients(deep):
     return c
 
 
-def _on_surface(points, triangles):
+def places_on(points, triangles):
     """Places of a surface where the field may miss it most."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     edges = [(1.0 - t) * p + t * q for p, q in ((a, b), (b, c), (c, a)) for t in (0.25, 0.5)]

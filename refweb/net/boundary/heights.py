@@ -56,12 +56,22 @@ def _between(points):
         raise InputError(f"its {len(points)} places lie on one line: ground needs three at least that do not") from None
 
 
+def rim_of(triangles):
+    """Edges (e, 2) of one triangle, in its direction."""
+    ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    _, of, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return ends[times[of.ravel()] == 1]
+
+
+def on_rim(triangles):
+    """Mask of triangles with a corner on the rim."""
+    return np.isin(triangles, rim_of(triangles)).any(axis=1)
+
+
 def above_ground(points, triangles, bottom):
     """(corners, triangles) of the block between a surface that faces up and the height of its bottom [m]."""
     count = len(points)
     low = np.column_stack([points[:, :2], np.full(count, bottom)])
-    ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    _, of, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
-    a, b = ends[times[of.ravel()] == 1].T
+    a, b = rim_of(triangles).T
     walls = np.vstack([np.column_stack([b, a, a + count]), np.column_stack([b, a + count, b + count])])
     return np.vstack([points, low]), np.vstack([triangles, count + triangles[:, ::-1], walls])

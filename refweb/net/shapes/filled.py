@@ -46,6 +46,8 @@ class Solid(NamedTuple):
         Corners and triangles of the boundary of a solid whose surface had faults, where these are not the ones above.
     winding : refweb.net.boundary.winding.Winding, optional
         Tells what is inside of such a solid.
+    error : float, optional
+        Error of the field at the part of the surface that matters [m]; by default that of the field.
     """
 
     points: np.ndarray
@@ -58,6 +60,7 @@ class Solid(NamedTuple):
     remarks: tuple
     felt: tuple | None = None
     winding: Any = None
+    error: float | None = None
 
 
 class Filled(Shape):
@@ -134,12 +137,12 @@ class Filled(Shape):
         centre = ", ".join(f"{x:.4g}" for x in solid.centre)
         grid = " × ".join(map(str, field.counts))
         yield f"{len(solid.triangles)} triangles, {solid.volume:.4g} m³, centre of mass at ({centre}) m from its origin"
-        yield f"surface within {field.error:.1e} m on a grid of {grid} points"
+        yield f"surface within {self.error:.1e} m on a grid of {grid} points"
 
     @property
     def error(self):
         """Largest distance of the surface that lines feel from that of the file [m]."""
-        return self.solid.field.error
+        return self.solid.field.error if self.solid.error is None else self.solid.error
 
 
 def field_in(points, triangles, grid, winding=None, fewest=GRID):
@@ -152,10 +155,10 @@ def field_in(points, triangles, grid, winding=None, fewest=GRID):
         if field.thickness >= WALL * field.spacing:
             return field
         more = min(max(1.1 * WALL * field.spacing / max(field.thickness, field.spacing), 1.25), 2.0)
-        finer = int(np.ceil(more * cells))
+        finer, remedy = int(np.ceil(more * cells)), "or " if winding is None else 'take surface = "hull", or '
         if grid or np.prod(np.array(field.counts, dtype=float)) * more**3 > MOST:
             raise InputError(
                 f"grid = {cells} has cells of {field.spacing:.3g} m, and walls {2.0 * field.thickness:.3g} m thin need "
-                f"{2.0 * WALL:g} of them: give grid = {finer} or more, or thicken the walls"
+                f"{2.0 * WALL:g} of them: give grid = {finer} or more, {remedy}thicken the walls"
             )
         cells = finer

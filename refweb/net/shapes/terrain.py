@@ -25,8 +25,8 @@ class Terrain(Filled):
 
     The position is where the origin of the file lies, the third axis is up. A CSV file has the columns x, y and z of
     places, on a grid or scattered, between which the ground is made of triangles; a surface file (OBJ, STL, VTP) brings
-    the triangles. The surface has one height at each place, so no cliff hangs over. What is said of the grid of a mesh,
-    and of its error, holds here.
+    the triangles. The surface has one height at each place, so no cliff hangs over. Its error is that of the ground but
+    for triangles at the rim. Where the stiffness of contact is left out it is chosen as for a plane.
 
     Parameters
     ----------
@@ -109,7 +109,8 @@ class Terrain(Filled):
 def _solid(path, content, scale, thickness, grid):
     """The `Solid` of a file of some content."""
     from ..boundary.closed import NotClosedError, closed, is_convex, moments
-    from ..boundary.heights import above_ground, places_of
+    from ..boundary.field import places_on
+    from ..boundary.heights import above_ground, on_rim, places_of
 
     points, triangles = places_of(path)
     points = scale * points
@@ -126,4 +127,8 @@ def _solid(path, content, scale, thickness, grid):
     cells = int(np.clip(np.ceil(sides.max() / edge), GRID, max(finest, GRID)))
     field = field_in(surface.points, surface.triangles, grid, fewest=cells)
     convex = is_convex(surface.points, volume)
-    return Solid(surface.points, surface.triangles, centre, volume, inertia, field, convex, ())
+    solid = Solid(surface.points, surface.triangles, centre, volume, inertia, field, convex, ())
+    used, inner = np.unique(triangles[~on_rim(triangles)], return_inverse=True)
+    if not len(used):
+        return solid
+    return solid._replace(error=float(np.abs(field.at(places_on(points[used], inner.reshape(-1, 3)))[0]).max()))
