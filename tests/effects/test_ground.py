@@ -294,3 +294,35 @@ def test_the_error_of_terrain_is_that_of_the_ground(tmp_path):
     found = forms[-1].solid.field.at(np.column_stack([p, height]))[0]
     sagitta = 0.05**2 / 8 * 0.1 * (16 + 9 + 12)  # of triangles of 0.05 m, by the second derivatives
     assert np.abs(found).max() < errors[-1] + sagitta
+
+
+@pytest.mark.parametrize("shape", [{"radius": 0.1}, {"shape": "box", "size": [0.2, 0.3, 0.1]}])
+def test_bodies_move_on_a_terrain_as_on_the_plane(shape, tmp_path):
+    """A ball and a box that fall on a slope, skid and turn."""
+    file = write_csv(tmp_path / "it.csv", grid_of(lambda x, y: 0.2 * x - 0.1 * y, size=4.0))
+    grounds = {"shape": "terrain", "heights": file}, {"shape": "plane", "normal": [-0.2, 0.1, 1.0]}
+    states = []
+    for ground in grounds:
+        scene = refweb.Scene.from_dict({
+            "web": {"kind": "inline", "points": [[9, 0, 9], [9, 1, 9]], "lines": [[0, 1]], "supports": [0, 1]},
+            "cable": {"law": "linear", "modulus": 1e7, "area": 1e-6, "density": 1000.0},
+            "gravity": {"acceleration": [0.0, 0.0, -G]},
+            "body": [
+                {"name": "ground", "position": [0, 0, 0], "fixed": True, **ground},
+                {"name": "it", "mass": 2.0, "position": [0.1, 0.0, 0.2], "velocity": [0.5, 0.0, -1.0],
+                 "angular_velocity": [0.0, 3.0, 0.0], **shape},
+            ],
+            "contact": {"stiffness": 2e4, "friction": 0.3, "slip_velocity": 1e-2, "damping": 0.3,
+                        "between_bodies": True},
+            "solve": {"kind": "dynamic", "duration": 0.3, "step_size": 1e-4},
+            "accuracy": {"error": "none"},
+        })  # fmt: skip
+        solution = refweb.run(scene)
+        assert solution.passage["pairs"] == "certified"
+        states.append(solution.state)
+    body = states[0].system.net.bodies[1]
+    assert np.linalg.norm(states[1].v[body.row] - [0.5, 0.0, -1.0 - 0.3 * G]) > 0.5
+    np.testing.assert_allclose(states[0].x[body.row], states[1].x[body.row], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        body.turning(states[0].x, states[0].v), body.turning(states[1].x, states[1].v), rtol=0, atol=1e-4
+    )
