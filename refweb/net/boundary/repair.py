@@ -80,9 +80,13 @@ def repaired(points, triangles, cells):
     points, triangles = joined(points, triangles)
     if not len(triangles):
         raise InputError(EMPTY)
-    triangles, doubled = _single(triangles)
-    triangles, inverted, sheets, manifold = _outward(points, triangles)
-    extended, lids, holes = _lids(points, triangles)
+    single, doubled = _single(triangles)
+    single, sheets = _without_sheets(points, single)
+    if not len(single):
+        raise InputError(EMPTY)
+    pieces = _pieces(points, single)
+    triangles = _outward(points, single, pieces)
+    extended, lids, holes = _lids(points, triangles, pieces.ends)
     surface = np.vstack([triangles, lids])
     winding = Winding(extended, surface)
     spacing = float(np.ptp(extended[np.unique(surface)], axis=0).max()) / cells
@@ -96,8 +100,13 @@ def repaired(points, triangles, cells):
     weighed = summed if cut.any() or abs(exact.volume - summed.volume) > SUMMED * summed.volume else exact
     remaining = _turned(surface, side)[(side != 0) | cut]
     used, number = np.unique(remaining, return_inverse=True)
-    remarks = [*_remarks(triangles, holes, doubled, inverted, manifold)]
-    remarks += _of_inner(points[triangles], sheets, (side == 0)[: len(triangles)], spacing)
+    inverted, inner = int((triangles != single).any(axis=1).sum()), int((side == 0)[: len(triangles)].sum())
+    remarks = [*_remarks(pieces, holes, doubled, inverted, sheets)]
+    if inner:
+        seams = f", its edges there within {SMALL * spacing:.2g} m" if cut.any() else ""
+        remarks.append(
+            f"{inner} triangles lie in other parts or pass through them: the solid is the union of its parts{seams}"
+        )
     return Repaired(extended[used], number.reshape(-1, 3), (flat, faces), weighed, winding, tuple(remarks))
 
 
@@ -139,32 +148,76 @@ def _edges(triangles):
     return of.reshape(-1, 3), edges
 
 
-def _outward(points, triangles):
-    """(Triangles outward, number that were turned, mask of those that bound nothing, edges of more than two)."""
+class _Pieces(NamedTuple):
+    """Triangles that hang together at edges of two triangles.
+
+    Attributes
+    ----------
+    triangles : ndarray of int, shape (t, 3)
+        All, those of a piece facing one side.
+    piece, area : ndarray, shape (t,)
+        Piece of each triangle, and its area [m²].
+    as_given : ndarray of bool, shape (pieces,)
+        Whether most of a piece is as the file has it.
+    volume : ndarray, shape (pieces,)
+        Volume between a piece and the middle of its rim [m³].
+    flat : ndarray of bool, shape (pieces,)
+        Whether that is none.
+    ends : ndarray of int, shape (k, 2)
+        Corners of the edges of one triangle.
+    open : ndarray of bool, shape (pieces,)
+        Whether a piece has such an edge.
+    crowded : int
+        Number of edges of more than two triangles.
+    """
+
+    triangles: np.ndarray
+    piece: np.ndarray
+    area: np.ndarray
+    as_given: np.ndarray
+    volume: np.ndarray
+    flat: np.ndarray
+    ends: np.ndarray
+    open: np.ndarray
+    crowded: int
+
+
+def _pieces(points, triangles):
+    """The `_Pieces` of some triangles."""
     edges, ends = _edges(triangles)
     count = np.bincount(edges.ravel())
     order = np.argsort(edges.ravel(), kind="stable")
     order = order[count[edges.ravel()[order]] == 2].reshape(-1, 2)
     start = triangles[order // 3, order % 3]
     piece, turned = oriented(len(triangles), order // 3, start[:, 0] == start[:, 1])
-    given = np.where(turned[:, None], triangles[:, ::-1], triangles)
-    a, b, c = (points[given[:, k]] for k in range(3))
+    faces = np.where(turned[:, None], triangles[:, ::-1], triangles)
+    a, b, c = (points[faces[:, k]] for k in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    as_given = np.bincount(piece, np.where(turned, -area, area)) >= 0.0  # most of a piece is as the file has it
-    flip, flat = np.zeros(piece.max() + 1, dtype=bool), np.zeros(piece.max() + 1, dtype=bool)
-    volume = np.zeros(len(flip))
-    for n in range(len(flip)):
-        volume[n] = _volume(points, given[piece == n])
-        flat[n] = abs(volume[n]) <= FLAT * area[piece == n].sum() ** 1.5
-    flip = np.where(flat, ~as_given, volume < 0.0)
-    outward = np.where(flip[piece][:, None], given[:, ::-1], given)
-    inside_out = ~flat & (flip == as_given)
-    if volume[np.flatnonzero(~flat)].size and (np.abs(volume) * np.where(inside_out, -1.0, 1.0))[~flat].sum() > 0.0:
+    as_given = np.bincount(piece, np.where(turned, -area, area)) >= 0.0
+    volume = np.array([_volume(points, faces[piece == n]) for n in range(piece.max() + 1)])
+    flat = np.abs(volume) <= FLAT * np.bincount(piece, area) ** 1.5
+    is_open = np.bincount(piece, (count[edges] == 1).any(axis=1)) > 0
+    return _Pieces(faces, piece, area, as_given, volume, flat, ends[count == 1], is_open, int((count > 2).sum()))
+
+
+def _without_sheets(points, triangles):
+    """(Triangles without pieces that are flat and have an open edge, area of each triangle of these [m²])."""
+    pieces = _pieces(points, triangles)
+    sheet = (pieces.flat & pieces.open)[pieces.piece]
+    return triangles[~sheet], pieces.area[sheet]
+
+
+def _outward(points, triangles, pieces):
+    """Triangles outward."""
+    flip = np.where(pieces.flat, ~pieces.as_given, pieces.volume < 0.0)
+    outward = np.where(flip[pieces.piece][:, None], pieces.triangles[:, ::-1], pieces.triangles)
+    inside_out = ~pieces.flat & (flip == pieces.as_given)
+    if (np.abs(pieces.volume) * np.where(inside_out, -1.0, 1.0))[~pieces.flat].sum() > 0.0:
         for n in np.flatnonzero(inside_out):
-            if _lies_in_others(points, outward, piece == n):
-                outward[piece == n] = outward[piece == n][:, ::-1]
-    inverted = int((outward != triangles).any(axis=1).sum())
-    return outward, inverted, flat[piece], int((count > 2).sum())
+            part = pieces.piece == n
+            if _lies_in_others(points, outward, part):
+                outward[part] = outward[part][:, ::-1]
+    return outward
 
 
 def _rim(triangles):
@@ -192,9 +245,12 @@ def _lies_in_others(points, triangles, part):
     return bool(Winding(points, triangles[~part]).inside(points[triangles[part]].mean(axis=1)).all())
 
 
-def _lids(points, triangles):
-    """(Points with middles of rims behind them, triangles that close all rims, size of each hole [m])."""
-    rim = _rim(triangles)
+def _lids(points, triangles, ends):
+    """(Points with middles of rims behind them, triangles that close all rims, size of each hole [m]).
+
+    A rim with edges of one triangle, corners ``ends (k, 2)``, is that of a hole.
+    """
+    rim, opening = _rim(triangles), set(map(tuple, np.sort(ends, axis=1).tolist()))
     if not len(rim):
         return points, np.zeros((0, 3), dtype=np.int64), []
     corners, number = np.unique(rim, return_inverse=True)
@@ -205,7 +261,8 @@ def _lids(points, triangles):
     for n in range(part.max() + 1):
         edges = rim[part[number[:, 0]] == n]
         places = points[np.unique(edges)]
-        holes.append(float(np.linalg.norm(np.ptp(places, axis=0))))
+        if not opening.isdisjoint(map(tuple, np.sort(edges, axis=1).tolist())):
+            holes.append(float(np.linalg.norm(np.ptp(places, axis=0))))
         loop = _loop(edges) if len(edges) <= LOOP else None
         parts = None if loop is None else _in_plane(points[loop])
         if parts is not None:
@@ -309,29 +366,18 @@ def _of_sums(sums):
     return Moments(volume, centre, np.trace(second) * np.eye(3) - second)
 
 
-def _remarks(triangles, holes, doubled, inverted, manifold):
+def _remarks(pieces, holes, doubled, inverted, sheets):
     """Faults of a surface, each a text."""
     if holes:
         yield (
-            f"the surface is open at {len(_rim(triangles))} edges, in {len(holes)} holes that were bridged, the "
-            f"largest {holes[0]:.3g} m across"
+            f"the surface is open at {len(pieces.ends)} edges, in {len(holes)} holes that were bridged, the largest "
+            f"{holes[0]:.3g} m across"
         )
     if doubled:
         yield f"{doubled} triangles lay on others and were left out"
-    if manifold:
-        yield f"{manifold} edges have more than two triangles: parts that touch there are one solid"
+    if pieces.crowded:
+        yield f"{pieces.crowded} edges have more than two triangles: parts that touch there are one solid"
     if inverted:
-        yield f"{inverted} of {len(triangles)} triangles faced inward and were turned"
-
-
-def _of_inner(corners, sheets, inner, spacing):
-    """Remarks on triangles (t, 3, 3) that are not in the boundary, or not all of them."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    if (thin := inner & sheets).any():
-        yield f"{thin.sum()} triangles, {area[thin].sum():.3g} m², bound nothing: sheets without thickness are not felt"
-    if (inner := inner & ~sheets).any():
-        yield (
-            f"{inner.sum()} triangles lie in other parts or pass through them: the solid is the union of its parts, "
-            f"its edges there within {SMALL * spacing:.2g} m"
-        )
+        yield f"{inverted} of {len(pieces.triangles)} triangles faced inward and were turned"
+    if len(sheets):
+        yield f"{len(sheets)} triangles, {sheets.sum():.3g} m², bound nothing: sheets without thickness are not felt"
