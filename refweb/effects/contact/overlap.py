@@ -71,10 +71,14 @@ def allowed(body):
     return SHARE * size_of(body)
 
 
+def allowed_in(net, body):
+    """Overlap that is allowed of a body of a net [m]: of ground as of a body as small as the shortest line."""
+    return min(allowed(body), SHARE * float(net.natural_length.min())) if body.shape.ground else allowed(body)
+
+
 def aim(net, body):
-    """Overlap that a stiffness is chosen for [m]: of ground as for a body as small as the shortest line."""
-    size = float(net.natural_length.min()) if body.shape.ground else math.inf
-    return AIM * min(allowed(body), SHARE * size)
+    """Overlap that a stiffness is chosen for [m]."""
+    return AIM * allowed_in(net, body)
 
 
 def rounded_up(value):
@@ -128,6 +132,8 @@ class Deepest(NamedTuple):
         Overlap at t = 0 [m], which no stiffness changes.
     fixed : bool
         Whether it is deeper than allowed, and neither the line nor the body is free to give way.
+    allowed : float
+        Overlap that is allowed [m].
     """
 
     body: RigidBody
@@ -141,11 +147,12 @@ class Deepest(NamedTuple):
     chosen: bool
     initial: float
     fixed: bool
+    allowed: float
 
     @property
     def too_deep(self):
         """True if it is deeper than allowed."""
-        return self.overlap > allowed(self.body)
+        return self.overlap > self.allowed
 
     @property
     def at_start(self):
@@ -163,16 +170,20 @@ class Deepest(NamedTuple):
 
         In the core the depth says little: it is no less than what the energy at the start asks for.
         """
-        share = self.overlap / (AIM * allowed(self.body))
+        share = self.overlap / (AIM * self.allowed)
         factor = self.stiffness * share ** (self.exponent + self.moving)
         return rounded_up(max(factor, self.smallest) if self.in_core else factor)
 
     def plain(self):
         """Convert to values for ``run.json``."""
-        size = allowed(self.body)
+        size = self.allowed
         values = {"overlap": self.overlap, "time": self.time if self.overlap > 0.0 else None, "line": self.line}
         values |= {"allowed": size if math.isfinite(size) else None, "stiffness": self.stiffness, "chosen": self.chosen}
         return values | ({"surface_error": error} if (error := self.body.shape.error) is not None else {})
+
+    @property
+    def _size(self):
+        return "the shortest line" if self.body.shape.ground else "its size"
 
     def _where(self):
         instant = f"t = {self.time:.6g} s" if self.moving else f"load step {self.time:g}"
@@ -193,7 +204,7 @@ class Deepest(NamedTuple):
                 f"line {self.line} starts in the core of a body, {self._where()}: move the body or the web"
             )
         if self.chosen and not self.fixed and self.too_deep and self.overlap > DEEPER * self.initial:
-            raise too_soft(self, f"line {self.line} is {self._where()}", allowed(self.body), [self.body.name])
+            raise too_soft(self, f"line {self.line} is {self._where()}", self.allowed, [self.body.name])
         if self.in_core:
             raise SolverError(
                 f"line {self.line} passes the core of a body: it is {self._where()}, whose middle is "
@@ -208,12 +219,14 @@ class Deepest(NamedTuple):
             )
         elif self.too_deep:
             remedy = "there it starts" if self.at_start else self._remedy()
-            share = 100.0 * self.overlap / size_of(self.body)
-            text = f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {remedy}"
+            share = 100.0 * self.overlap * SHARE / self.allowed
+            text = f"line {self.line} is up to {self._where()}, {share:.3g} % of {self._size}; {remedy}"
             yield Finding("deep-contact", text, "contact")
-        elif self.overlap > max(NOTED * size_of(self.body), DEEPER * self.initial) and not self.fixed:
-            share = 100.0 * self.overlap / size_of(self.body)
-            text = f"line {self.line} is up to {self._where()}, {share:.2g} % of its size: results may move with the "
+        elif self.overlap > max(NOTED * self.allowed / SHARE, DEEPER * self.initial) and not self.fixed:
+            share = 100.0 * self.overlap * SHARE / self.allowed
+            text = (
+                f"line {self.line} is up to {self._where()}, {share:.2g} % of {self._size}: results may move with the "
+            )
             text += f"stiffness of contact; {self.enough:g} holds it to {100.0 * AIM * SHARE:g} %, and refweb trust "
             yield Finding("soft-contact", text + "says by how much", "contact")
 
@@ -262,8 +275,18 @@ class Overlaps:
         if self._moving and time == 0.0:
             self._initial[i] = overlap
         net, unmoved = self.system.net, self.system.fixed
-        fixed_pair = overlap > allowed(body) and bool(unmoved[[body.row, *net.cells[net.line == line].ravel()]].all())
-        fields = stiffness, exponent, self._moving, smallest, body.name in self._chosen, self._initial[i], fixed_pair
+        limit = allowed_in(net, body)
+        fixed_pair = overlap > limit and bool(unmoved[[body.row, *net.cells[net.line == line].ravel()]].all())
+        fields = (
+            stiffness,
+            exponent,
+            self._moving,
+            smallest,
+            body.name in self._chosen,
+            self._initial[i],
+            fixed_pair,
+            limit,
+        )
         return Deepest(body, overlap, time, line, *fields)
 
     def stiffness_of(self, body):
