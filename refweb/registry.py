@@ -104,6 +104,8 @@ SHAPES = {
     "cylinder": "refweb.net.shapes.cylinder:Cylinder",
     "capsule": "refweb.net.shapes.capsule:Capsule",
     "mesh": "refweb.net.shapes.mesh:Mesh",
+    "plane": "refweb.net.shapes.plane:Plane",
+    "terrain": "refweb.net.shapes.terrain:Terrain",
 }
 """Shapes of ``[[body]]``; how to write one says `refweb.net.rigid_body`."""
 
@@ -222,7 +224,7 @@ def name_of(table, value):
     return next((name for name, reference in table.items() if reference == own_reference), None)
 
 
-FILES = {"web": ("path", "lines"), "body": ("file",), "fold": ("file",)}
+FILES = {"web": ("path", "lines"), "body": ("file", "heights"), "fold": ("file",)}
 """Keys of tables of a scene that are paths of files."""
 
 

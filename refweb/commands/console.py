@@ -109,12 +109,12 @@ def _stiffness(scene, system):
     """Rows of the box on the stiffness of contact that refweb has chosen."""
     for body in system.net.bodies if scene.chosen else ():
         if body.name in scene.chosen:
-            from ..effects.contact.overlap import AIM, allowed
+            from ..effects.contact.overlap import aim
 
             stiffness, exponent = scene.contact.law_of(body)
             unit = "N/m" if exponent == 1.0 else f"N/m^{exponent:g}"
             text = f'stiffness {stiffness:g} {unit} for body "{body.name}", chosen for an overlap of '
-            yield "contact", text + readable(AIM * allowed(body), None, "m")
+            yield "contact", text + readable(aim(system.net, body), None, "m")
     if "self_contact" in scene.chosen:
         from ..effects.self_contact.penetration import Passage
 

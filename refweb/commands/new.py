@@ -51,7 +51,7 @@ density = 200.0             # [kg/m³]
 
 [[body]]
 name = "ball"
-shape = "sphere"            # sphere | ring | box | cylinder | capsule
+shape = "sphere"            # sphere | ring | box | cylinder | capsule | mesh | plane | terrain
 radius = 0.1                # [m]
 mass = 1.0                  # [kg]
 position = [0.0, 0.0, -0.11]

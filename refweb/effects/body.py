@@ -95,12 +95,12 @@ class Body(Table):
     ----------
     name : str
         Name in observables and files.
-    shape : {"sphere", "ring", "box", "cylinder", "capsule", "mesh"}
+    shape : {"sphere", "ring", "box", "cylinder", "capsule", "mesh", "plane", "terrain"}
         Its shape, of `refweb.registry.SHAPES`; "sphere" by default.
     radius : float
         Radius of a sphere, a ring, a cylinder or a capsule [m], > 0.
     normal : sequence of 3 float
-        Normal of a ring.
+        Normal of a ring; of a plane the direction away from the ground.
     size : sequence of 3 float
         Edges of a box [m], > 0.
     axes : list of 2 vectors, optional
@@ -113,12 +113,21 @@ class Body(Table):
     rounding : float, optional
         Radius of the edges of a box or a cylinder [m], > 0, by default 2 % of its smallest size.
     file : str
-        Of a mesh: STL, OBJ or VTP file of its closed surface, relative to the scene's folder.
+        Of a mesh: STL, OBJ or VTP file of its surface, relative to the scene's folder.
     scale : float
-        Of a mesh: metres a unit of its file, > 0; 1 by default.
+        Of a mesh or terrain: metres a unit of its file, > 0; 1 by default.
+    surface : {"file", "hull"}
+        Of a mesh: "hull" takes the convex hull of its surface in place of what the file has.
+    drawn : float
+        Of a plane: edge of the square that is drawn [m], > 0; 2 by default.
+    heights : str
+        Of terrain: CSV file of heights, with the columns x, y and z, or OBJ, STL or VTP file of an open surface,
+        relative to the scene's folder.
+    thickness : float, optional
+        Of terrain: depth of the ground below its lowest place [m], > 0; by default a quarter of its longest side.
     grid : int, optional
-        Of a mesh: number of cells along its longest side of the grid on which depth is known; by default 48, or as many
-        as its thinnest wall asks for.
+        Of a mesh or terrain: number of cells along its longest side of the grid on which depth is known; by default 48,
+        or as many as its thinnest wall asks for.
     orientation : sequence of 4 float, optional
         In place of ``axes`` or ``axis``: the quaternion (w, x, y, z), of any length but 0, of the rotation that takes
         x, y and z to the body's axes.
@@ -127,7 +136,8 @@ class Body(Table):
     density : float, optional
         Density [kg/m³] of a body that is solid, > 0, in place of the mass.
     position : sequence of 3 float
-        Position of its centre [m], which is its centre of mass; of a mesh that of a uniform solid.
+        Position of its centre [m], which is its centre of mass; of a mesh that of a uniform solid, of a plane any point
+        on it, of terrain that of the origin of its file.
     velocity : sequence of 3 float
         Initial velocity [m/s].
     angular_velocity : sequence of 3 float

@@ -26,19 +26,19 @@ A shape is a file with a class, whose fields are its keys in ``[[body]]``. This 
             return Grown(0.0, (np.inf, np.inf, np.inf))
         def depth(self):
             return depth
-        def surface(self):  # points and triangles, along the axes
+        def boundary(self):  # points and triangles, along the axes
             corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
             return 0.5 * self.drawn * corners, np.array([[0, 1, 2], [0, 2, 3]])
 
 A body is convex. Its depth is the distance from its surface there, and concave, with a gradient that nowhere jumps: the
 force is the slope of an energy. That is why edges are rounded, and a body is a core and the radius by which it has
 grown on all sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core is a box, whose half sizes may be 0, or
-round about its axis, ``depth`` and ``surface`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is a
-capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move and turn sets
-``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its centre. One
-that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as `refweb.net.shapes.mesh` has. By
-its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`, it touches other bodies; where they are to touch,
-one without is refused. The line in ``SHAPES`` of ``refweb/registry.py``::
+round about its axis, ``depth`` and ``boundary`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is
+a capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move and turn
+sets ``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its
+centre. One that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as
+`refweb.net.shapes.filled` has. By its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`, it touches other
+bodies; where they are to touch, one without is refused. The line in ``SHAPES`` of ``refweb/registry.py``::
 
     "wall": "refweb.net.shapes.wall:Wall",
 """
@@ -94,6 +94,8 @@ class Shape(Table):
         both ends and once in between.
     planar : bool
         Whether it turns about its third axis only, and looks the same then.
+    ground : bool
+        Whether its size says nothing of the depth of contact that is too much, as that of ground does not.
     error : float, optional
         Largest distance of the surface that lines feel from the one that is meant [m], where these differ.
     directions : tuple of str
@@ -103,6 +105,7 @@ class Shape(Table):
     free = False
     once = False
     planar = False
+    ground = False
     error: float | None = None
     directions: ClassVar[tuple] = ("axes", "axis", "normal")
 
@@ -164,7 +167,7 @@ class Shape(Table):
         """Points of the core (n, 3) [m] that are farthest along unit vectors (n, 3)."""
         return np.sign(normals) * self.grown().core
 
-    def surface(self):
+    def boundary(self):
         """Its surface about the centre as points (n, 3) [m] and triangles (t, 3), outward."""
         from .surfaces import sphere
 
@@ -290,7 +293,7 @@ class RigidBody:
 
     def surface(self, centre, rotation=None):
         """Its surface with its row at a centre: points (n, 3) [m] and triangles (t, 3), outward; turned by a matrix."""
-        local, triangles = self.shape.surface()
+        local, triangles = self.shape.boundary()
         axes = self.axes if rotation is None else self.axes @ rotation.T
         return np.asarray(centre) + (local + self.offset) @ axes, triangles
 

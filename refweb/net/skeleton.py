@@ -102,6 +102,8 @@ def of_cylinder(grown):
 def of_surface(corners, triangles):
     """Parts of a surface of triangles (t, 3), outward, of corners (n, 3): its edges that stand out, by `FLAT`.
 
+    Edges of one triangle, where parts of a solid pass into each other, do not stand out.
+
     Raises
     ------
     InputError
@@ -116,7 +118,7 @@ def of_surface(corners, triangles):
             side[triangle[k], triangle[k - 2]] = t, triangle[k - 1]
     pairs = []
     for (i, j), (t, _) in side.items():
-        opposite, across = side[j, i]
+        opposite, across = side.get((j, i), (t, i))
         below = normals[t] @ (corners[across] - corners[i])
         if i < j and below < 0.0 and normals[t] @ normals[opposite] < math.cos(FLAT):
             pairs.append((i, j))

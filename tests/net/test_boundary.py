@@ -10,11 +10,11 @@ import solids
 import refweb
 from refweb import memory
 from refweb.net.boundary import field as fields
-from refweb.net.boundary.closed import closed, moments
+from refweb.net.boundary.closed import NotClosedError, closed, moments
 from refweb.net.boundary.distances import signed
 from refweb.net.boundary.field import AROUND, HEAD, field_of
 from refweb.net.boundary.surface_file import read
-from refweb.net.shapes import mesh as shape
+from refweb.net.shapes import filled
 from refweb.net.shapes.mesh import Mesh, _solid
 
 SIZE = np.array([0.3, 0.4, 0.2])
@@ -68,6 +68,13 @@ def test_files_of_every_format_are_one_solid(tmp_path):
     quads = [[0, 1, 2, 3], [0, 3, 4, 5]]
     walls = [[i, (i + 1) % 6, 6 + (i + 1) % 6, 6 + i] for i in range(6)]
     solids.write(tmp_path / "quads.obj", points, [q[::-1] for q in quads] + [[6 + i for i in q] for q in quads] + walls)
+    lines = ["# a comment", "mtllib it.mtl", "o thing", "usemtl red", "s off"]
+    lines += ["v " + " ".join(map(repr, p)) + " 0.5 0.5 0.5" for p in points.tolist()]
+    lines += ["vt 0 0", "vt 1 0", "vn 0 0 1", "g walls"]
+    lids = [list(range(6))[::-1], list(range(6, 12))]  # whole angles, which are not convex
+    forms = ["{0}/1/1", "{0}//1", "{0}/2", "{0}"]
+    lines += ["f " + " ".join(forms[n % 4].format(i + 1) for i in face) for n, face in enumerate(lids + walls)]
+    (tmp_path / "textured.obj").write_text("\n".join(lines) + "\nl 1 2\n")
     import pyvista
 
     pyvista.PolyData(points, np.column_stack([np.full(len(triangles), 3), triangles])).save(tmp_path / "it.vtp")
@@ -76,7 +83,7 @@ def test_files_of_every_format_are_one_solid(tmp_path):
     assert expected.volume == pytest.approx(legs.sum(), rel=1e-12)
     middles = np.array([[0.15, 0.06, 0.0], [0.06, 0.21, 0.0]])
     np.testing.assert_allclose(expected.centre, legs @ middles / legs.sum(), atol=1e-12)
-    for name in ("binary.stl", "it.obj", "backwards.obj", "quads.obj", "it.vtp"):
+    for name in ("binary.stl", "it.obj", "backwards.obj", "quads.obj", "textured.obj", "it.vtp"):
         surface = closed(*read(tmp_path / name))
         assert len(surface.triangles) == 20 and not surface.turned
         found = moments(surface.points, surface.triangles)
@@ -107,7 +114,7 @@ def moved(surface, by, scale=1.0):
 
 
 BOX = solids.box(SIZE)
-REFUSED = {
+FAULTS = {
     "open": (without(BOX, 3), r"the surface is open: 3 edges have one triangle, such as the one from \(.*\) to \(.*\)"),
     "three at an edge": (
         joined(BOX, moved(BOX, SIZE * [1.0, 1.0, 0.0])),
@@ -117,11 +124,23 @@ REFUSED = {
         joined(BOX, moved(BOX, 0.5 * SIZE)),
         r"crosses itself: triangle \d+ about \(.*\) and triangle \d+ pass through each other; join",
     ),
-    "flat": (moved(BOX, 0.0, np.array([1.0, 1.0, 0.0])), r"flat|no triangles|more than two triangles"),
+    "few": ((BOX[0], BOX[1][:2]), "holds 2 triangles with an area: a closed surface has at least 4"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_faults_of_a_surface_are_named(name):
+    surface, message = FAULTS[name]
+    with pytest.raises(NotClosedError, match=message):
+        closed(*surface)
+
+
+REFUSED = {
+    "flat": (moved(BOX, 0.0, np.array([1.0, 1.0, 0.0])), r'has no inside.*shape = "terrain"'),
+    "sheet": ((BOX[0], BOX[1][:2]), r'has no inside.*nowhere above 1/2.*shape = "terrain" with heights = FILE'),
     "large": (moved(BOX, 0.0, 1e8), r"its size is 4e\+07 m with scale = 1, it must be 1e-06 to 1e\+06 m: give scale"),
     "small": (moved(BOX, 0.0, 1e-7), "its size is 4e-08 m"),
     "not finite": ((np.where(BOX[0] > 0.19, np.inf, BOX[0]), BOX[1]), "corners must be numbers ≤ 1e\\+100|cannot read"),
-    "few": ((BOX[0], BOX[1][:2]), "holds 2 triangles with an area: a closed surface has at least 4"),
 }  # fmt: skip
 
 
@@ -140,7 +159,14 @@ FILES = {
     "it.ply": ("ply\n", r"format \".ply\" must be one of .stl, .obj, .vtp"),
     "broken.vtp": ("<VTKFile", "VTK cannot read|holds no triangles"),
     "none.stl": (None, "there is no file"),
-    "far.obj": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "corners that are not among its 3|VTK cannot read"),
+    "far.obj": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "corners that are not among its 3"),
+    "zero.obj": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 0\n", "corners that are not among its 3"),
+    "words.obj": ("v 0 0 0\nv 1 0 zero\n", r'words.obj, line 2: "v 1 0 zero" must have 3 numbers'),
+    "face.obj": ("v 0 0 0\nf 1/a b c\n", r'face.obj, line 2: "f 1/a b c" must have whole numbers, v, v/vt'),
+    "bow.obj": (
+        "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 3 1 0\nv 1 3 0\nf 1 2 3 4 5\n",
+        "the sides of a face of 5 corners cross: mend it|has no inside",
+    ),
 }
 
 
@@ -291,7 +317,7 @@ def test_a_thin_wall_asks_for_a_finer_grid(tmp_path, monkeypatch):
         _ = mesh(tmp_path / "plate.obj", plate, grid=24).solid
     fine = mesh(tmp_path / "plate.obj", plate).solid.field
     assert fine.thickness >= 2.0 * fine.spacing and fine.thickness == pytest.approx(0.01, rel=0.15)
-    monkeypatch.setattr(shape, "MOST", 200_000)
+    monkeypatch.setattr(filled, "MOST", 200_000)
     foil = solids.box([0.5, 0.5, 1e-5])
     with pytest.raises(refweb.InputError, match="thicken the walls"):
         _ = mesh(tmp_path / "foil.obj", foil).solid

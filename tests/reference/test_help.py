@@ -80,6 +80,8 @@ def test_examples_pass_the_check(name, tmp_path, monkeypatch, capsys):
         meshio.write(tmp_path / "net.vtu", meshio.Mesh(np.array(POINTS, float), cells, point_data=support))
     if name == "body.mesh":
         solids.write(tmp_path / "satellite.stl", *solids.box((300.0, 300.0, 300.0)))
+    if name == "body.terrain":
+        (tmp_path / "hill.csv").write_text("x,y,z\n-1,-1,0\n1,-1,0\n-1,1,0\n1,1,0.5\n")
     import tomli_w
 
     monkeypatch.chdir(tmp_path)

@@ -72,6 +72,16 @@ def allowed(body):
     return SHARE * size_of(body)
 
 
+def allowed_in(net, body):
+    """Overlap that is allowed of a body of a net [m]: of ground as of a body as small as the shortest line."""
+    return min(allowed(body), SHARE * float(net.natural_length.min())) if body.shape.ground else allowed(body)
+
+
+def aim(net, body):
+    """Overlap that a stiffness is chosen for [m]."""
+    return AIM * allowed_in(net, body)
+
+
 def rounded_up(value):
     """A number of two digits that is not smaller."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
@@ -124,6 +134,8 @@ class Deepest(NamedTuple):
         Overlap at t = 0 [m], which no stiffness changes.
     fixed : bool
         Whether it is deeper than allowed, and neither the line nor the body is free to give way.
+    allowed : float
+        Overlap that is allowed [m].
     """
 
     body: RigidBody
@@ -137,11 +149,12 @@ class Deepest(NamedTuple):
     chosen: bool
     initial: float
     fixed: bool
+    allowed: float
 
     @property
     def too_deep(self):
         """True if it is deeper than allowed."""
-        return self.overlap > allowed(self.body)
+        return self.overlap > self.allowed
 
     @property
     def at_start(self):
@@ -159,16 +172,20 @@ class Deepest(NamedTuple):
 
         In the core the depth says little: it is no less than what the energy at the start asks for.
         """
-        share = self.overlap / (AIM * allowed(self.body))
+        share = self.overlap / (AIM * self.allowed)
         factor = self.stiffness * share ** (self.exponent + self.moving)
         return rounded_up(max(factor, self.smallest) if self.in_core else factor)
 
     def plain(self):
         """Convert to values for ``run.json``."""
-        size = allowed(self.body)
+        size = self.allowed
         values = {"overlap": self.overlap, "time": self.time if self.overlap > 0.0 else None, "line": self.line}
         values |= {"allowed": size if math.isfinite(size) else None, "stiffness": self.stiffness, "chosen": self.chosen}
         return values | ({"surface_error": error} if (error := self.body.shape.error) is not None else {})
+
+    @property
+    def _size(self):
+        return "the shortest line" if self.body.shape.ground else "its size"
 
     def _where(self):
         instant = f"t = {self.time:.6g} s" if self.moving else f"load step {self.time:g}"
@@ -189,7 +206,7 @@ class Deepest(NamedTuple):
                 f"line {self.line} starts in the core of a body, {self._where()}: move the body or the web"
             )
         if self.chosen and not self.fixed and self.too_deep and self.overlap > DEEPER * self.initial:
-            raise too_soft(self, f"line {self.line} is {self._where()}", allowed(self.body), [self.body.name])
+            raise too_soft(self, f"line {self.line} is {self._where()}", self.allowed, [self.body.name])
         if self.in_core:
             raise SolverError(
                 f"line {self.line} passes the core of a body: it is {self._where()}, whose middle is "
@@ -204,12 +221,14 @@ class Deepest(NamedTuple):
             )
         elif self.too_deep:
             remedy = "there it starts" if self.at_start else self._remedy()
-            share = 100.0 * self.overlap / size_of(self.body)
-            text = f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {remedy}"
+            share = 100.0 * self.overlap * SHARE / self.allowed
+            text = f"line {self.line} is up to {self._where()}, {share:.3g} % of {self._size}; {remedy}"
             yield Finding("deep-contact", text, "contact")
-        elif self.overlap > max(NOTED * size_of(self.body), DEEPER * self.initial) and not self.fixed:
-            share = 100.0 * self.overlap / size_of(self.body)
-            text = f"line {self.line} is up to {self._where()}, {share:.2g} % of its size: results may move with the "
+        elif self.overlap > max(NOTED * self.allowed / SHARE, DEEPER * self.initial) and not self.fixed:
+            share = 100.0 * self.overlap * SHARE / self.allowed
+            text = (
+                f"line {self.line} is up to {self._where()}, {share:.2g} % of {self._size}: results may move with the "
+            )
             text += f"stiffness of contact; {self.enough:g} holds it to {100.0 * AIM * SHARE:g} %, and refweb trust "
             yield Finding("soft-contact", text + "says by how much", "contact")
 
@@ -258,8 +277,18 @@ class Overlaps:
         if self._moving and time == 0.0:
             self._initial[i] = overlap
         net, unmoved = self.system.net, self.system.fixed
-        fixed_pair = overlap > allowed(body) and bool(unmoved[[body.row, *net.cells[net.line == line].ravel()]].all())
-        fields = stiffness, exponent, self._moving, smallest, body.name in self._chosen, self._initial[i], fixed_pair
+        limit = allowed_in(net, body)
+        fixed_pair = overlap > limit and bool(unmoved[[body.row, *net.cells[net.line == line].ravel()]].all())
+        fields = (
+            stiffness,
+            exponent,
+            self._moving,
+            smallest,
+            body.name in self._chosen,
+            self._initial[i],
+            fixed_pair,
+            limit,
+        )
         return Deepest(body, overlap, time, line, *fields)
 
     def stiffness_of(self, body):
@@ -337,7 +366,7 @@ def first_stiffness(system, body, exponent, load_steps=()):
     InputError
         For a body without end, whose size says nothing of an overlap.
     """
-    net, deep = system.net, AIM * allowed(body)
+    net, deep = system.net, aim(system.net, body)
     if not math.isfinite(deep):
         raise InputError(f'stiffness is missing for body "{body.name}", whose size is infinite: give stiffness = ...')
     lines = net.line_data.ea / (net.natural_length * exponent * deep ** (exponent - 1.0))
@@ -358,7 +387,7 @@ def first_between(system, bodies, exponent):
     energy by which they turn, and under the outer forces on all bodies that are free. v is their speed at the start
     with what they gain under outer forces until they meet.
     """
-    net, deep = system.net, AIM * min(map(allowed, bodies))
+    net, deep = system.net, min(aim(system.net, body) for body in bodies)
     if not math.isfinite(deep):
         named = " and ".join(f'"{body.name}"' for body in bodies)
         raise InputError(f"stiffness is missing for bodies {named}, whose size is infinite: give stiffness = ...")
@@ -366,7 +395,8 @@ def first_between(system, bodies, exponent):
     free = [body for body in bodies if not body.fixed]
     mass = 1.0 / sum(1.0 / net.mass[body.row] for body in free)
     falls = [np.zeros(3) if body.fixed else force[body.row] / net.mass[body.row] for body in bodies]
-    gap = np.linalg.norm(net.points[bodies[0].row] - net.points[bodies[1].row]) - sum(b.thickness for b in bodies)
+    first, second = sorted(bodies, key=lambda body: not body.shape.ground)
+    gap = _distances(net, first, net.points[[second.row]])[0] - sum(map(_reach, bodies))
     square = float(((v[bodies[0].row] - v[bodies[1].row]) ** 2).sum())
     square += 2.0 * float(np.linalg.norm(falls[0] - falls[1])) * max(float(gap), 0.0)
     turns = [body for body in free if body.turn is not None]
@@ -389,6 +419,20 @@ def _push(system, body, t):
     return float(np.linalg.norm(force[: system.net.nodes].sum(axis=0) if body.fixed else force[body.row]))
 
 
+def _distances(net, body, points):
+    """Distances of points (n, 3) from the middle of a body, or from ground [m], shape (n,)."""
+    away = points - net.points[body.row]
+    if not body.shape.ground:
+        return np.linalg.norm(away, axis=1)
+    depth, grown = body.shape.depth(), body.shape.grown()
+    return np.array([-depth(tuple(p), grown)[0] for p in (away @ body.axes.T).tolist()])
+
+
+def _reach(body):
+    """Distance at which a body is touched, of those of `_distances` [m]."""
+    return 0.0 if body.shape.ground else body.thickness
+
+
 def _energy(system, body):
     """½ μ v² of a web and a body that meet, and the energy by which that turns [J], see `first_stiffness`."""
     net, nodes = system.net, system.net.nodes
@@ -397,8 +441,8 @@ def _energy(system, body):
     if not len(free):
         free = np.arange(nodes)
     web, body_mass = float(net.mass[free].sum()), float(net.mass[body.row])
-    v, away = system.initial_velocity(), net.points[free] - net.points[body.row]
-    distance, speed = np.linalg.norm(away, axis=1), np.linalg.norm(v[free] - v[body.row], axis=1)
+    v = system.initial_velocity()
+    distance, speed = _distances(net, body, net.points[free]), np.linalg.norm(v[free] - v[body.row], axis=1)
     nearest = int(distance.argmin())
     v0 = float(speed[nearest]) if speed[nearest] > 0.0 else float(speed.max())
     fastest = 0.0
@@ -410,7 +454,7 @@ def _energy(system, body):
     falls = np.zeros(3) if body.fixed else force[body.row] / body_mass
     carried = fixed.any() and not body.fixed
     along = np.zeros(3) if carried or not web > 0.0 else force[free].sum(axis=0) / web
-    gained = 2.0 * float(np.linalg.norm(falls - along)) * max(float(distance[nearest]) - body.thickness, 0.0)
+    gained = 2.0 * float(np.linalg.norm(falls - along)) * max(float(distance[nearest]) - _reach(body), 0.0)
     mass = web if body.fixed else body_mass if fixed.any() else body_mass * web / (body_mass + web)
     turning = 0.0
     if body.turn is not None:

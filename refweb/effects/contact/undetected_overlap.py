@@ -11,6 +11,7 @@ import itertools
 
 import numpy as np
 
+from ...errors import InputError
 from ...findings import Finding
 from ...net.skeleton import ARC, FROM, KIND, OWNS, POINT, THICKNESS, THIRD, TO
 
@@ -83,8 +84,11 @@ class Silent:
 
 def _depth(body, body_b, places, x):
     """Depth of the skeleton of a body in another one [m]."""
-    parts = body.shape.skeleton()
-    if parts is None:
+    try:
+        parts = body.shape.skeleton()
+    except InputError:  # a surface of more edges than can be looked at
+        return 0.0
+    if parts is None or not len(parts):
         return 0.0
     axes, its = (item.axes @ item.rotation(x).T for item in (body, body_b))
     points_in_b = (_along(parts) + body.offset) @ axes + places[body.row] - places[body_b.row]

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from ...errors import InputError
 from ...tables import LARGEST
@@ -29,6 +29,10 @@ THIN = 1e-9
 
 DENT = 1e-6
 """Share of its volume that a convex solid may lack: rounding of its corners."""
+
+
+class NotClosedError(InputError):
+    """A surface that bounds no solid as it is; `refweb.net.boundary.repair` may find the solid that is meant."""
 
 
 class Closed(NamedTuple):
@@ -44,12 +48,15 @@ class Closed(NamedTuple):
         Number of triangles that faced inward.
     dropped : int
         Number of triangles that had no area, two of whose corners are one.
+    pieces : int
+        Number of pieces that have no edge in common.
     """
 
     points: np.ndarray
     triangles: np.ndarray
     turned: int
     dropped: int
+    pieces: int
 
 
 class Moments(NamedTuple):
@@ -76,24 +83,32 @@ def closed(points, triangles):
     Raises
     ------
     InputError
-        For what is not finite, flat, open, not orientable or crosses itself, and for edges of more than two triangles.
+        For what is not finite or flat.
+    NotClosedError
+        For what is open, not orientable or crosses itself, and for edges of more than two triangles.
     """
     if not (np.abs(points) <= LARGEST).all():
         raise InputError(f"coordinates of corners must be numbers ≤ {LARGEST:g} [m] in size")
-    points, triangles = _joined(points, triangles)
     count = len(triangles)
-    a, b, c = triangles.T
-    triangles = triangles[(a != b) & (b != c) & (c != a)]
+    points, triangles = joined(points, triangles)
     if len(triangles) < 4:
-        raise InputError(f"it holds {len(triangles)} triangles with an area: a closed surface has at least 4")
+        raise NotClosedError(f"it holds {len(triangles)} triangles with an area: a closed surface has at least 4")
     pairs, along = _neighbours(points, triangles)
-    piece, turned = _oriented(points, triangles, pairs, along)
+    piece, turned = oriented(len(triangles), pairs, along)
+    wrong = np.flatnonzero(turned[pairs[:, 0]] ^ turned[pairs[:, 1]] ^ along)
+    if len(wrong):
+        first, second = pairs[wrong[0]]
+        edge = np.intersect1d(triangles[first], triangles[second])[:2]
+        raise NotClosedError(
+            f"the surface has one side only, as a Möbius band, as seen at an edge {_edge(points, *edge)}"
+        )
     triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
     size = np.ptp(points[triangles].reshape(-1, 3), axis=0).max()
     inward = _inward(points, triangles, piece, THIN * size**3)
     triangles = np.where(inward[piece][:, None], triangles[:, ::-1], triangles)
     used, number = np.unique(triangles, return_inverse=True)
-    solid = Closed(points[used], number.reshape(-1, 3), int((turned ^ inward[piece]).sum()), count - len(triangles))
+    faced_inward, dropped = int((turned ^ inward[piece]).sum()), count - len(triangles)
+    solid = Closed(points[used], number.reshape(-1, 3), faced_inward, dropped, int(piece.max()) + 1)
     _refuse_crossings(solid)
     return solid
 
@@ -110,13 +125,33 @@ def moments(points, triangles):
     return Moments(float(volume), middle + centre, np.trace(second) * np.eye(3) - second)
 
 
+def convex_hull(points, triangles):
+    """(corners, triangles) of the convex hull of a surface, outward.
+
+    Raises
+    ------
+    InputError
+        For what lies in a plane.
+    """
+    if not (np.abs(points) <= LARGEST).all():
+        raise InputError(f"coordinates of corners must be numbers ≤ {LARGEST:g} [m] in size")
+    points = points[np.unique(triangles)]
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        raise InputError("the surface is flat, and its hull has no volume: a body has one") from None
+    a, b, c = (points[hull.simplices[:, k]] for k in range(3))
+    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
+    return points, np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices).astype(np.int64)
+
+
 def is_convex(points, volume):
     """Tell if a solid with some corners and volume [m³] fills their hull."""
     return bool(ConvexHull(points).volume <= (1.0 + DENT) * volume)
 
 
-def _joined(points, triangles):
-    """Points of which each place has one, and the triangles between them."""
+def joined(points, triangles):
+    """Points of which each place has one, and the triangles between them that have three corners."""
     if not len(triangles):
         return points, triangles
     near = SAME * max(np.abs(points[triangles]).max(), np.finfo(float).tiny)
@@ -124,7 +159,9 @@ def _joined(points, triangles):
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
     _, part = connected_components(graph, directed=False)
     _, first = np.unique(part, return_index=True)
-    return points[first], part[triangles].astype(np.int64)
+    triangles = part[triangles].astype(np.int64)
+    a, b, c = triangles.T
+    return points[first], triangles[(a != b) & (b != c) & (c != a)]
 
 
 def _edge(points, start, end):
@@ -139,13 +176,13 @@ def _neighbours(points, triangles):
     edges, of, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
     if (count == 1).any():
         edge = edges[count.argmin()]
-        raise InputError(
+        raise NotClosedError(
             f"the surface is open: {int((count == 1).sum())} edges have one triangle, such as the one "
             f"{_edge(points, *edge)}; close it where it is made, as by a filter that fills holes"
         )
     if (count > 2).any():
         edge = edges[count.argmax()]
-        raise InputError(
+        raise NotClosedError(
             f"{int((count > 2).sum())} edges have more than two triangles, such as the one {_edge(points, *edge)} with "
             f"{count.max()}: part the solids that touch there, or join them to one, where the surface is made"
         )
@@ -154,25 +191,31 @@ def _neighbours(points, triangles):
     return order // 3, along
 
 
-def _oriented(points, triangles, pairs, along):
-    """(piece of each triangle, whether it is to be turned so that all of a piece face one side)."""
-    size = len(triangles)
+def oriented(size, pairs, along):
+    """(piece of each triangle, whether it is to be turned so that all of a piece face one side).
+
+    Parameters
+    ----------
+    size : int
+        Number of triangles.
+    pairs : ndarray of int, shape (e, 2)
+        Triangles on both sides of edges.
+    along : ndarray of bool, shape (e,)
+        Whether both run along the edge in one direction.
+    """
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(size, size)).tocsr()
     graph = graph + graph.T
-    pieces, piece = connected_components(graph, directed=False)
+    _, piece = connected_components(graph, directed=False)
     differs = coo_matrix((np.where(along, 2.0, 1.0), pairs.T), shape=(size, size)).tocsr()
     differs = differs.maximum(differs.T)
     turned = np.zeros(size, dtype=bool)
     for first in np.unique(piece, return_index=True)[1]:
         order, before = breadth_first_order(graph, first, directed=False)
+        if len(order) == 1:
+            continue
         flips = np.asarray(differs[order[1:], before[order[1:]]]).ravel() == 2.0
         for t, flip in zip(order[1:].tolist(), flips.tolist(), strict=True):
             turned[t] = turned[before[t]] ^ flip
-    wrong = np.flatnonzero(turned[pairs[:, 0]] ^ turned[pairs[:, 1]] ^ along)
-    if len(wrong):
-        first_piece, second = pairs[wrong[0]]
-        edge = np.intersect1d(triangles[first_piece], triangles[second])[:2]
-        raise InputError(f"the surface has one side only, as a Möbius band, seen at the edge {_edge(points, *edge)}")
     return piece, turned
 
 
@@ -214,7 +257,7 @@ def _refuse_crossings(surface):
         return
     where = surface.points[surface.triangles[first]].mean(axis=0)
     coordinates = ", ".join(f"{x:.6g}" for x in where)
-    raise InputError(
+    raise NotClosedError(
         f"the surface crosses itself: triangle {first} about ({coordinates}) and triangle {second} pass through "
         "each other; join the solids to one (a boolean union) where the surface is made"
     )

@@ -115,8 +115,11 @@ def _side(x0, y0, x1, y1):
 
 
 @kernel(fastmath=False)
-def _meets(points, triangle, x, y):
-    """(whether the line through (x, y) along the third axis meets a triangle, where)."""
+def meets(points, triangle, x, y):
+    """(side from which the line through (x, y) along the third axis meets a triangle, where).
+
+    1 where it comes from behind the triangle, −1 where from before it, 0 where it does not meet it.
+    """
     x0, y0 = points[triangle[0], 0] - x, points[triangle[0], 1] - y
     x1, y1 = points[triangle[1], 0] - x, points[triangle[1], 1] - y
     x2, y2 = points[triangle[2], 0] - x, points[triangle[2], 1] - y
@@ -125,9 +128,9 @@ def _meets(points, triangle, x, y):
     three, c = _side(x0, y0, x1, y1)
     total = a + b + c
     if first == 0 or first != two or first != three or total == 0.0:
-        return False, 0.0
+        return 0, 0.0
     z0, z1, z2 = points[triangle[0], 2], points[triangle[1], 2], points[triangle[2], 2]
-    return True, (a * z0 + b * z1 + c * z2) / total
+    return (1 if total < 0.0 else -1), (a * z0 + b * z1 + c * z2) / total
 
 
 @kernel()
@@ -142,11 +145,21 @@ def _crossings(points, triangles, origin, h, count):
         high1 = min(int(math.ceil((max(points[a, 1], points[b, 1], points[c, 1]) - origin[1]) / h)), n1 - 1)
         for i in range(low0, high0 + 1):
             for j in range(low1, high1 + 1):
-                met, z = _meets(points, triangles[t], origin[0] + h * i, origin[1] + h * j)
-                if met:
+                side, z = meets(points, triangles[t], origin[0] + h * i, origin[1] + h * j)
+                if side != 0:
                     behind = int(math.ceil((z - origin[2]) / h))
                     if behind < n2:
                         count[i, j, max(behind, 0)] += 1
+
+
+@kernel()
+def unsigned(points, triangles, origin, h, squares, nearest):
+    """Write the squared distance from the surface to ``squares``; arguments are those of `signed`."""
+    _near(points, triangles, origin, h, squares, nearest)
+    for _ in range(SWEEPS):
+        for m in range(8):
+            di, dj, dk = 1 - 2 * (m & 1), 1 - (m & 2), 1 - ((m & 4) >> 1)
+            _sweep(points, triangles, origin, h, squares, nearest, di, dj, dk)
 
 
 @kernel()
@@ -170,11 +183,7 @@ def signed(points, triangles, origin, h, squares, nearest, count):
     count : ndarray of uint8, shape (n0, n1, n2)
         0; space to work in.
     """
-    _near(points, triangles, origin, h, squares, nearest)
-    for _ in range(SWEEPS):
-        for m in range(8):
-            di, dj, dk = 1 - 2 * (m & 1), 1 - (m & 2), 1 - ((m & 4) >> 1)
-            _sweep(points, triangles, origin, h, squares, nearest, di, dj, dk)
+    unsigned(points, triangles, origin, h, squares, nearest)
     _crossings(points, triangles, origin, h, count)
     n0, n1, n2 = squares.shape
     for i in range(n0):

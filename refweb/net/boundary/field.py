@@ -36,6 +36,8 @@ AROUND = 4
 """Number of points of the grid on each side of the body."""
 BYTES = 40.0
 """Memory for a point of a grid while its field is made."""
+GAP = 0.02
+"""Thickness of gaps between parts of a repaired solid that are none, over the distance of the points."""
 LOOKS, OPPOSITE, BEYOND, THINNER = 4000, -0.8, 1.5, 0.01
 """Number of places from which walls are looked for; rate at which depth falls beyond the middle of one, so many cells
 behind it; share of the surface that may be thinner."""
@@ -166,34 +168,55 @@ class Field:
         return result[:, 0], result[:, 1:]
 
 
-def field_of(points, triangles, cells, around=AROUND, known=None):
+def field_of(points, triangles, cells, around=AROUND, known=None, winding=None):
     """The `Field` of the solid that a surface bounds, with so many cells along its longest side.
 
     So many points of the grid stand ``around`` it. Of a wider one error and thickness are those of ``known``, a field.
+    Where the surface is the boundary of a `refweb.net.boundary.repair.Repaired` solid, its ``winding`` tells what is
+    inside.
 
     Raises
     ------
     InputError
         For a grid that does not fit into memory.
     """
-    from .distances import signed
-
     low, size = points.min(axis=0), np.ptp(points, axis=0)
     h = float(size.max()) / cells
     counts = np.ceil(size / h).astype(np.int64) + 1 + 2 * around
     shape = tuple(counts.tolist())
     memory.check(BYTES * float(np.prod(counts.astype(float))), f"the {' × '.join(map(str, shape))} points of its grid")
     origin = low + 0.5 * size - 0.5 * h * (counts - 1)
-    deep, nearest = np.full(shape, np.inf), np.full(shape, -1, dtype=np.int32)
-    signed(points, triangles, origin, h, deep, nearest, np.zeros(shape, dtype=np.uint8))
-    del nearest
+    deep = _depths(points, triangles, origin, h, shape, winding)
     head = [*origin, 1.0 / h, *counts, (around - 1) * h]
     numbers = np.concatenate([head, _coefficients(deep).ravel()])
     field = Field(numbers, h, shape, 0.0, 0.0)
     if known is not None:
         return replace(field, error=known.error, thickness=known.thickness)
-    error = np.abs(field.at(_on_surface(points, triangles))[0]).max()
+    error = np.abs(field.at(places_on(points, triangles))[0]).max()
     return replace(field, error=float(error), thickness=_thickness(field, points, triangles))
+
+
+def _depths(points, triangles, origin, h, shape, winding):
+    """Depth at the points of a grid [m]."""
+    from .distances import signed, unsigned
+
+    deep, nearest = np.full(shape, np.inf), np.full(shape, -1, dtype=np.int32)
+    if winding is None:
+        signed(points, triangles, origin, h, deep, nearest, np.zeros(shape, dtype=np.uint8))
+        return deep
+    unsigned(points, triangles, origin, h, deep, nearest)
+    del nearest
+    np.sqrt(deep, out=deep)
+    for i in range(shape[0]):
+        places = np.stack(np.meshgrid(*(h * np.arange(n) for n in (1, *shape[1:])), indexing="ij"), axis=-1)
+        places = (places + origin + [i * h, 0.0, 0.0]).reshape(-1, 3)
+        inside = winding.inside(places)
+        # A point far from the boundary with the solid around it lies in a gap between parts.
+        far = np.flatnonzero(~inside & (deep[i].ravel() > 4.0 * GAP * h))
+        for step in GAP * h * np.vstack([np.eye(3), -np.eye(3)]) if len(far) else ():
+            inside[far] |= winding.inside(places[far] + step)
+        deep[i][~inside.reshape(shape[1:])] *= -1.0
+    return deep
 
 
 def _coefficients(deep):
@@ -205,7 +228,7 @@ def _coefficients(deep):
     return c
 
 
-def _on_surface(points, triangles):
+def places_on(points, triangles):
     """Places of a surface where the field may miss it most."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     edges = [(1.0 - t) * p + t * q for p, q in ((a, b), (b, c), (c, a)) for t in (0.25, 0.5)]

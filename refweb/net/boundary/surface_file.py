@@ -1,6 +1,7 @@
 """Surfaces from files: corners and triangles, from STL, OBJ and VTP.
 
-meshio reads STL and OBJ, and VTK, in a process of its own, VTP and what of OBJ meshio does not know.
+meshio reads STL, and VTK, in a process of its own, VTP. Of OBJ only the corners and faces count, which
+`refweb.net.boundary.obj_file` reads: textured files have lists that meshio does not take, and VTK rounds to 7 digits.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from ... import memory
 from ...errors import InputError
 from ...messages import quote
 from ..mesh_readers import by_meshio, by_vtk
+from .obj_file import faces_of
+from .polygons import ears
 
-FORMATS = {".stl": "stl", ".obj": "obj", ".vtp": None}
-"""Formats of surfaces by the end of their name, as meshio calls them; None for what VTK alone reads."""
 HARMLESS = ("vertex", "poly_vertex", "line", "polyline")
 """Cells that bound nothing."""
 
@@ -29,27 +30,21 @@ def read(path):
     if not path.is_file():
         raise InputError(f"there is no file {path}")
     suffix = path.suffix.lower()
-    if suffix not in FORMATS:
-        raise InputError(f"format {quote(path.suffix)} must be one of {', '.join(FORMATS)}: use meshio convert")
+    if suffix not in READERS:
+        raise InputError(f"format {quote(path.suffix)} must be one of {', '.join(READERS)}: use meshio convert")
     size = path.stat().st_size
     memory.check(memory.READING * size, f"the {size / 1e6:.3g} MB of {path.name}")
-    points, cells = _of_vtk(path) if FORMATS[suffix] is None else _of_meshio(path, FORMATS[suffix])
-    if _strays(points, cells):
-        points, cells = _of_vtk(path)  # OBJ counts backwards with negative numbers
-        if _strays(points, cells):
-            raise InputError(f"its triangles name corners that are not among its {len(points)}")
+    points, cells = READERS[suffix](path)
+    if any(cell_set.min() < 0 or cell_set.max() >= len(points) for cell_set in cells):
+        raise InputError(f"its triangles name corners that are not among its {len(points)}")
     triangles = [triangle for cell_set in cells for triangle in _triangles(points, cell_set)]
     if not len(points) or not triangles:
         raise InputError("it holds no triangles: a body needs a closed surface")
     return points, np.ascontiguousarray(np.vstack(triangles), dtype=np.int64)
 
 
-def _strays(points, cells):
-    return any(cell_set.min() < 0 or cell_set.max() >= len(points) for cell_set in cells)
-
-
-def _of_meshio(path, kind):
-    mesh = by_meshio(path, kind)
+def _of_stl(path):
+    mesh = by_meshio(path, "stl")
     return _sorted(mesh.points, [(block.type, block.data) for block in mesh.cells])
 
 
@@ -69,13 +64,19 @@ def _sorted(points, blocks):
 
 
 def _triangles(points, cells):
-    """Triangles of cells of some corners each, which are convex."""
+    """Triangles of cells of some corners each."""
     corners = cells.shape[1]
-    fan = [cells[:, [0, k, k + 1]] for k in range(1, corners - 1)]
-    if corners > 4:
-        normals = [np.cross(points[f[:, 1]] - points[f[:, 0]], points[f[:, 2]] - points[f[:, 0]]) for f in fan]
-        total = sum(normals)
-        bad = np.any([(normal * total).sum(axis=1) < 0.0 for normal in normals], axis=0)
-        if bad.any():
-            raise InputError(f"a face of {corners} corners is not convex: triangulate the surface where it is made")
+    fan = np.stack([cells[:, [0, k, k + 1]] for k in range(1, corners - 1)])
+    if corners > 3:
+        p, q, r = (points[fan[..., k]] for k in range(3))
+        normals = np.cross(q - p, r - p)
+        for n in np.flatnonzero(((normals * normals.sum(axis=0)).sum(axis=2) < 0.0).any(axis=0)):
+            parts = ears(points[cells[n]])
+            if parts is None:
+                raise InputError(f"the sides of a face of {corners} corners cross: mend it where the surface is made")
+            fan[:, n] = cells[n][parts]
     return fan
+
+
+READERS = {".stl": _of_stl, ".obj": faces_of, ".vtp": _of_vtk}
+"""What reads surfaces, by the end of their name."""

@@ -77,7 +77,7 @@ class Ring(Shape):
         if across > 1e-9 * np.linalg.norm(angular_velocity) * np.linalg.norm(self.normal):
             raise InputError(f"angular_velocity = {list(angular_velocity)} must be along the normal of the ring")
 
-    def surface(self):
+    def boundary(self):
         """A thin tube whose outer edge has the radius."""
         from ..surfaces import tube
 

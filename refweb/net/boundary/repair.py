@@ -1,0 +1,383 @@
+"""The solid that a faulty surface means: holes are bridged, parts that overlap or touch are one.
+
+Triangles that are there twice count once. Parts that hang together at edges of two triangles are made to face one side,
+outward: so that the volume between a part and the middle of its rim is positive. A part that the file has inside out
+and that lies in others bounds a hollow. Holes are closed by the triangles of their rim, or where that does not lie in a
+plane by the cone from its middle. Then the surface has no rim, and the solid is where its winding number, see
+`refweb.net.boundary.winding`, is above 1/2: of parts that overlap that is their union.
+
+Of the surface only counts what has the solid on one side alone. Triangles that others cross are parted until the parts
+are small against the cells of the grid of depth; walls and gaps between parts that are thinner than 2 % of a cell are
+taken for none.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ...errors import InputError
+from .closed import Moments, joined, moments, oriented
+from .field import GAP
+from .polygons import ears
+from .winding import Winding
+
+COARSE, SMALL = 2.0, 1.0 / 16.0
+"""Length of the parts of a triangle that are looked at one by one, and of those that are parted no more, over a
+cell."""
+LOOKS = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
+"""Places of a triangle that are looked at, as shares of its corners."""
+FLAT = 1e-7
+"""Volume of a part that is a sheet, over the power 3/2 of its area."""
+LOOP = 400
+"""Largest number of edges of a hole that triangles of its rim close."""
+SUMMED = 5e-3
+"""Share by which sums over lines may miss the volume that a boundary without seams has exactly."""
+EMPTY = (
+    "it has no inside: its winding number is nowhere above 1/2, and a body needs a surface that encloses something. "
+    'Open ground is shape = "terrain" with heights = FILE'
+)
+
+
+class Repaired(NamedTuple):
+    """The solid that a surface means.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        Corners [m].
+    triangles : ndarray of int, shape (t, 3)
+        Those of each triangle that is in its boundary, outward; a part of it may lie inside.
+    boundary : tuple of ndarray
+        Corners and triangles of the boundary alone.
+    moments : refweb.net.boundary.closed.Moments
+        Of the solid.
+    winding : refweb.net.boundary.winding.Winding
+        Tells what is inside.
+    remarks : tuple of str
+        Faults of the surface.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    boundary: tuple
+    moments: Moments
+    winding: Winding
+    remarks: tuple
+
+
+def repaired(points, triangles, cells):
+    """The `Repaired` solid of some triangles, for a grid of depth with so many cells along the longest side.
+
+    Raises
+    ------
+    InputError
+        For what has no inside.
+    """
+    points, triangles = joined(points, triangles)
+    if not len(triangles):
+        raise InputError(EMPTY)
+    single, doubled = _single(triangles)
+    single, sheets = _without_sheets(points, single)
+    if not len(single):
+        raise InputError(EMPTY)
+    pieces = _pieces(points, single)
+    triangles = _outward(points, single, pieces)
+    extended, lids, holes = _lids(points, triangles, pieces.ends)
+    surface = np.vstack([triangles, lids])
+    winding = Winding(extended, surface)
+    spacing = float(np.ptp(extended[np.unique(surface)], axis=0).max()) / cells
+    corners, side, cut = _boundary(extended[surface], winding, spacing)
+    summed = _of_sums(winding.sums())
+    if not len(corners) or not summed.volume > 0.0:
+        raise InputError(EMPTY)
+    flat, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = number.reshape(-1, 3)
+    exact = moments(flat, faces)
+    weighed = summed if cut.any() or abs(exact.volume - summed.volume) > SUMMED * summed.volume else exact
+    remaining = _turned(surface, side)[(side != 0) | cut]
+    used, number = np.unique(remaining, return_inverse=True)
+    inverted, inner = int((triangles != single).any(axis=1).sum()), int((side == 0)[: len(triangles)].sum())
+    remarks = [*_remarks(pieces, holes, doubled, inverted, sheets)]
+    if inner:
+        seams = f", its edges there within {SMALL * spacing:.2g} m" if cut.any() else ""
+        remarks.append(
+            f"{inner} triangles lie in other parts or pass through them: the solid is the union of its parts{seams}"
+        )
+    return Repaired(extended[used], number.reshape(-1, 3), (flat, faces), weighed, winding, tuple(remarks))
+
+
+def touches_itself(points, triangles, cells):
+    """Tell if parts of a closed surface touch, or are nearer to each other than `GAP` of a cell."""
+    spacing = float(np.ptp(points, axis=0).max()) / cells
+    _, side, _ = _boundary(points[triangles], Winding(points, triangles), spacing)
+    return not (side == 1).all()
+
+
+def _single(triangles):
+    """(Triangles of which each is there once, number of others); of a wall that two parts have alike there is none."""
+    _, first, of, count = np.unique(
+        np.sort(triangles, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    doubled = len(triangles) - len(first)
+    single, twice = triangles[first], count % 2 == 0
+    if twice.any():
+        edges, _ = _edges(single)
+        between = np.flatnonzero(twice)
+        inside = coo_matrix(
+            (np.ones(3 * len(between)), (np.repeat(np.arange(len(between)), 3), edges[between].ravel()))
+        )
+        _, wall = connected_components(inside @ inside.T, directed=False)
+        within = np.bincount(edges[between].ravel(), minlength=edges.max() + 1)
+        beside = np.bincount(edges.ravel(), minlength=edges.max() + 1) - within
+        rim = within == 1
+        open_ = (rim & ((beside == 0) | (beside % 2 == 1)))[edges[between]].any(axis=1)
+        needed = np.ones(len(single), dtype=bool)
+        needed[between] = np.isin(wall, wall[open_])
+        single = single[needed]
+    return single, doubled
+
+
+def _edges(triangles):
+    """(number of each edge of triangles (t, 3), corners of each edge (e, 2))."""
+    ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, of = np.unique(ends, axis=0, return_inverse=True)
+    return of.reshape(-1, 3), edges
+
+
+class _Pieces(NamedTuple):
+    """Triangles that hang together at edges of two triangles.
+
+    Attributes
+    ----------
+    triangles : ndarray of int, shape (t, 3)
+        All, those of a piece facing one side.
+    piece, area : ndarray, shape (t,)
+        Piece of each triangle, and its area [m²].
+    as_given : ndarray of bool, shape (pieces,)
+        Whether most of a piece is as the file has it.
+    volume : ndarray, shape (pieces,)
+        Volume between a piece and the middle of its rim [m³].
+    flat : ndarray of bool, shape (pieces,)
+        Whether that is none.
+    ends : ndarray of int, shape (k, 2)
+        Corners of the edges of one triangle.
+    open : ndarray of bool, shape (pieces,)
+        Whether a piece has such an edge.
+    crowded : int
+        Number of edges of more than two triangles.
+    """
+
+    triangles: np.ndarray
+    piece: np.ndarray
+    area: np.ndarray
+    as_given: np.ndarray
+    volume: np.ndarray
+    flat: np.ndarray
+    ends: np.ndarray
+    open: np.ndarray
+    crowded: int
+
+
+def _pieces(points, triangles):
+    """The `_Pieces` of some triangles."""
+    edges, ends = _edges(triangles)
+    count = np.bincount(edges.ravel())
+    order = np.argsort(edges.ravel(), kind="stable")
+    order = order[count[edges.ravel()[order]] == 2].reshape(-1, 2)
+    start = triangles[order // 3, order % 3]
+    piece, turned = oriented(len(triangles), order // 3, start[:, 0] == start[:, 1])
+    faces = np.where(turned[:, None], triangles[:, ::-1], triangles)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    as_given = np.bincount(piece, np.where(turned, -area, area)) >= 0.0
+    volume = np.array([_volume(points, faces[piece == n]) for n in range(piece.max() + 1)])
+    flat = np.abs(volume) <= FLAT * np.bincount(piece, area) ** 1.5
+    is_open = np.bincount(piece, (count[edges] == 1).any(axis=1)) > 0
+    return _Pieces(faces, piece, area, as_given, volume, flat, ends[count == 1], is_open, int((count > 2).sum()))
+
+
+def _without_sheets(points, triangles):
+    """(Triangles without pieces that are flat and have an open edge, area of each triangle of these [m²])."""
+    pieces = _pieces(points, triangles)
+    sheet = (pieces.flat & pieces.open)[pieces.piece]
+    return triangles[~sheet], pieces.area[sheet]
+
+
+def _outward(points, triangles, pieces):
+    """Triangles outward."""
+    flip = np.where(pieces.flat, ~pieces.as_given, pieces.volume < 0.0)
+    outward = np.where(flip[pieces.piece][:, None], pieces.triangles[:, ::-1], pieces.triangles)
+    inside_out = ~pieces.flat & (flip == pieces.as_given)
+    if (np.abs(pieces.volume) * np.where(inside_out, -1.0, 1.0))[~pieces.flat].sum() > 0.0:
+        for n in np.flatnonzero(inside_out):
+            part = pieces.piece == n
+            if _lies_in_others(points, outward, part):
+                outward[part] = outward[part][:, ::-1]
+    return outward
+
+
+def _rim(triangles):
+    """Directed edges (e, 2) that a surface has more often in one direction than in the other."""
+    ends = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    forth = ends[:, 0] < ends[:, 1]
+    edges, of = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    net = np.bincount(of.ravel(), np.where(forth, 1.0, -1.0)).astype(int)
+    directed = np.where((net > 0)[:, None], edges, edges[:, ::-1])
+    return np.repeat(directed, np.abs(net), axis=0)
+
+
+def _volume(points, triangles):
+    """Volume between a surface and the middle of its rim [m³]."""
+    rim = _rim(triangles)
+    middle = points[rim].mean(axis=(0, 1)) if len(rim) else points[triangles[0, 0]]
+    a, b, c = (points[triangles[:, k]] - middle for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def _lies_in_others(points, triangles, part):
+    """Tell if a part without a rim lies in what other triangles enclose."""
+    if len(_rim(triangles[part])):
+        return False
+    return bool(Winding(points, triangles[~part]).inside(points[triangles[part]].mean(axis=1)).all())
+
+
+def _lids(points, triangles, ends):
+    """(Points with middles of rims behind them, triangles that close all rims, size of each hole [m]).
+
+    A rim with edges of one triangle, corners ``ends (k, 2)``, is that of a hole.
+    """
+    rim, opening = _rim(triangles), set(map(tuple, np.sort(ends, axis=1).tolist()))
+    if not len(rim):
+        return points, np.zeros((0, 3), dtype=np.int64), []
+    corners, number = np.unique(rim, return_inverse=True)
+    number = number.reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(rim)), number.T), shape=(len(corners), len(corners)))
+    _, part = connected_components(graph, directed=False)
+    lids, middles, holes = [], [], []
+    for n in range(part.max() + 1):
+        edges = rim[part[number[:, 0]] == n]
+        places = points[np.unique(edges)]
+        if not opening.isdisjoint(map(tuple, np.sort(edges, axis=1).tolist())):
+            holes.append(float(np.linalg.norm(np.ptp(places, axis=0))))
+        loop = _loop(edges) if len(edges) <= LOOP else None
+        parts = None if loop is None else _in_plane(points[loop])
+        if parts is not None:
+            lids.append(np.array(loop)[parts])
+        else:
+            at = len(points) + len(middles)
+            middles.append(points[edges[:, 0]].mean(axis=0))
+            lids.append(np.column_stack([edges[:, ::-1], np.full(len(edges), at)]))
+    return np.vstack([points, *middles]), np.vstack(lids), sorted(holes, reverse=True)
+
+
+def _loop(edges):
+    """Corners around a hole, against the direction of its edges; None for what is not one loop."""
+    after = dict(edges[:, ::-1].tolist())
+    if len(after) < len(edges) or len(set(after.values())) < len(edges):
+        return None
+    loop = [int(edges[0, 1])]
+    while (corner := after[loop[-1]]) != loop[0]:
+        loop.append(corner)
+    return loop if len(loop) == len(edges) else None
+
+
+def _in_plane(corners):
+    """Triangles of a polygon that lies in a plane within a thousandth of its size; None for another."""
+    normal = np.linalg.svd(corners - corners.mean(axis=0))[2][2]
+    away = np.abs((corners - corners.mean(axis=0)) @ normal).max()
+    if len(corners) > 3 and away > 1e-3 * np.ptp(corners, axis=0).max():
+        return None
+    return ears(corners)
+
+
+def _sides(corners, winding, spacing):
+    """1, −1 or 0 of places of triangles (t, 3, 3): solid behind, before, on both sides or none; shape (t, looks)."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0)
+    places = np.einsum("lk,tkx->tlx", LOOKS, corners)
+    shift = GAP * spacing * normal[:, None]
+    before, behind = (winding.inside((places + s * shift).reshape(-1, 3)) for s in (1.0, -1.0))
+    return (behind.astype(int) - before).reshape(len(corners), -1)
+
+
+def _boundary(corners, winding, spacing):
+    """(Corners (k, 3, 3) of the boundary, 1 or −1 of triangles that are whole in it, mask of those that are cut)."""
+    parts, of = _parted(corners, np.arange(len(corners)), COARSE * spacing)
+    sides = _sides(parts, winding, spacing)
+    low, high = np.full(len(corners), 2), np.full(len(corners), -2)
+    np.minimum.at(low, of, sides.min(axis=1))
+    np.maximum.at(high, of, sides.max(axis=1))
+    side, cut = np.where(low == high, low, 0), low != high
+    kept = [_turned(corners[side != 0], side[side != 0])]
+    parts, sides = parts[cut[of]], sides[cut[of]]
+    while len(parts):
+        same = (sides == sides[:, :1]).all(axis=1) | (_longest(parts)[0] <= SMALL * spacing)
+        kept.append(_turned(parts[same & (sides[:, 0] != 0)], sides[same & (sides[:, 0] != 0), 0]))
+        parts = _halved(parts[~same])
+        sides = _sides(parts, winding, spacing) if len(parts) else np.zeros((0, len(LOOKS)), dtype=int)
+    return np.vstack(kept), side, cut
+
+
+def _turned(corners, side):
+    """Triangles, by corners or by their numbers, turned where a side is below 0."""
+    return np.where((side < 0).reshape(-1, *(corners.ndim - 1) * (1,)), corners[:, ::-1], corners)
+
+
+def _longest(corners):
+    """(Length of the longest edge of triangles (t, 3, 3), number of the corner where it begins)."""
+    length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    return length.max(axis=1, initial=0.0), length.argmax(axis=1)
+
+
+def _halved(corners):
+    """Both halves of triangles that are cut at the middle of their longest edge."""
+    if not len(corners):
+        return corners
+    _, at = _longest(corners)
+    row = np.arange(len(corners))
+    a, b, c = (corners[row, (at + k) % 3] for k in range(3))
+    middle = 0.5 * (a + b)
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
+def _parted(corners, of, length):
+    """Parts of triangles whose edges are no longer than a length, and the triangle of each."""
+    done, owners = [], []
+    while len(corners):
+        short = _longest(corners)[0] <= length
+        done.append(corners[short])
+        owners.append(of[short])
+        corners, of = _halved(corners[~short]), np.tile(of[~short], 2)
+    return np.concatenate(done), np.concatenate(owners)
+
+
+def _of_sums(sums):
+    """`Moments` from the integrals of `Winding.sums`."""
+    if not sums[0] > 0.0:
+        return Moments(0.0, np.zeros(3), np.zeros((3, 3)))
+    volume, centre = float(sums[0]), sums[1:4] / sums[0]
+    xx, xy, xz, yy, yz, zz = sums[4:]
+    second = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) - volume * np.outer(centre, centre)
+    return Moments(volume, centre, np.trace(second) * np.eye(3) - second)
+
+
+def _remarks(pieces, holes, doubled, inverted, sheets):
+    """Faults of a surface, each a text."""
+    if holes:
+        yield (
+            f"the surface is open at {len(pieces.ends)} edges, in {len(holes)} holes that were bridged, the largest "
+            f"{holes[0]:.3g} m across"
+        )
+    if doubled:
+        yield f"{doubled} triangles lay on others and were left out"
+    if pieces.crowded:
+        yield f"{pieces.crowded} edges have more than two triangles: parts that touch there are one solid"
+    if inverted:
+        yield f"{inverted} of {len(pieces.triangles)} triangles faced inward and were turned"
+    if len(sheets):
+        yield f"{len(sheets)} triangles, {sheets.sum():.3g} m², bound nothing: sheets without thickness are not felt"

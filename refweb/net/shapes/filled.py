@@ -1,0 +1,164 @@
+"""Bodies whose depth is known on a grid: solids that a surface of triangles bounds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...errors import InputError
+from ...tables import Several
+from ..rigid_body import Grown, Shape, axes_of
+
+GRID = 48
+"""Number of cells of the grid along the longest side, where none is given and no wall is too thin for it."""
+WIDE = 96
+"""The same of a grid for bodies that are thicker than the first one reaches: far from a surface depth is smooth."""
+WALL = 2.0
+"""Least number of cells from the middle of a wall to its surface."""
+MOST = 4_000_000
+"""Largest number of points of a grid that is chosen."""
+
+
+class Solid(NamedTuple):
+    """Solid of a file, about the origin of the body.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        Corners [m].
+    triangles : ndarray of int, shape (t, 3)
+        Those of each triangle, outward.
+    centre : ndarray, shape (3,)
+        Centre of mass, from the origin of the file [m].
+    volume : float
+        Volume [m³].
+    inertia : ndarray, shape (3, 3)
+        Moments for a density of 1 [m⁵].
+    field : refweb.net.boundary.field.Field
+        Depth in it.
+    convex : bool
+        Whether it is convex.
+    remarks : tuple of str
+        Faults of the surface.
+    felt : tuple of ndarray, optional
+        Corners and triangles of the boundary of a solid whose surface had faults, where these are not the ones above.
+    winding : refweb.net.boundary.winding.Winding, optional
+        Tells what is inside of such a solid.
+    error : float, optional
+        Error of the field at the part of the surface that matters [m]; by default that of the field.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    centre: np.ndarray
+    volume: float
+    inertia: np.ndarray
+    field: Any
+    convex: bool
+    remarks: tuple
+    felt: tuple | None = None
+    winding: Any = None
+    error: float | None = None
+
+
+class Filled(Shape):
+    """Shape of a body whose `Solid` is in ``solid``, with ``axes`` of its file."""
+
+    solid: Any
+    axes: Several
+
+    def grown(self):
+        """No core: the box that it fills about its centre, within its error, and where its field's numbers stand."""
+        field = self.solid.field
+        size = tuple((np.abs(self.solid.points).max(axis=0) + field.error).tolist())
+        return Grown(
+            0.0, size, fine=math.inf if self.solid.convex else field.spacing, thick=field.thickness, field=field.address
+        )
+
+    @property
+    def extent(self):
+        """Largest distance from its centre to its surface, within its error [m]."""
+        return float(np.linalg.norm(self.solid.points, axis=1).max()) + self.solid.field.error
+
+    def frame(self):
+        """Unit vectors of the axes of the file."""
+        return axes_of(self.axes)
+
+    def volume(self):
+        """Its volume [m³]."""
+        return self.solid.volume
+
+    def inertia(self, mass):
+        """Tensor of inertia of a uniform mass about its centre [kg m²], along its axes, shape (3, 3)."""
+        return mass / self.solid.volume * self.solid.inertia
+
+    def depth(self):
+        """Kernel of the depth that its field has."""
+        from ..boundary.field import depth
+
+        return depth
+
+    def skeleton(self):
+        """Its edges that stand out."""
+        from ..skeleton import of_surface
+
+        return of_surface(self.solid.points, self.solid.triangles)
+
+    def touched(self, thickness):
+        """Its field, or for what is thicker than that reaches a wider one, with `WIDE` cells along all it fills."""
+        field, grown = self.solid.field, self.grown()
+        if thickness <= field.margin:
+            return grown
+        from ..boundary.field import field_of
+
+        wide = vars(self).setdefault("_wide", {})  # kept as long as this: kernels read it where it stands
+        if thickness not in wide:
+            points, triangles = self.solid.felt or (self.solid.points, self.solid.triangles)
+            size = float(np.ptp(points, axis=0).max())
+            spacing = max((size + 2.0 * thickness) / WIDE, field.spacing)
+            cells = max(int(np.ceil(size / spacing)), 1)
+            around = int(np.ceil(1.1 * thickness * cells / size)) + 2
+            wide[thickness] = field_of(points, triangles, cells, around, field, self.solid.winding)
+        return grown._replace(field=wide[thickness].address)
+
+    def boundary(self):
+        """Its triangles."""
+        return self.solid.points, self.solid.triangles
+
+    def remarks(self):
+        """Remarks on repairs of its file."""
+        return self.solid.remarks
+
+    def texts(self):
+        """Texts on its size, its centre of mass in the file, and the error of its field at the surface."""
+        solid, field = self.solid, self.solid.field
+        centre = ", ".join(f"{x:.4g}" for x in solid.centre)
+        grid = " × ".join(map(str, field.counts))
+        yield f"{len(solid.triangles)} triangles, {solid.volume:.4g} m³, centre of mass at ({centre}) m from its origin"
+        yield f"surface within {self.error:.1e} m on a grid of {grid} points"
+
+    @property
+    def error(self):
+        """Largest distance of the surface that lines feel from that of the file [m]."""
+        return self.solid.field.error if self.solid.error is None else self.solid.error
+
+
+def field_in(points, triangles, grid, winding=None, fewest=GRID):
+    """The field of the solid in a surface, of a grid that is fine enough for its walls; ``fewest`` cells by default."""
+    from ..boundary.field import field_of
+
+    cells = grid or fewest
+    while True:
+        field = field_of(points, triangles, cells, winding=winding)
+        if field.thickness >= WALL * field.spacing:
+            return field
+        more = min(max(1.1 * WALL * field.spacing / max(field.thickness, field.spacing), 1.25), 2.0)
+        finer, remedy = int(np.ceil(more * cells)), "or " if winding is None else 'take surface = "hull", or '
+        if grid or np.prod(np.array(field.counts, dtype=float)) * more**3 > MOST:
+            raise InputError(
+                f"grid = {cells} has cells of {field.spacing:.3g} m, and walls {2.0 * field.thickness:.3g} m thin need "
+                f"{2.0 * WALL:g} of them: give grid = {finer} or more, {remedy}thicken the walls"
+            )
+        cells = finer

@@ -1,0 +1,80 @@
+"""Planes: the ground behind them has no end."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...errors import InputError
+from ...kernels import kernel
+from ...tables import Several, real, table, vector
+from ..rigid_body import Grown, Shape, axes_about
+
+
+@kernel()
+def depth(p, grown):
+    """Distance behind the plane, as `refweb.net.grown_core.depth`, of a body that is thicker by ``grown.radius``."""
+    return grown.radius - p[2], (0.0, 0.0, -1.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@table
+class Plane(Shape):
+    """All that lies behind a plane through the position, such as level ground; it is fixed.
+
+    Where the stiffness of contact is left out it is chosen for an overlap of 2 % of the shortest line, since a plane
+    has no size. Nothing passes through it, however deep.
+
+    Parameters
+    ----------
+    normal : sequence of 3 float
+        Direction away from the ground.
+    drawn : float
+        Edge of the square that is drawn about the position [m], > 0.
+
+    Examples
+    --------
+        [[body]]
+        name = "floor"
+        shape = "plane"
+        normal = [0.0, 0.0, 1.0]
+        position = [0.0, 0.0, -0.2]
+        fixed = true
+    """
+
+    ground = True
+
+    normal: Several = vector(default=None)
+    drawn: float = real(default=2.0, above=0, unit="m")
+
+    def check(self):
+        """Refuse a normal that is zero."""
+        if self.normal is not None:
+            self.frame()
+
+    def frame(self):
+        """Unit vectors of its axes, the normal third."""
+        return axes_about("normal", self.normal)
+
+    def grown(self):
+        """A box without end."""
+        return Grown(0.0, (math.inf, math.inf, math.inf))
+
+    def depth(self):
+        """Kernel of the distance behind it."""
+        return depth
+
+    def skeleton(self):
+        """No parts: it touches other bodies by theirs."""
+        from ..skeleton import COLUMNS
+
+        return np.zeros((0, COLUMNS))
+
+    def volume(self):
+        """None: it has no end."""
+        raise InputError('density has no meaning for shape = "plane", which has no end: leave it out')
+
+    def boundary(self):
+        """A square."""
+        corners = 0.5 * self.drawn * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+        return corners, np.array([[0, 1, 2], [0, 2, 3]])

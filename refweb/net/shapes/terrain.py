@@ -1,0 +1,134 @@
+"""Terrain: ground whose heights are in a file."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError
+from ...messages import quote
+from ...tables import Several, integer, real, rows, table, text
+from .filled import GRID, MOST, Filled, Solid, field_in
+
+DEEP = 0.25
+"""Depth of the ground below its lowest place, where none is given, over its longest side."""
+FORMATS = (".csv", ".obj", ".stl", ".vtp")
+"""Ends of names of files of heights."""
+
+
+@table
+class Terrain(Filled):
+    """Ground given by heights: all below them down to a depth is solid, with upright walls at its rim; it is fixed.
+
+    The position is where the origin of the file lies, the third axis is up. A CSV file has the columns x, y and z of
+    places, on a grid or scattered, between which the ground is made of triangles; a surface file (OBJ, STL, VTP) brings
+    the triangles. The surface has one height at each place, so no cliff hangs over. Its error is that of the ground but
+    for triangles at the rim. Where the stiffness of contact is left out it is chosen as for a plane.
+
+    Parameters
+    ----------
+    heights : str
+        CSV file of heights, or OBJ, STL or VTP file of an open surface, relative to the scene's folder.
+    scale : float
+        Metres a unit of the file, > 0.
+    thickness : float, optional
+        Depth of the ground below its lowest place [m], > 0; by default a quarter of its longest side.
+    axes : list of 2 vectors, optional
+        Directions of the first two axes of the file, at right angles; by default x and y.
+    grid : int, optional
+        Number of cells along its longest side of the grid on which depth is known; by default 48 or more, so that a
+        cell is no longer than the edges of the triangles, as far as memory allows.
+
+    Examples
+    --------
+        [[body]]
+        name = "hill"
+        shape = "terrain"
+        heights = "hill.csv"
+        position = [0.0, 0.0, -2.0]
+        fixed = true
+    """
+
+    ground = True
+
+    heights: str = text()
+    scale: float = real(default=1.0, above=0)
+    thickness: float | None = real(default=None, above=0, unit="m")
+    axes: Several = rows(3, default=None)
+    grid: int | None = integer(default=None, at_least=8, at_most=4096)
+
+    def check(self):
+        """Refuse axes that are not two at right angles."""
+        self.frame()
+
+    def to_dict(self):
+        """The table as plain TOML values, the file with its folder."""
+        return {**super().to_dict(), "heights": str(Path(self.heights).absolute())}
+
+    @functools.cached_property
+    def solid(self):
+        """The `Solid`, about the origin of the file.
+
+        Raises
+        ------
+        InputError
+            For a file that cannot be read or whose surface has two heights at a place, and a grid that is too coarse or
+            does not fit into memory.
+        """
+        path = Path(self.heights)
+        try:
+            if path.suffix.lower() not in FORMATS:
+                raise InputError(f"format {quote(path.suffix)} must be one of {', '.join(FORMATS)}")
+            if not path.is_file():
+                raise InputError(f"there is no file {path}")
+            content = hashlib.sha256(path.read_bytes()).hexdigest()
+            return _solid(path, content, self.scale, self.thickness, self.grid)
+        except InputError as error:
+            raise InputError(f"heights = {quote(self.heights)}: {error}") from None
+        except OSError as error:
+            raise InputError(f"heights = {quote(self.heights)}: cannot be read: {error.strerror or error}") from None
+
+    def skeleton(self):
+        """Its edges that stand out, or none where there are too many: other bodies touch it by theirs."""
+        from ..skeleton import COLUMNS
+
+        try:
+            return super().skeleton()
+        except InputError:
+            return np.zeros((0, COLUMNS))
+
+    def settle(self):
+        """Read the file."""
+        _ = self.solid
+
+
+@functools.lru_cache(maxsize=16)
+def _solid(path, content, scale, thickness, grid):
+    """The `Solid` of a file of some content."""
+    from ..boundary.closed import NotClosedError, closed, is_convex, moments
+    from ..boundary.field import places_on
+    from ..boundary.heights import above_ground, on_rim, places_of
+
+    points, triangles = places_of(path)
+    points = scale * points
+    longest = float(np.ptp(points[triangles].reshape(-1, 3), axis=0).max())
+    bottom = points[triangles, 2].min() - (thickness or DEEP * longest)
+    try:
+        surface = closed(*above_ground(points, triangles, bottom))
+    except NotClosedError as error:
+        raise InputError(f"its surface must have one height at each place: {error}") from None
+    volume, centre, inertia = moments(surface.points, surface.triangles)
+    edge = np.median(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1))
+    sides = np.ptp(surface.points, axis=0)
+    finest = 0.5 * (MOST / max(float(np.prod(sides / sides.max())), 1e-3)) ** (1.0 / 3.0)
+    cells = int(np.clip(np.ceil(sides.max() / edge), GRID, max(finest, GRID)))
+    field = field_in(surface.points, surface.triangles, grid, fewest=cells)
+    convex = is_convex(surface.points, volume)
+    solid = Solid(surface.points, surface.triangles, centre, volume, inertia, field, convex, ())
+    used, inner = np.unique(triangles[~on_rim(triangles)], return_inverse=True)
+    if not len(used):
+        return solid
+    return solid._replace(error=float(np.abs(field.at(places_on(points[used], inner.reshape(-1, 3)))[0]).max()))
