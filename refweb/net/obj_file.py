@@ -40,7 +40,7 @@ def read_obj(path):
         text = path.read_text(encoding="utf-8-sig", errors="strict")
     except UnicodeDecodeError:
         text = path.read_bytes().decode("latin-1")
-    for number, row in enumerate(text.replace("\\\n", " ").splitlines(), 1):
+    for number, row in enumerate(text.replace("\\\r\n", " ").replace("\\\n", " ").splitlines(), 1):
         words = row.partition("#")[0].split()
         if not words:
             continue

@@ -1,10 +1,12 @@
 """Surfaces from files: corners and triangles, from STL, OBJ and VTP.
 
 meshio reads STL, and VTK, in a process of its own, VTP. Of OBJ only the corners and faces count, which
-`refweb.net.boundary.obj_file` reads: textured files have lists that meshio does not take, and VTK rounds to 7 digits.
+`refweb.net.obj_file` reads: textured files have lists that meshio does not take, and VTK rounds to 7 digits.
 """
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 
@@ -12,7 +14,7 @@ from ... import memory
 from ...errors import InputError
 from ...messages import quote
 from ..mesh_readers import by_meshio, by_vtk
-from .obj_file import faces_of
+from ..obj_file import read_obj
 from .polygons import ears
 
 HARMLESS = ("vertex", "poly_vertex", "line", "polyline")
@@ -48,6 +50,12 @@ def _of_stl(path):
     return _sorted(mesh.points, [(block.type, block.data) for block in mesh.cells])
 
 
+def _of_obj(path):
+    """Corners, and an array (faces, corners) for each sequence of faces with as many corners."""
+    points, _, faces, _, _ = read_obj(path)
+    return points, [np.array(list(group), dtype=np.int64) for _, group in itertools.groupby(faces, len)]
+
+
 def _of_vtk(path):
     mesh = by_vtk(path)
     return _sorted(mesh.points, [(block.kind, block.cells) for block in mesh.blocks])
@@ -78,5 +86,5 @@ def _triangles(points, cells):
     return fan
 
 
-READERS = {".stl": _of_stl, ".obj": faces_of, ".vtp": _of_vtk}
+READERS = {".stl": _of_stl, ".obj": _of_obj, ".vtp": _of_vtk}
 """What reads surfaces, by the end of their name."""
