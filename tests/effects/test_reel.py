@@ -391,7 +391,7 @@ def test_a_scene_is_read_and_written():
         ({"lines": 1.5, "factor": REELED}, "lines = 1.5 must be a line number or a name"),
         ({"lines": 0, "factor": [[0.0, 1.0], [1.0, 0.0]]}, r"\[\[reel\]\] 1 factor\[1\]\[1\] = 0 must be > 0"),
         ({"lines": 0, "factor": [[1.0, 1.0], [1.0, 0.5]]}, r"factor\[1\]\[0\] = 1.0 must be > 1"),
-        ({"lines": "rim", "factor": REELED}, r'\[\[reel\]\] 1 lines = "rim": no line of this web joins two'),
+        ({"lines": "centre", "factor": REELED}, r'\[\[reel\]\] 1 lines = "centre"'),
         ({"lines": [0, 10**6], "factor": REELED}, r"\[\[reel\]\] 1 lines\[1\] = 1000000 must be 0 … 23"),
     ],
 )
