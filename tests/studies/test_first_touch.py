@@ -18,6 +18,7 @@ def test_a_first_touch_grows_with_elements_and_stiffness(seed):
     assert both[2] > 1.1 * both[0]  # twice as much, but for what the web as a whole pushes back
 
 
+@pytest.mark.slow
 def test_a_ring_that_a_cable_stops_has_a_limit():
     """The cable decides on the force, and neither elements nor stiffness."""
     ring = refweb.Observe(name="force", quantity="reaction", body="ring", reduce="max")
