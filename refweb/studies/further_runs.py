@@ -1,9 +1,10 @@
 """All parts of the error of results, by further runs within a budget of CPU time.
 
 A run and its twin tell of time steps alone. Further runs of the same scene tell of the rest: with twice and four times
-the elements, with 4 and 16 times the stiffness of contact, with a tenth of the smoothing, with two starts side by side
-and, where these grow apart, with several. Those that cost least come first; one that is expected to take more than what
-is left of the budget is not begun, and one that is seen to is ended. A part of which no run is left is "not estimated".
+the elements, with 4 and 16 times the stiffness of contact, with a tenth of the smoothing and a quarter of the slip
+velocity of friction, with two starts side by side and, where these grow apart, with several. Those that cost least come
+first; one that is expected to take more than what is left of the budget is not begun, and one that is seen to is ended.
+A part of which no run is left is "not estimated".
 
 Two runs are held against each other by their result, and by the mean difference of the observable before, as a run and
 its twin are, see `refweb.dynamics.twin_error`: results may agree by chance.
