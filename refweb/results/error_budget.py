@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 from ..findings import Finding
-from ..net.tension_laws import LINEAR, SMOOTH
+from ..net.tension_laws import SMOOTH
 from .solution import Result
 from .strength import ALIKE, UTILISATION, of_observable
 from .units import readable
@@ -75,8 +75,6 @@ def reasons_of(scene, system, solution):
             reasons["elements"] = "straight elements that are loaded at their ends alone are exact"
     else:
         reasons["rounding"] = "part of that of time steps: both runs round differently"
-    if scene.cable.subdivide == scene.cable.order == 1 and (system.net.laws == LINEAR).all():
-        reasons["elements"] = "lines that push have one element each: in several they would be chains"
     touching = [entry["overlap"] for table in (solution.bodies, solution.pairs) for entry in table.values()]
     touching += [solution.lines["overlap"]] if solution.lines else []
     if not touching:
@@ -311,21 +309,27 @@ def _remedies(result, solution, price):
     until = f" at t < {horizon:.3g} s" if horizon else ""
     if solution.scene.solve.kind == "static":
         wide = "that is what the residual and rounding leave of it"
-        return {WIDE: wide, STATISTICAL: "", NO_LIMIT: "", MODEL: _of_model(result).partition(", or ask")[0]}
+        return {
+            WIDE: wide,
+            STATISTICAL: "",
+            NO_LIMIT: "",
+            MODEL: _of_model(result, solution.scene.cable).partition(", or ask")[0],
+        }
     return {
         WIDE: f"[accuracy] digits = 1 makes it smaller{cost}",
         STATISTICAL: f"ask for a result{until}, for a mean (average), or for quantiles of many runs (refweb sweep)",
-        MODEL: _of_model(result),
+        MODEL: _of_model(result, solution.scene.cable),
         NO_LIMIT: "ask for its mean over a time (average = 0.01), which is an impulse",
     }
 
 
-def _of_model(result):
-    """Sentence on the largest part of a model."""
+def _of_model(result, cable):
+    """Sentence on the largest part of a model; bars that push, of the linear law, become chains in more elements."""
+    where = " where lines only pull" * (cable.law == "linear")
     parts = {part: result.parts[part] for part in MODELS if isinstance(result.parts[part], float)}
     largest = max(parts, key=lambda part: parts[part], default="elements")
     return {
-        "elements": "[cable] subdivide = 2 makes it smaller, or ask for its mean over a longer time (average)",
+        "elements": f"[cable] subdivide = 2 makes it smaller{where}, or ask for its mean over a longer time (average)",
         "contact_stiffness": "give [contact] the stiffness of the real surface, or a larger one",
         "smoothing": "lower the smoothing of the cable law, or the slip_velocity of friction",
     }[largest]

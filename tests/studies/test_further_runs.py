@@ -176,7 +176,8 @@ def upright(speed, **changes):
 def test_a_peak_before_the_horizon_may_be_exceeded_behind_it():
     """It stands for 15 s where nothing pushes it, and swings through its lowest place where anything does."""
     found = upright(0.05).trust(progress=False).results["lowest"]
-    assert found.value > 0.9 and found.verdict == "statistical" and found.error > 1.9
+    assert found.value > 0.9 and found.parts["chance"] > 1.9 and found.error > 1.9
+    assert found.verdict in ("statistical", "depends on the model")  # a bar in two elements is a chain, and falls too
 
 
 def test_steps_that_are_too_long_are_no_chance():
