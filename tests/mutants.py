@@ -215,7 +215,7 @@ MUTANTS = [
     Mutant("net/faces", "np.roll(corners, -1, axis=1)", "np.roll(corners, -2, axis=1)"),
     Mutant("net/faces", "cells[:, [0, 1, 3, 2]]", "cells[:, [0, 1, 2, 3]]"),
     Mutant("net/obj_file", "else count + corner", "else count + corner - 1"),
-    Mutant("net/csv_files", "np.column_stack(pairs) - first", "np.column_stack(pairs)"),
+    Mutant("net/csv_files", "for end in pairs]) - first", "for end in pairs])"),
     Mutant("commands/doubts", "0.5 * high**2 * np.sin(turned)", "high**2 * np.sin(turned)"),
     Mutant("commands/doubts", "distances[0] > 0.0", "distances[0] < 0.0"),
     Mutant("scene", "min(max(SHORTEST_INTERVAL, ", "min(min(SHORTEST_INTERVAL, "),

@@ -139,7 +139,7 @@ def scene_text(target, source=None):
     if source is None:
         path, text = target, START
     elif study:
-        path = load(source).folder / f"{pathlib.Path(source).stem}.toml"
+        path = pathlib.Path(load(source).folder or ".") / f"{pathlib.Path(source).stem}.toml"
         text = path.read_bytes().decode("utf-8-sig")
     else:
         path = file_of(source)

@@ -117,7 +117,7 @@ class Twin:
             self._thread.join()
         else:
             self._run(self._simulation.integrator.refined)
-        if self._course is None or self._rows is None:
+        if self._course is None or self._rows is None or self._share_rows is None:
             return None
         watch, course = self._simulation.watch, self._course
         results, shares = watch.results(course, self._last), watch.shares(course)
@@ -275,10 +275,10 @@ def _add_errors_of_shares(simulation, run, twin, rows, factor, known):
     """Add ± to the utilisation and the margin of safety of a solution, as far as these are before a ``known`` time."""
     solution, largest = simulation.solution, run.course.largest
     tables = (rows, simulation.share_rows), (twin.rows, twin.share_rows)
-    compared = [np.column_stack([table[:, 0], shares, table[:, -1]]) for table, shares in tables]
-    results = with_errors(run.shares, run.share_corrections, twin.shares, *compared, factor, energy=largest)
+    kept, refined = (np.column_stack([table[:, 0], shares, table[:, -1]]) for table, shares in tables)
+    results = with_errors(run.shares, run.share_corrections, twin.shares, kept, refined, factor, energy=largest)
     if run.course.stopped and len(rows) > 1:
-        _add_lateness(results, solution.events, compared[0][-2:])
+        _add_lateness(results, solution.events, kept[-2:])
     errors = {name: share.error if share.time < known else None for name, share in results.items()}
     solution.utilisation = solution.utilisation._replace(error=errors["utilisation"])
     margin, error = solution.margin, errors["utilisation"]

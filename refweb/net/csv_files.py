@@ -54,8 +54,8 @@ def web_of(points, lines, columns=None, first=0):
         if name:
             names.setdefault(name, []).append(number)
     return Web(
-        np.column_stack(places),
-        np.column_stack(pairs) - first,
+        np.column_stack([np.asarray(column) for column in places]),
+        np.column_stack([np.asarray(end) for end in pairs]) - first,
         length,
         rim=() if rim is None else np.flatnonzero(rim),
         kind="file",
@@ -73,7 +73,7 @@ def places_of(path):
         problems.add(f"{path.name}: column {quote(name)} is unknown, {nearest(name, 'xyz')}")
     places = [columns.numbers(key, problems) for key in "xyz"]
     problems.refuse()
-    return np.column_stack(places)
+    return np.column_stack([np.asarray(column) for column in places])
 
 
 class Problems:

@@ -173,7 +173,7 @@ def _outline(points, lines, ends, sides):
 
     ``ends`` are the nodes at the ends of links, and ``sides`` the line of each side of each polygon, −1 for none.
     """
-    inner = ~np.isin(lines, ends).any(axis=1)
+    inner = np.logical_not(np.asarray(np.isin(lines, ends).any(axis=1)))
     complete = ((sides >= 0) & inner[sides]).all(axis=1)
     count = np.bincount(sides[complete].ravel(), minlength=len(lines))
     rim = np.flatnonzero(inner & (count < 2))
@@ -309,7 +309,8 @@ class Window(Table):
 
     def web(self, base=None):
         """The `refweb.net.web.Web`; its cells count the sectors between links as `Paper` does."""
-        return _window(self.mesh, *self.counts, self.side, "window")
+        rows, columns = self.counts
+        return _window(self.mesh, rows, columns, self.side, "window")
 
 
 @table

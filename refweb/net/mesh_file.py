@@ -188,7 +188,7 @@ def _web_of(mesh, edges=None):
             joined[name] = np.union1d(joined.get(name, np.zeros(0, dtype=np.int64)), first + number).astype(np.int64)
         groups = joined
     if mesh.groups is not None:
-        named = {} if groups is None else dict(members(groups, len(lines)))
+        named: dict = {} if groups is None else dict(members(groups, len(lines)))
         for name, cells in mesh.groups.items():
             named[name] = [*named.get(name, ()), *cells]
         once, order = _merged(lines, mesh)

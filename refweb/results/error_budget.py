@@ -286,7 +286,7 @@ def _judge_utilisation(solution, scene, system, reasons, further):
         return
     result = Result(used.value, used.error, "1", 0.0, used.line, smoothing=used.smoothing)
     result = with_parts(result, scene.solve.kind == "static", {**reasons, **further.get("reasons", {})})
-    result = summed(result._replace(parts={**result.parts, **further.get("parts", {})}))
+    result = summed(result._replace(parts={**(result.parts or {}), **further.get("parts", {})}))
     proven = used.proven
     if (match := of_observable(scene, system, solution.results, used)) is not None:
         observed, factor = match

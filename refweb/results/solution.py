@@ -201,7 +201,7 @@ class SolutionData:
     horizon: dict = field(default_factory=dict)
     divergence: Any = None
     further: list = field(default_factory=list)
-    utilisation: tuple | None = None
+    utilisation: Any = None
     margin: dict | None = None
     bodies: dict = field(default_factory=dict)
     pairs: dict = field(default_factory=dict)

@@ -156,8 +156,8 @@ class Simulation:
             error = share.error(state, equilibrium)
             errors.append((error, None if error is None else error + (moved or 0.0)))
         proven = errors[0][0] is not None and self._shares["strength"].proven(equilibrium)
-        known = dict(error=errors[0][0], smoothing=smoothed[0], proven=proven)
-        solution.utilisation = Utilisation(used.value, used.where, **known)
+        line = 0 if used.where is None else used.where
+        solution.utilisation = Utilisation(used.value, line, errors[0][0], None, smoothed[0], proven)
         if solution.margin is None or state.margin["used"] > solution.margin["used"]:
             solution.margin = {**state.margin, "error": errors[-1][1]}
 

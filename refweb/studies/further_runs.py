@@ -129,7 +129,7 @@ class FurtherRuns:
     def follow(self):
         """Run what the budget allows, cheapest first."""
         waiting = list(variants(self.scene, self.simulation.system, self.solution, self._single))
-        done = {None}
+        done: set[str | None] = {None}
         while ready := [v for v in waiting if v.follows in done]:
             variant = min(ready, key=lambda v: v.price)
             waiting.remove(variant)
