@@ -46,8 +46,8 @@ def _cells_of(points, corners, low, h, n, span):
         lower, upper = points[corners[0], k], points[corners[0], k]
         for c in corners:
             lower, upper = min(lower, points[c, k]), max(upper, points[c, k])
-        span[0, k] = min(max(int((lower - low[k]) / h), 0), n[k] - 1)
-        span[1, k] = min(max(int((upper - low[k]) / h), 0), n[k] - 1)
+        span[0, k] = min(max(int((lower - low[k]) / h[k]), 0), n[k] - 1)
+        span[1, k] = min(max(int((upper - low[k]) / h[k]), 0), n[k] - 1)
 
 
 @kernel()
@@ -65,6 +65,35 @@ def _find(points, triangles, low, h, n, count, listed, fill):
                         listed[count[cell]] = t
                     else:
                         count[cell + 1] += 1
+
+
+def triangles_by_cell(points, triangles, low, h, n):
+    """Triangles in the cells of a grid that each reaches.
+
+    Parameters
+    ----------
+    points : ndarray, shape (corners, 3)
+        Corners [m].
+    triangles : ndarray of int, shape (t, 3)
+        Those of each triangle.
+    low, h : ndarray, shape (3,)
+        Lowest corner of the grid, and edges of its cells [m].
+    n : ndarray of int, shape (3,)
+        Number of cells along each axis; cell (i, j, k) has the number (i n₁ + j) n₂ + k.
+
+    Returns
+    -------
+    ends : ndarray of int, shape (cells + 1,)
+        Where the triangles of each cell begin in the list, and those of the last end.
+    listed : ndarray of int
+        The list.
+    """
+    ends = np.zeros(n.prod() + 1, np.int64)
+    _find(points, triangles, low, h, n, ends, np.zeros(0, np.int64), False)
+    ends = np.cumsum(ends)
+    listed, filled = np.empty(ends[-1], np.int64), ends[1:].copy()
+    _find(points, triangles, low, h, n, filled, listed, True)
+    return ends, listed
 
 
 @kernel()
@@ -93,9 +122,6 @@ def crossing(points, triangles):
     edges = np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2)
     h = max(float(np.median(edges)), float(size.max()) / MOST)
     n = np.maximum(np.ceil(size / h), 1.0).astype(np.int64)
-    ends = np.zeros(n.prod() + 1, np.int64)
-    _find(points, triangles, low, h, n, ends, np.zeros(0, np.int64), False)
-    ends = np.cumsum(ends)
-    listed, filled = np.empty(ends[-1], np.int64), ends[1:].copy()
-    _find(points, triangles, low, h, n, filled, listed, True)
+    h = np.full(3, h)
+    ends, listed = triangles_by_cell(points, triangles, low, h, n)
     return tuple(map(int, _first(points, triangles, low, h, n, ends, listed)))

@@ -18,6 +18,7 @@ import math
 import numpy as np
 
 from ...kernels import kernel
+from .crossings import triangles_by_cell
 from .distances import meets
 
 MOST = 512
@@ -29,29 +30,6 @@ LINES = 1024
 @kernel()
 def _cell(value, low, h, count):
     return min(max(int(math.floor((value - low) / h)), 0), count - 1)
-
-
-@kernel()
-def _list_triangles(points, triangles, low, h, n, count, listed, fill):
-    """List the triangles of each cell (``fill``), or count them."""
-    for t in range(triangles.shape[0]):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        x0, x1 = (
-            min(points[a, 0], points[b, 0], points[c, 0]),
-            max(points[a, 0], points[b, 0], points[c, 0]),
-        )
-        y0, y1 = (
-            min(points[a, 1], points[b, 1], points[c, 1]),
-            max(points[a, 1], points[b, 1], points[c, 1]),
-        )
-        for i in range(_cell(x0, low[0], h[0], n), _cell(x1, low[0], h[0], n) + 1):
-            for j in range(_cell(y0, low[1], h[1], n), _cell(y1, low[1], h[1], n) + 1):
-                cell = i * n + j
-                if fill:
-                    count[cell] -= 1
-                    listed[count[cell]] = t
-                else:
-                    count[cell + 1] += 1
 
 
 @kernel()
@@ -125,12 +103,7 @@ class Winding:
         self._low, size = used.min(axis=0), np.ptp(used, axis=0)
         self._size = size
         h = np.maximum(size / n, np.finfo(float).tiny)
-        ends = np.zeros(n * n + 1, np.int64)
-        _list_triangles(*self._surface, self._low, h, n, ends, np.zeros(0, np.int64), False)
-        ends = np.cumsum(ends)
-        listed, filled = np.empty(ends[-1], np.int64), ends[1:].copy()
-        _list_triangles(*self._surface, self._low, h, n, filled, listed, True)
-        self._grid = self._low, h, n, ends, listed
+        self._grid = self._low, h, n, *triangles_by_cell(*self._surface, self._low, h, np.array([n, n, 1]))
 
     def moved(self, by):
         """The same of the surface moved by a vector [m]."""
