@@ -216,7 +216,7 @@ MUTANTS = [
     Mutant("net/faces", "cells[:, [0, 1, 3, 2]]", "cells[:, [0, 1, 2, 3]]"),
     Mutant("net/obj_file", "else count + corner", "else count + corner - 1"),
     Mutant("net/csv_files", "for end in pairs]) - first", "for end in pairs])"),
-    Mutant("commands/doubts", "0.5 * high**2 * np.sin(turned)", "high**2 * np.sin(turned)"),
+    Mutant("commands/doubts", "0.5 * high**2 * np.sin(", "high**2 * np.sin("),
     Mutant("commands/doubts", "distances[0] > 0.0", "distances[0] < 0.0"),
     Mutant("scene", "min(max(SHORTEST_INTERVAL, ", "min(min(SHORTEST_INTERVAL, "),
     Mutant("dynamics/schedule", "((rows - 1) % scene.output.frames != 0)", "(rows % scene.output.frames != 0)"),
@@ -410,7 +410,7 @@ MUTANTS = [
     Mutant("statics/interval", "between = (ends[:, 0] != ends[:, 1])", "between = (ends[:, 0] < ends[:, 1])"),
     Mutant("statics/lowest", "starts[1] < starts[0] - none", "starts[1] > starts[0] + none"),
     Mutant("results/observables/observable", "/ SHARE * ROUNDING", "/ SHARE * ROUNDING / 27.0"),
-    Mutant("statics/smoothing_error", "/ (1.0 - SHARE) for", "* (1.0 - SHARE) for"),
+    Mutant("statics/smoothing_error", "/ rest for", "* rest for"),
     Mutant("statics/newton", "((-self._tiny, 1), (self._tiny, 0))", "((-self._tiny, 1), (self._tiny, -1))"),
     Mutant(
         "statics/stability", "0 if self.definite >= 0 else int(_negative", "0 if self.definite >= -1 else int(_negative"

@@ -199,22 +199,18 @@ def _largest_area(web, mouth):
     longest = ways.max()
     if 2.0 * longest >= ways.sum():
         return None
-    angles = lambda radius: 2.0 * np.arcsin(np.minimum(0.5 * ways / radius, 1.0))  # noqa: E731
-    obtuse = angles(0.5 * longest).sum() < 2.0 * np.pi  # the centre is outside, beyond the longest side
 
-    def excess(radius):
-        turned = angles(radius)
-        if obtuse:
+    def angles(radius, outside):
+        turned = 2.0 * np.arcsin(np.minimum(0.5 * ways / radius, 1.0))
+        if outside:
             turned[ways.argmax()] = 2.0 * np.pi - turned[ways.argmax()]
-        return turned.sum() - 2.0 * np.pi
+        return turned
 
-    low, high = 0.5 * longest, 0.5 * longest
-    while (excess(high) < 0.0) == obtuse and high < 1e9 * longest:
+    low = high = 0.5 * longest
+    outside = angles(low, False).sum() < 2.0 * np.pi  # the centre is beyond the longest side
+    while (angles(high, outside).sum() < 2.0 * np.pi) == outside and high < 1e9 * longest:
         high *= 2.0
     for _ in range(100):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if (excess(middle) < 0.0) == obtuse else (low, middle)
-    turned = angles(high)
-    if obtuse:
-        turned[ways.argmax()] = 2.0 * np.pi - turned[ways.argmax()]
-    return float(0.5 * high**2 * np.sin(turned).sum())
+        low, high = (middle, high) if (angles(middle, outside).sum() < 2.0 * np.pi) == outside else (low, middle)
+    return float(0.5 * high**2 * np.sin(angles(high, outside)).sum())

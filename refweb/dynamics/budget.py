@@ -33,6 +33,11 @@ class Run(NamedTuple):
     price: float
 
 
+def budget_of(given, first):
+    """The budget that is given [s], else that of a first run of a cost [s], see `LEAST`."""
+    return max(LEAST, RUNS * first) if given is None else given
+
+
 class Budget:
     """CPU time that the runs of a simulation may take.
 
@@ -59,7 +64,7 @@ class Budget:
     def total(self):
         """All of it [s]."""
         first = self.runs[0].price if self.runs else 0.0
-        return max(LEAST, RUNS * first) if self._given is None else self._given
+        return budget_of(self._given, first)
 
     @property
     def spent(self):

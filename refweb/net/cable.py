@@ -150,6 +150,11 @@ class Cable(Table):
         groups = {name: group.filled() if group.law == "smooth" else group for name, group in self.groups.items()}
         object.__setattr__(self, "groups", groups)
 
+    def with_smoothing(self, share):
+        """The cable with a share of its smoothing and of that of its groups."""
+        groups = {name: _smoothed(group, share) for name, group in self.groups.items()}
+        return replace(_smoothed(self, share), groups=groups)
+
     def properties(self, web):
         """Values for each line of a web.
 
@@ -200,6 +205,11 @@ class Cable(Table):
                 )
             values[key][plain] = 0.0
         return values
+
+
+def _smoothed(table, share):
+    """A cable or a group of it with a share of its smoothing, where it has one."""
+    return table if table.smoothing is None else replace(table, smoothing=share * table.smoothing)
 
 
 def _number(table, key, missing):

@@ -14,7 +14,7 @@ def draw(results, title):
     names = list(results)
 
     def bars(axes):
-        used = set()
+        drawn = {}
         for row, name in enumerate(reversed(names)):
             result, left = results[name], 0.0
             size = abs(result.value) or 1.0
@@ -22,8 +22,8 @@ def draw(results, title):
             for part, colour in zip(PARTS, COLOURS, strict=False):
                 if isinstance(share := result.parts[part], float) and share > 0.0:
                     width = shrunk * share / size
-                    axes.barh(row, 100.0 * width, left=100.0 * left, color=colour, height=0.6)
-                    left, used = left + width, used | {part}
+                    drawn[part] = axes.barh(row, 100.0 * width, left=100.0 * left, color=colour, height=0.6)
+                    left += width
             missing = [WORDS[part] for part in PARTS if result.parts[part] == OPEN]
             words = result.verdict or ("without " + ", ".join(missing) if missing else "")
             over = f"→ {100.0 * result.error / size:.0f} %, " if result.error and result.error > MOST * size else ""
@@ -42,8 +42,7 @@ def draw(results, title):
         axes.set_ylim(-0.5, len(names) - 0.5)
         widest = max((result.error or 0.0) / (abs(result.value) or 1.0) for result in results.values())
         axes.set_xlim(0.0, 100.0 * min(MOST, max(1.3 * widest, 2.0 * ALLOWED)))
-        handles = {part: axes.barh([0], [0], color=colour) for part, colour in zip(PARTS, COLOURS, strict=False)}
-        legend(axes, [(bar, WORDS[part]) for part, bar in handles.items() if part in used], columns=3)
+        legend(axes, [(drawn[part], WORDS[part]) for part in PARTS if part in drawn], columns=3)
 
     panel = Panel(bars, "± over the value [%], dashed: a tenth", 0.55 + 0.42 * len(names))
     return sheet([panel], title)

@@ -43,6 +43,8 @@ DETERMINED, WIDE, STATISTICAL, MODEL, NO_LIMIT = VERDICTS = (
 )
 ALLOWED = 0.1
 """± over the value above which a result is not determined."""
+SMOOTHING_SHARE = 0.1
+"""Smoothing that results are compared with, over that of the scene."""
 SMOOTHED = 1.32
 """What smoothing leaves of a result over what is found by a tenth of it, as if errors went with η.
 
@@ -67,8 +69,8 @@ EXACT = {"load", "motion", "reel", "temperature", "point_mass", "link"}
 
 def reasons_of(scene, system, solution):
     """Reasons why parts of the error do not exist in a scene, by part; the others apply."""
-    reasons = {}
-    if scene.solve.kind == "static":
+    reasons, static = {}, scene.solve.kind == "static"
+    if static:
         reasons |= dict.fromkeys(("time", "chance"), "an equilibrium has none")
         terms = {term.name for term in system.terms if not term.over_lines}
         if scene.cable.order == 1 and terms <= EXACT:
@@ -81,7 +83,6 @@ def reasons_of(scene, system, solution):
         reasons["contact_stiffness"] = "no contact in the scene"
     elif not any(touching):
         reasons["contact_stiffness"] = "nothing touches"
-    static = scene.solve.kind == "static"
     if not (system.net.laws == SMOOTH).any() and (static or not any(map(rubs, scene.effects))):
         reasons["smoothing"] = "neither the cable law nor friction has any"
     return reasons
@@ -94,8 +95,26 @@ def rubs(effect):
     return hasattr(effect, "slip_velocity") and any((friction or 0.0, *(value or 0.0 for value in others)))
 
 
-def with_parts(result, static, reasons):
-    """A `refweb.results.solution.Result` with the parts of its error, as far as its run tells, not summed yet."""
+def with_parts(result, static, reasons, further):
+    """A `refweb.results.solution.Result` with the parts of its error and their sum.
+
+    Parameters
+    ----------
+    result : refweb.results.solution.Result
+        With the errors that its run tells.
+    static : bool
+        Whether it is one of an equilibrium.
+    reasons : dict of str to str
+        Reasons why parts do not exist in its scene, by part.
+    further : dict
+        ``parts`` and ``reasons`` by further runs, which count where they differ; empty without any.
+
+    Returns
+    -------
+    refweb.results.solution.Result
+        Also with the reason of each part that does not exist.
+    """
+    reasons = {**reasons, **further.get("reasons", {})}
     known = {
         "rounding" if static else "time": result.error,
         "elements": result.discretisation,
@@ -105,7 +124,8 @@ def with_parts(result, static, reasons):
     for part in PARTS:
         value = known.get(part)
         parts[part] = (NONE if part in reasons else OPEN) if value is None else float(value)
-    return result._replace(parts=parts, reasons={part: reasons[part] for part in PARTS if parts[part] == NONE})
+    reasons = {part: reasons[part] for part in PARTS if parts[part] == NONE}
+    return summed(result._replace(parts={**parts, **further.get("parts", {})}, reasons=reasons))
 
 
 def summed(result):
@@ -245,9 +265,7 @@ def judge(solution, scene, system, price=None, asked=None):
         made = {}
         for name, result in results.items():
             further = asked.get(name, {})
-            known = with_parts(result, static, {**reasons, **further.get("reasons", {})})
-            known = known._replace(parts={**known.parts, **further.get("parts", {})})
-            total = named[name].bounded(summed(known), system)
+            total = named[name].bounded(with_parts(result, static, reasons, further), system)
             mesh_only = further.get("mesh_only")
             if mesh_only is None:
                 touch = first_touch(scene, system, named[name])
@@ -285,8 +303,7 @@ def _judge_utilisation(solution, scene, system, reasons, further):
     if used is None:
         return
     result = Result(used.value, used.error, "1", 0.0, used.line, smoothing=used.smoothing)
-    result = with_parts(result, scene.solve.kind == "static", {**reasons, **further.get("reasons", {})})
-    result = summed(result._replace(parts={**(result.parts or {}), **further.get("parts", {})}))
+    result = with_parts(result, scene.solve.kind == "static", reasons, further)
     proven = used.proven
     if (match := of_observable(scene, system, solution.results, used)) is not None:
         observed, factor = match
@@ -305,8 +322,6 @@ def _remedies(result, solution, price):
     cost = ""
     if price is not None and 1.0 < share < math.inf:
         cost = f", for some {price(share):.2g} s of CPU time"
-    horizon = next((time for k, time in reversed(solution.horizon.get("digits", ())) if time is not None), None)
-    until = f" at t < {horizon:.3g} s" if horizon else ""
     if solution.scene.solve.kind == "static":
         wide = "that is what the residual and rounding leave of it"
         return {
@@ -317,10 +332,17 @@ def _remedies(result, solution, price):
         }
     return {
         WIDE: f"[accuracy] digits = 1 makes it smaller{cost}",
-        STATISTICAL: f"ask for a result{until}, for a mean (average), or for quantiles of many runs (refweb sweep)",
+        STATISTICAL: _of_statistics(solution),
         MODEL: _of_model(result, solution.scene.cable),
         NO_LIMIT: "ask for its mean over a time (average = 0.01), which is an impulse",
     }
+
+
+def _of_statistics(solution):
+    """Sentence on what to ask instead of a number that chance decides."""
+    horizon = next((time for k, time in reversed(solution.horizon.get("digits", ())) if time is not None), None)
+    until = f" at t < {horizon:.3g} s" if horizon else ""
+    return f"ask for a result{until}, for a mean (average), or for quantiles of many runs (refweb sweep)"
 
 
 def _of_model(result, cable):
@@ -340,10 +362,10 @@ def _of_chaos(result, solution, spread):
 
     It stays wide where time steps are the largest part of ±, and runs from starts side by side say otherwise.
     """
-    divergence, remedy = solution.divergence, _remedies(result, solution, None)[STATISTICAL]
+    divergence = solution.divergence
     if spread is not None and result.verdict == STATISTICAL:
         mean = readable(spread["mean"], spread["deviation"], result.unit)
-        text = f"{mean} over runs from starts side by side; {remedy}"
+        text = f"{mean} over runs from starts side by side; {_of_statistics(solution)}"
         return result._replace(verdict_text=text)
     if spread is None and divergence is not None and result.verdict == WIDE and result.time >= divergence.lost:
         text = f"run and step refinement grow apart with {divergence.growth:.3g} 1/s and leave no digit from t = "

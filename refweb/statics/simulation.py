@@ -118,7 +118,7 @@ class Simulation:
             solution.passage = {**solution.passage, "lines": f"not certified: {self._lines.why}"}
             solution.lines = self._lines.deepest.plain()
         smoothed = self._smoothed(equilibrium, state, smoothing)
-        results = self._results(equilibrium, state, smoothed)
+        results = self._results(equilibrium, state, smoothed[: len(scene.observables)])
         row = [equilibrium.step, *(result.value for result in results.values()), *state.energies.values()]
         if not np.isfinite(row).all():
             bad = self.columns[np.isfinite(row).argmin()]
@@ -188,7 +188,7 @@ class Simulation:
                 ),
                 self.system,
             )
-            for o, value, error, moved in zip(observables, values, errors, smoothed, strict=False)
+            for o, value, error, moved in zip(observables, values, errors, smoothed, strict=True)
         }
 
     def _frame(self, folder):

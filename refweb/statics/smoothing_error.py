@@ -6,19 +6,15 @@ state, shows nine tenths of that.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from ..errors import SolverError
+from ..results.error_budget import SMOOTHING_SHARE
 from ..results.state import State
 from ..system.static_system import at_rest
 from .newton import Newton
 
-SHARE = 0.1
-"""Smoothing that is compared with, over that of the scene."""
-
 
 class Smoothing:
-    """The equilibria of a static scene with `SHARE` of its smoothing, one for each that is asked for.
+    """The equilibria of a static scene with `SMOOTHING_SHARE` of its smoothing, one for each that is asked for.
 
     Parameters
     ----------
@@ -29,10 +25,8 @@ class Smoothing:
     """
 
     def __init__(self, scene, more=()):
-        cable = scene.cable
-        groups = {name: less_smooth(group) for name, group in cable.groups.items()}
         self._observables = [*(o.observable for o in scene.observables), *more]
-        self._system = scene.replace(cable=replace(less_smooth(cable), groups=groups)).build()
+        self._system = scene.replace(cable=scene.cable.with_smoothing(SMOOTHING_SHARE)).build()
         self._newton = Newton(at_rest(self._system))
 
     def errors(self, equilibrium, values):
@@ -43,9 +37,5 @@ class Smoothing:
             return [None] * len(values)
         state = State(self._system, equilibrium_near.step, equilibrium_near.x)
         values_near = [o.of(state).value for o in self._observables]
-        return [abs(value - value_near) / (1.0 - SHARE) for value, value_near in zip(values, values_near, strict=True)]
-
-
-def less_smooth(table):
-    """A cable or a group of it with `SHARE` of its smoothing, where it has one."""
-    return table if table.smoothing is None else replace(table, smoothing=SHARE * table.smoothing)
+        rest = 1.0 - SMOOTHING_SHARE
+        return [abs(value - value_near) / rest for value, value_near in zip(values, values_near, strict=True)]

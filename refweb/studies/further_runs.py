@@ -26,12 +26,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..dynamics.budget import steps_with_twin
+from ..dynamics.budget import Spent, budget_of, steps_with_twin
 from ..dynamics.twin_error import largest_mean
 from ..errors import InputError, SolverError
 from ..net.tension_laws import SMOOTH
 from ..registry import EFFECTS, INTEGRATORS, name_of
-from ..results.error_budget import ALLOWED, SMOOTHED, first_touch, reasons_of, rubs
+from ..results.error_budget import ALLOWED, SMOOTHED, SMOOTHING_SHARE, first_touch, reasons_of, rubs
 from ..results.files import write_atomically, write_text
 from ..results.solution import as_history
 from ..results.strength import UTILISATION
@@ -39,16 +39,12 @@ from ..settings import Accuracy
 from .discretisation_error import MARGIN, left_of
 from .predictability import ensemble, horizon, lost_digits
 
-LEAST, RUNS = 600.0, 20.0
-"""Budget where none is given: this time [s], or so many times the cost of the first run, whichever is larger."""
 SURE = 1.1
 """Time that a run takes by its progress, over what is left, at which it is ended."""
 SEEN = 0.1
 """Share of a run that has to be done before it is judged by its progress."""
 STIFFER = (4.0, 16.0)
 """Stiffness of contact that is compared with, over that of the scene."""
-LESS = 0.1
-"""Smoothing that is compared with, over that of the scene."""
 SLOWER = 0.25
 """Slip velocity of friction that is compared with, over that of the scene."""
 MEMBERS, QUANTILE = 8, 2.5
@@ -61,10 +57,6 @@ FALLS, GROWS = 0.85, 1.5
 """Factors on a force of contact, with twice the elements and with 4 times the stiffness, below and above which it is
 that of a first touch: that has 0.71 and 2. Finer elements bring it down to what the web as a whole pushes back, stiffer
 contact drives it up without end: whoever refines both finds no limit."""
-
-
-class Spent(Exception):
-    """A run was ended because it would have cost more than what is left of the budget."""
 
 
 class Variant(NamedTuple):
@@ -117,8 +109,7 @@ class FurtherRuns:
         spent = clock.spent()
         first = max(spent["cpu_s"] - spent["compile_s"], 1e-3)
         self._single = first if self.static else first / steps_with_twin(simulation.scene)
-        given = scene.accuracy.budget
-        self.budget = max(LEAST, RUNS * first) if given is None else given
+        self.budget = budget_of(scene.accuracy.budget, first)
         self._compared = {None: (_results(solution), as_history(solution.columns, rows))}
 
     @property
@@ -277,7 +268,7 @@ SMOOTHER, SLIP = "a tenth of the smoothing", "a quarter of the slip velocity of 
 TELLING = (
     ("elements", FINER, 2.0),
     ("contact_stiffness", STIFFNESS, 2.0),
-    ("smoothing", (SMOOTHER,), SMOOTHED / (1.0 - LESS) / MARGIN),
+    ("smoothing", (SMOOTHER,), SMOOTHED / (1.0 - SMOOTHING_SHARE) / MARGIN),
     ("smoothing", (SLIP,), 1.0 / (1.0 - SLOWER)),
 )
 """Parts of the error, the runs that tell of each, and what a single one leaves over the change that it makes."""
@@ -301,11 +292,8 @@ def variants(scene, system, solution, single):
             price = single * (times**0.5 if explicit else 1.5)
             yield Variant("contact_stiffness", text, stiffer, price, STIFFNESS[0] if n else None)
     if not static and (system.net.laws == SMOOTH).any():
-        from ..statics.smoothing_error import less_smooth
-
-        groups = {name: less_smooth(group) for name, group in scene.cable.groups.items()}
-        cable = replace(less_smooth(scene.cable), groups=groups)
-        yield Variant("smoothing", SMOOTHER, plain.replace(cable=cable), single)
+        smoother = plain.replace(cable=scene.cable.with_smoothing(SMOOTHING_SHARE))
+        yield Variant("smoothing", SMOOTHER, smoother, single)
     if not static and (effects := slower_slip(scene)) is not None:
         yield Variant("smoothing", SLIP, plain.replace(effects=effects), single)
     if not static:
