@@ -65,6 +65,11 @@ def _probes_of_warnings(system, followed, step_size):
     return by_name
 
 
+def _correction(extremes, at, relative):
+    """Lower limit of ± of an extreme value by its number, see `Watch.corrections`."""
+    return max(float(extremes.corrections[at]), SPREAD * relative * abs(float(extremes.values[at])))
+
+
 def _shares_differ(net):
     """Tell if the line of the smallest margin of safety may be another one than that of the largest utilisation."""
     return net.allowed_share is not None and np.ptp(net.allowed_share[np.isfinite(net.strength)]) > 0.0
@@ -253,15 +258,13 @@ class Watch:
         tolerances, by unit, a displacement or a velocity: run and twin that agree more closely do so by chance. What a
         web at rest moves by is such a result.
         """
-        extremes, absolute = course.extremes, absolute or {}
+        absolute = absolute or {}
         limits = {o.name: SPREAD * absolute.get(o.unit, 0.0) for o in self._observables}
         for o in self._observables:
             if o.reduce != "final":
-                at = self._slot(o)
-                peak = max(float(extremes.corrections[at]), SPREAD * relative * abs(float(extremes.values[at])))
-                limits[o.name] = max(limits[o.name], peak)
+                limits[o.name] = max(limits[o.name], _correction(course.extremes, self._slot(o), relative))
             elif o.average is not None:
-                limits[o.name] = max(limits[o.name], float(extremes.corrections[self._slot(o)]))
+                limits[o.name] = max(limits[o.name], float(course.extremes.corrections[self._slot(o)]))
         return limits
 
     def drifts(self, course, twin, time):
@@ -329,11 +332,7 @@ class Watch:
 
     def share_corrections(self, course, relative=0.0):
         """Lower limits of ± of `shares`, by name, see `corrections`."""
-        extremes = course.extremes
-        return {
-            name: max(float(extremes.corrections[at]), SPREAD * relative * abs(float(extremes.values[at])))
-            for name, at in self._shares.items()
-        }
+        return {name: _correction(course.extremes, at, relative) for name, at in self._shares.items()}
 
     def strain(self, course):
         """Largest strain of all steps [1] and its line."""

@@ -144,10 +144,12 @@ def blocks(integrator, course, schedule, first=0):
         count = min(size, stop + 1 - first)
         began, rows = time.perf_counter(), times[first : first + count]
         between = schedule.between[(schedule.between > course.time) & (schedule.between < rows[-1])]
-        history = integrator.advance(course, np.sort(np.concatenate([rows, between])))
-        selected = np.isin(history.time, rows) | (len(schedule.between) == 0)
-        selected[-1] = True  # where an event ends the run, its row is that of the event
-        yield Block(first, history[selected], history)
+        history = compared = integrator.advance(course, np.sort(np.concatenate([rows, between])))
+        if len(between):
+            selected = np.isin(compared.time, rows)
+            selected[-1] = True  # where an event ends the run, its row is that of the event
+            history = compared[selected]
+        yield Block(first, history, compared)
         first += count
         spent = time.perf_counter() - began
         size = max(1, min(2 * size if spent < 0.5 * BLOCK else int(size * BLOCK / spent), MOST_ROWS))

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...kernels import Integers, Matrix, Record, Vector, kernel
+from .extremes import look_at
 
 if TYPE_CHECKING:
     from .extremes import Extremes
@@ -258,7 +259,7 @@ def look_for_means(
     slots = observed.windows.slots
     for n in range(slots.size):
         i = slots[n]
-        averages.within[n, part] = observed.probes[i](t, x, v, f, lines, observed.rows[i], observed.data[i], where)
+        averages.within[n, part] = look_at(i, t, x, v, f, lines, observed, where)
 
 
 @kernel(apart=("averages",))

@@ -184,6 +184,11 @@ class Deepest(NamedTuple):
         return values | ({"surface_error": error} if (error := self.body.shape.error) is not None else {})
 
     @property
+    def _percent(self):
+        """Overlap in per cent of the size that it is held against."""
+        return 100.0 * self.overlap * SHARE / self.allowed
+
+    @property
     def _size(self):
         return "the shortest line" if self.body.shape.ground else "its size"
 
@@ -221,16 +226,12 @@ class Deepest(NamedTuple):
             )
         elif self.too_deep:
             remedy = "there it starts" if self.at_start else self._remedy()
-            share = 100.0 * self.overlap * SHARE / self.allowed
-            text = f"line {self.line} is up to {self._where()}, {share:.3g} % of {self._size}; {remedy}"
+            text = f"line {self.line} is up to {self._where()}, {self._percent:.3g} % of {self._size}; {remedy}"
             yield Finding("deep-contact", text, "contact")
         elif self.overlap > max(NOTED * self.allowed / SHARE, DEEPER * self.initial) and not self.fixed:
-            share = 100.0 * self.overlap * SHARE / self.allowed
-            text = (
-                f"line {self.line} is up to {self._where()}, {share:.2g} % of {self._size}: results may move with the "
-            )
-            text += f"stiffness of contact; {self.enough:g} holds it to {100.0 * AIM * SHARE:g} %, and refweb trust "
-            yield Finding("soft-contact", text + "says by how much", "contact")
+            text = f"line {self.line} is up to {self._where()}, {self._percent:.2g} % of {self._size}: results may "
+            text += f"move with the stiffness of contact; {self.enough:g} holds it to {100.0 * AIM * SHARE:g} %, and "
+            yield Finding("soft-contact", text + "refweb trust says by how much", "contact")
 
     def _remedy(self):
         if self.fixed:

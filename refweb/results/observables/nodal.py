@@ -92,10 +92,9 @@ class Place(Nodal):
         if limits is None:
             return None
         shift = float((self.vectors(state) - state.position)[rows[0], axis])
-        value = float(
-            self.vectors(state)[rows[0], axis]
-        )  # which rounding may leave beside limits that are next to equal
+        value = float(self.vectors(state)[rows[0], axis])
         ends = sorted(float(limit) + shift for limit in limits)
+        # rounding may leave the value beside limits that are next to equal
         return min(ends[0], value), max(ends[1], value)
 
 
