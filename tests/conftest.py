@@ -3,9 +3,33 @@
 They compile without a second process: the workers of the tests fill the cores.
 """
 
+import fnmatch
 import os
 import pathlib
+
+import pytest
 
 _before = os.environ.get("PYTHONPATH")
 os.environ["PYTHONPATH"] = os.pathsep.join([str(pathlib.Path(__file__).parents[1]), *([_before] if _before else [])])
 os.environ.setdefault("REFWEB_COMPILERS", "1")
+
+MANY = 5000
+"""Number of tests from which on all files are collected whole, so that each variant that is named must be there."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark as slow the variants of a test that ``@pytest.mark.ordinary(...)`` does not name, by their ids or patterns.
+
+    The ordinary run keeps each value of each parameter in one variant at least; the slow one has all the others.
+    """
+    unused = {}
+    for item in items:
+        if (mark := item.get_closest_marker("ordinary")) is None:
+            continue
+        named = [pattern for pattern in mark.args if fnmatch.fnmatchcase(item.callspec.id, pattern)]
+        if not named:
+            item.add_marker(pytest.mark.slow)
+        unused.setdefault(item.nodeid.partition("[")[0], set(mark.args)).difference_update(named)
+    if len(items) > MANY and (wrong := {test: sorted(left) for test, left in unused.items() if left}):
+        raise pytest.UsageError(f"variants that are named ordinary and are not there: {wrong}")

@@ -2,14 +2,15 @@
 
 Attributes
 ----------
-MODULES : dict of ast.Module
-    What runs of each file, by the name of the module below the package.
+MODULES : mapping of ast.Module
+    What runs of each file, by the name of the module below the package; a file is parsed when it is first asked for.
 PACKAGES : set of str
     Names of those that are folders.
 """
 
 import ast
 import pathlib
+from collections.abc import Mapping
 
 import refweb
 
@@ -33,7 +34,26 @@ def parsed(path):
     return Running().visit(ast.parse(path.read_text(encoding="utf-8")))
 
 
-MODULES = {name_of(path): parsed(path) for path in sorted(ROOT.rglob("*.py"))}
+class _Modules(Mapping):
+    def __init__(self, files):
+        self._files, self._parsed = files, {}
+
+    def __getitem__(self, name):
+        if name not in self._parsed:
+            self._parsed[name] = parsed(self._files[name])
+        return self._parsed[name]
+
+    def __contains__(self, name):
+        return name in self._files
+
+    def __iter__(self):
+        return iter(self._files)
+
+    def __len__(self):
+        return len(self._files)
+
+
+MODULES = _Modules({name_of(path): path for path in sorted(ROOT.rglob("*.py"))})
 PACKAGES = {name_of(path) for path in ROOT.rglob("__init__.py")}
 
 

@@ -24,8 +24,13 @@ LONG = (
     "published_throw",
     "falling_net",
     "odds_of_capture",
+    "spin_deployment",
+    "spun_tight",
+    "tethered_web",
+    "coverage",
+    "trust",
 )
-"""Cases that take more than eight seconds with ``--quick``; what they show has tests of its own beside them."""
+"""Cases that take more than two seconds with ``--quick``; what they show has tests of its own beside them."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in cases.names()])

@@ -267,6 +267,7 @@ SHIPPED = {path.stem: tomllib.loads(path.read_text(encoding="utf-8")) for path i
 STATIC = sorted(name for name, given in SHIPPED.items() if given["solve"]["kind"] == "static")
 
 
+@pytest.mark.ordinary("square-load", "triangle-load", "catenary", "spun-tight")
 @pytest.mark.parametrize("name", STATIC)
 def test_shipped_scene_runs_by_name(here, capsys, name):
     given = SHIPPED[name]

@@ -64,6 +64,7 @@ def ball(**changes):
     return refweb.Body(**{**given, **changes})
 
 
+@pytest.mark.ordinary("central-difference", "adams", "ida")
 @pytest.mark.parametrize("solve", METHODS, ids=NAMES)
 def test_first_touch_of_a_flying_ball(solve):
     """It meets the line x = 0 at the height √(R² − 0.01²), and the whole web not before."""
@@ -86,6 +87,7 @@ def held_line(**changes):
     return dict(web=web, cable=cable(density=200.0), **changes)
 
 
+@pytest.mark.ordinary("central-difference", "adams")
 @pytest.mark.parametrize("solve", METHODS, ids=NAMES)
 def test_first_touch_of_falling_balls(solve):
     """√(2 h/g) each, and of any body the earlier; one that flies past touches nothing."""
@@ -116,6 +118,7 @@ def test_a_contact_that_is_there_at_the_start(solve):
         assert solution.history["time"][-1] == solution.state.time == (0.0 if stop else 0.01)
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("solve", SOME, ids=NAMES)
 def test_first_touch_in_a_turning_frame(solve):
     """A ball falls on a line along x that turns about z: seen from outside it flies straight on.
@@ -148,6 +151,7 @@ def test_first_touch_in_a_turning_frame(solve):
 # A line that snaps taut
 
 
+@pytest.mark.ordinary("*-central-difference", "smooth-adams", "tension-only-bdf")
 @pytest.mark.parametrize("solve", METHODS, ids=NAMES)
 @pytest.mark.parametrize("law", ["tension-only", "smooth"])
 def test_masses_that_fly_apart(solve, law):
@@ -220,6 +224,7 @@ STEP = 0.05 * 2.0  # of central differences at this safety, as a phase
 PLACE = refweb.Observe(name="x", quantity="displacement", node=1, component="x")
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("solve", SOME, ids=NAMES)
 def test_an_oscillator_passes_values(solve):
     """Upwards through ½a at asin(½)/ω, downwards through −½a at (π + asin(½))/ω; never through 2a; energies as well."""
@@ -287,6 +292,7 @@ STOPPED = [refweb.Event(name="down", kind="threshold", observe="x", value=-0.5 /
 DOWN = (np.pi + np.arcsin(0.5)) / RATE
 
 
+@pytest.mark.ordinary("central-difference", "ida")
 @pytest.mark.parametrize("solve", ROUGH, ids=NAMES)
 def test_a_run_stops_at_its_event(solve, tmp_path):
     """Last row, last frame, checkpoint and results are those of its time; what would have come later has not."""

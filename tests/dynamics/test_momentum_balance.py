@@ -104,6 +104,7 @@ def test_tables_are_integrated_exactly():
         assert integrate(t, data, 1, 2, 1) == pytest.approx(exact if t > points[0] else -exact, rel=1e-11, abs=1e-15)
 
 
+@pytest.mark.ordinary("supported-*", "free-central-difference", "free-explicit-*", "free-adams")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("supports", [None, FREE], ids=["supported", "free"])
 def test_gravity_and_a_hit(method, supports):
@@ -117,6 +118,7 @@ def test_gravity_and_a_hit(method, supports):
     assert turning is None if supports is None else turning <= (ROUNDING if method in EXPLICIT else allowed(1e-6))
 
 
+@pytest.mark.ordinary("1e-08-*", "0.0001-central-difference", "0.0001-explicit-*")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("width", [1e-4, 1e-8])
 def test_a_pulse(method, width):

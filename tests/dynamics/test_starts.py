@@ -392,6 +392,7 @@ def swing(duration, start="web", error="twin", **changes):
     )
 
 
+@pytest.mark.ordinary("keys0")
 @pytest.mark.parametrize("keys", [{"method": "central-difference"}, {"method": "cvode", "rtol": 1e-4}])
 def test_errors_go_on_with_the_state(keys, tmp_path):
     """30 periods, then a sixth of one: what the first leg is off counts in the second, whose own part is far less."""

@@ -119,6 +119,7 @@ def cloud(shape, count=300):
     return p[clear][:count]
 
 
+@pytest.mark.ordinary("box", "ring", "capsule")
 @pytest.mark.parametrize("shape", SHAPES)
 def test_depth_is_the_distance_from_the_surface(shape):
     """Against the least distance of tangent planes, inside and outside; the search is slow along creases of h."""
@@ -534,6 +535,7 @@ def wound(turns, share, friction=0.2, parts=16, pull=1.0):
     return solution.state.v[count - 1] @ ends[1]
 
 
+@pytest.mark.ordinary("1")
 @pytest.mark.parametrize("turns", [1, 2])
 def test_a_cable_holds_by_its_turns(turns):
     """It holds if and only if 2π n μ > ln(T₂/T₁): below, it creeps, within ten slip velocities; above it slides.

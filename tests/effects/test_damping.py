@@ -104,6 +104,7 @@ def test_restitution(zeta):
     assert restitutions[-1] < 0.5 * share**2 and slope(restitutions, safeties) > 1.8
 
 
+@pytest.mark.ordinary("0.1-Cvode", "2.0-Ida")
 @pytest.mark.parametrize("method", [Cvode, Ida])
 @pytest.mark.parametrize("zeta", [0.1, 0.5, 2.0])
 def test_restitution_by_implicit_steps(method, zeta):
@@ -150,6 +151,7 @@ def by_formula(zeta, law, gap, end, slackness=0.0, smoothing=0.0):
     return [*y, tension(y)]
 
 
+@pytest.mark.ordinary("smooth")
 @pytest.mark.parametrize("law", ["smooth", "linear"])
 def test_other_laws(law):
     """Of order 2 on the way out and back, and right where the smooth law is at its floor, and the linear one pushes."""
@@ -268,6 +270,7 @@ def test_decay_of_a_longitudinal_mode(law, kind):
     assert abs(slope(error, 1.0 / nsteps) - 2.0) < 0.05 and abs(slope(drift, 1.0 / nsteps) - 2.0) < 0.05
 
 
+@pytest.mark.ordinary("2-True-Cvode", "3-False-Ida")
 @pytest.mark.parametrize("method", [Cvode, Ida])
 @pytest.mark.parametrize("order, consistent", nets.some([(2, True), (1, False), (3, False), (2, False)], 2))
 def test_decay_at_every_order(method, order, consistent):

@@ -265,6 +265,7 @@ def test_free_particle_order_two():
     assert abs(slope(position, 1.0 / counts) - 2.0) < 0.05 and abs(slope(drift, 1.0 / counts) - 2.0) < 0.05
 
 
+@pytest.mark.ordinary("cvode", "cvode adams", "cvode block", "ida", "ida block")
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_free_particle(solver):
     system, v, path = free_particles()
@@ -346,6 +347,7 @@ def test_spinning_web_from_inside_and_from_outside():
     assert np.abs(found[0]).max() > 0.05 and abs(slope(errors, 1.0 / counts) - 2.0) < 0.1
 
 
+@pytest.mark.ordinary("cvode block")
 @pytest.mark.parametrize("solver", ["cvode block", "ida block"])
 def test_spinning_web_with_consistent_mass(solver):
     """Centrifugal and Coriolis forces are those of the consistent mass matrix: the motion is the same from outside."""

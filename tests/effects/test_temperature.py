@@ -115,6 +115,7 @@ def moving(effect, web=None, **solve):
     return found.replace(observe=observe, output=refweb.Output(interval=1e-3))
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("method", nets.some(["central-difference", "cvode", "ida"], 2))
 def test_heat_is_a_reel_of_every_line(method):
     """The same factor of natural length by either effect, for every method; methods agree within the sum of their ±."""

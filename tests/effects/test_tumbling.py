@@ -225,23 +225,31 @@ def test_explicit_orders(order):
     assert found == pytest.approx(order, abs=0.4), errors
 
 
-def test_implicit_methods_follow():
+@pytest.fixture(scope="module")
+def exact():
+    return refweb.run(trap(method="explicit", order=6, step_size=0.5 / 400)).state
+
+
+IMPLICIT = {
+    "adams": dict(method="cvode", family="adams", rtol=1e-8),
+    "cvode block": dict(method="cvode", rtol=1e-7, linear_solver="block"),
+    "cvode sparse": dict(method="cvode", rtol=1e-7, linear_solver="sparse"),
+    "ida block": dict(method="ida", rtol=1e-7, linear_solver="block"),
+    "ida": dict(method="ida", rtol=1e-7),
+}
+
+
+@pytest.mark.ordinary("adams", "cvode sparse", "ida block")
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_implicit_methods_follow(name, exact):
     """CVODE and IDA, by each kind of linear solver, against explicit steps of order 6."""
-    exact = refweb.run(trap(method="explicit", order=6, step_size=0.5 / 400)).state
     (body,) = exact.system.net.bodies
-    for keys in (
-        dict(method="cvode", family="adams", rtol=1e-8),
-        dict(method="cvode", rtol=1e-7, linear_solver="block"),
-        dict(method="cvode", rtol=1e-7, linear_solver="sparse"),
-        dict(method="ida", rtol=1e-7, linear_solver="block"),
-        dict(method="ida", rtol=1e-7),
-    ):
-        state = refweb.run(trap(**keys)).state
-        error = 1e-7 if "family" in keys else 2e-5  # of order 2
-        np.testing.assert_allclose(state.x, exact.x, rtol=0, atol=error, err_msg=str(keys))
-        np.testing.assert_allclose(state.v, exact.v, rtol=0, atol=60 * error, err_msg=str(keys))
-        q = [1.0 + state.x[body.turn, 0], *state.x[body.spin]]
-        assert np.linalg.norm(q) == pytest.approx(1.0, abs=1e-15)
+    state = refweb.run(trap(**IMPLICIT[name])).state
+    error = 1e-7 if name == "adams" else 2e-5  # of order 2
+    np.testing.assert_allclose(state.x, exact.x, rtol=0, atol=error)
+    np.testing.assert_allclose(state.v, exact.v, rtol=0, atol=60 * error)
+    q = [1.0 + state.x[body.turn, 0], *state.x[body.spin]]
+    assert np.linalg.norm(q) == pytest.approx(1.0, abs=1e-15)
 
 
 def caught(friction=0.3, **changes):

@@ -53,6 +53,7 @@ def net(points=None, cells=None, **data):
     return meshio.Mesh(points, cells or [("line", [[0, 1], [1, 2], [2, 3]])], **data)
 
 
+@pytest.mark.ordinary("0-*", "1-*")
 @pytest.mark.parametrize("suffix", [".vtu", ".vtk", ".msh"])
 @pytest.mark.parametrize("seed", range(5))
 def test_spoilt_web_files(tmp_path, capsys, suffix, seed):

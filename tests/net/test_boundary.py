@@ -1,6 +1,7 @@
 """Solids that a surface bounds: read, checked, mended and weighed, and the field of their depth."""
 
 import math
+import re
 
 import meshio
 import numpy as np
@@ -309,18 +310,40 @@ def test_walls_are_measured():
     assert field_of(*solids.tetrahedron(edge), 64).thickness == pytest.approx(inner, rel=0.1)
 
 
-def test_a_thin_wall_asks_for_a_finer_grid(tmp_path, monkeypatch):
+def test_a_thin_wall_asks_for_a_finer_grid(tmp_path):
     plate = solids.box([0.5, 0.5, 0.02])
-    with pytest.raises(
-        refweb.InputError, match=r"grid = 24 has cells of 0.0208 m, and walls .* give grid = \d+ or more"
-    ):
-        _ = mesh(tmp_path / "plate.obj", plate, grid=24).solid
-    fine = mesh(tmp_path / "plate.obj", plate).solid.field
+    body = mesh(tmp_path / "plate.obj", plate)
+    fine = body.solid.field
     assert fine.thickness >= 2.0 * fine.spacing and fine.thickness == pytest.approx(0.01, rel=0.15)
+    assert fine.offset == 0.0 and not body.remarks()
+
+
+@pytest.mark.parametrize("thick", [0.02, 1e-5])
+def test_a_wall_too_thin_for_its_grid_is_thickened(thick, tmp_path):
+    """The body is the plate with all that is nearer than the offset: depth is offset − distance from the plate."""
+    size = np.array([0.5, 0.5, thick])
+    body = mesh(tmp_path / "plate.obj", solids.box(size), grid=24)
+    field = body.solid.field
+    (text,) = body.remarks()
+    assert re.search(r"thinner than 4 cells of its grid, 0.083 m: the body is 0.0\d+ m thicker .* grid = 48 ", text)
+    places = np.random.default_rng(5).uniform(-1.0, 1.0, (500, 3)) * (0.5 * size + 1.8 * field.offset)
+    beyond = np.abs(places) - 0.5 * size
+    distance = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    near = (distance > 0.5 * field.offset) & (distance < 1.5 * field.offset)
+    deep, _ = field.at(places[near])
+    # A spline smooths the bend of depth about a wall within a cell and a half of it.
+    assert near.sum() > 100 and np.abs(deep - field.offset + distance[near]).max() < 0.15 * field.spacing
+    assert field.thickness >= 2.0 * field.spacing
+    middle, _ = field.at(np.zeros((1, 3)))
+    assert middle[0] > 1.5 * field.spacing
+    assert body.grown().core[2] >= 0.5 * thick + field.offset  # nothing of it lies beyond the box that is searched
+    assert body.error == pytest.approx(field.offset, rel=0.3)
+
+
+def test_a_foil_has_a_field_without_a_grid_that_is_given(tmp_path, monkeypatch):
     monkeypatch.setattr(filled, "MOST", 200_000)
-    foil = solids.box([0.5, 0.5, 1e-5])
-    with pytest.raises(refweb.InputError, match="thicken the walls"):
-        _ = mesh(tmp_path / "foil.obj", foil).solid
+    body = mesh(tmp_path / "foil.obj", solids.box([0.5, 0.5, 1e-5]))
+    assert body.solid.field.offset < 0.03 and len(body.remarks()) == 1
 
 
 def test_a_grid_that_does_not_fit_is_refused_beforehand(tmp_path, monkeypatch):

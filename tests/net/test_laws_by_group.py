@@ -80,6 +80,7 @@ def test_a_strut_ends_the_convex_bound_and_the_result_says_so():
     assert not any("bars push" in text for text in pulled.warnings)
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize(
     "solve",
     nets.some(

@@ -58,6 +58,7 @@ FLYING = [(effect, method) for effect in ALONE for method in METHODS if method !
 """Steps of high order take nothing that depends on velocity."""
 
 
+@pytest.mark.ordinary("gravity-central-difference", "gravity-ida", "frame-*", "orbit-*", "drag-*")
 @pytest.mark.parametrize("effect, method", FLYING)
 def test_a_body_that_touches_nothing_feels_no_contact(effect, method):
     """A ball flies above a web; forces on it are 9.4 mN of drag, newtons of weight, and change their sign."""
@@ -130,6 +131,7 @@ LAWS = {"linear": {}, "losses": {"friction": 0.3, "damping": 0.1}, "of Hertz": {
 GRAZED = [(law, method) for law in LAWS for method in METHODS if (law, method) != ("losses", "order 4")]
 
 
+@pytest.mark.ordinary("linear-*", "of Hertz-cvode")
 @pytest.mark.parametrize("law, method", some(GRAZED, 3))
 def test_impulse_of_contact_is_momentum(method, law):
     """A ball grazes a string: nothing else acts on it.
@@ -146,6 +148,7 @@ def test_impulse_of_contact_is_momentum(method, law):
     np.testing.assert_allclose(impulse, momentum, rtol=0, atol=2e-3 * np.linalg.norm(momentum))
 
 
+@pytest.mark.ordinary("central-difference", "ida")
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "order 4"])
 def test_impulse_of_bodies_on_each_other_is_momentum(method):
     """Two balls of unlike mass meet beside a web, and rub: each gains what the other loses."""
@@ -193,6 +196,7 @@ def test_where_a_body_is_touched_most(method):
 # Whom an event means
 
 
+@pytest.mark.ordinary("central-difference", "order 4", "cvode")
 @pytest.mark.parametrize("method", METHODS)
 def test_what_a_body_touches(method):
     """Two balls meet at (0.3 − 0.2)/2 s far from the web, and the third one falls on it at (0.15 − 0.1)/1 s."""

@@ -36,6 +36,7 @@ def residual(system, state):
     return np.linalg.norm(force, axis=1).max() / max(1.0, state.tension.max())
 
 
+@pytest.mark.ordinary("triangle")
 @pytest.mark.parametrize("mesh", MESHES)
 def test_tensions_agree_within_both_certificates(mesh):
     """Each certificate bounds the distance to the one exact tension, so that their sum bounds the difference."""

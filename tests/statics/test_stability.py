@@ -300,15 +300,15 @@ def kinds(seeds, **sizes):
 
 
 def test_random_nets():
-    """The word is right in all that are found: 3 s of CPU."""
-    found = kinds(range(100))
-    assert found["stable"] + found["grows"] + found["held"] >= 90 and not found["undecided"]
-    assert found["grows"] >= 15 and found["held"] >= 1 and found["marginal"] <= 5
+    """The word is right in all that are found."""
+    found = kinds(range(40))
+    assert found["stable"] + found["grows"] + found["held"] >= 36 and not found["undecided"]
+    assert found["grows"] >= 5 and found["marginal"] <= 2
 
 
 @pytest.mark.slow
 def test_many_random_nets():
-    found = kinds(range(100, 3000))
+    found = kinds(range(40, 3000))
     assert found["grows"] >= 300 and found["held"] >= 20 and not found["undecided"]
 
 

@@ -83,6 +83,7 @@ def deflection(mesh, found):
     return found.x[paper_web(mesh).centre, 2]
 
 
+@pytest.mark.ordinary("square-*", "triangle-*", "hexagon-0.0")
 @pytest.mark.parametrize("smoothing", EACH)
 @pytest.mark.parametrize("mesh", MESHES)
 def test_paper_webs_from_flat(mesh, smoothing):
@@ -111,6 +112,7 @@ def test_paper_webs_compared(smoothing, step):
     assert found["hexagon"].tension.max() < found["square"].tension.max() < found["triangle"].tension.max()
 
 
+@pytest.mark.ordinary("triangle", "square")
 @pytest.mark.parametrize("mesh", MESHES)
 def test_smoothing_converges_to_tension_only_at_first_order(mesh):
     """|deflection(η) − deflection(0)| ~ η, of order 1 without a logarithm.

@@ -142,7 +142,9 @@ class Field:
         Largest depth or distance that it has on the surface, where it should be 0 [m]: at corners, on edges and in the
         middle of triangles.
     thickness : float
-        Least distance from the middle of a wall to its surface [m], see `thickness_of`.
+        Least depth that it has in the middle of a wall [m], see `_thickness`.
+    offset : float
+        Distance from the surface to where depth is 0, outside of it [m].
     """
 
     numbers: np.ndarray
@@ -150,6 +152,7 @@ class Field:
     counts: tuple
     error: float
     thickness: float
+    offset: float
 
     @property
     def margin(self):
@@ -168,12 +171,12 @@ class Field:
         return result[:, 0], result[:, 1:]
 
 
-def field_of(points, triangles, cells, around=AROUND, known=None, winding=None):
+def field_of(points, triangles, cells, around=AROUND, known=None, winding=None, offset=0.0):
     """The `Field` of the solid that a surface bounds, with so many cells along its longest side.
 
-    So many points of the grid stand ``around`` it. Of a wider one error and thickness are those of ``known``, a field.
-    Where the surface is the boundary of a `refweb.net.boundary.repair.Repaired` solid, its ``winding`` tells what is
-    inside.
+    So many points of the grid stand ``around`` it. Of a wider one error, thickness and offset are those of ``known``, a
+    field. Where the surface is the boundary of a `refweb.net.boundary.repair.Repaired` solid, its ``winding`` tells
+    what is inside. An ``offset`` [m] makes the solid thicker by as much on each side.
 
     Raises
     ------
@@ -182,18 +185,21 @@ def field_of(points, triangles, cells, around=AROUND, known=None, winding=None):
     """
     low, size = points.min(axis=0), np.ptp(points, axis=0)
     h = float(size.max()) / cells
+    if known is not None:
+        offset = known.offset
+    around += int(np.ceil(offset / h))
     counts = np.ceil(size / h).astype(np.int64) + 1 + 2 * around
     shape = tuple(counts.tolist())
     memory.check(BYTES * float(np.prod(counts.astype(float))), f"the {' × '.join(map(str, shape))} points of its grid")
     origin = low + 0.5 * size - 0.5 * h * (counts - 1)
-    deep = _depths(points, triangles, origin, h, shape, winding)
-    head = [*origin, 1.0 / h, *counts, (around - 1) * h]
+    deep = _depths(points, triangles, origin, h, shape, winding) + offset
+    head = [*origin, 1.0 / h, *counts, (around - 1) * h - offset]
     numbers = np.concatenate([head, _coefficients(deep).ravel()])
-    field = Field(numbers, h, shape, 0.0, 0.0)
+    field = Field(numbers, h, shape, 0.0, 0.0, offset)
     if known is not None:
         return replace(field, error=known.error, thickness=known.thickness)
-    error = np.abs(field.at(places_on(points, triangles))[0]).max()
-    return replace(field, error=float(error), thickness=_thickness(field, points, triangles))
+    error = max(np.abs(field.at(places_on(points, triangles))[0]).max(), offset)
+    return replace(field, error=float(error), thickness=_thickness(field, points, triangles) + offset)
 
 
 def _depths(points, triangles, origin, h, shape, winding):

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import InputError
 from ...tables import Several
 from ..rigid_body import Grown, Shape, axes_of
 
@@ -128,8 +127,8 @@ class Filled(Shape):
         return self.solid.points, self.solid.triangles
 
     def remarks(self):
-        """Remarks on repairs of its file."""
-        return self.solid.remarks
+        """Remarks on repairs of its file, and on walls that are thickened."""
+        return *self.solid.remarks, *on_thin_walls(self.solid.field)
 
     def texts(self):
         """Texts on its size, its centre of mass in the file, and the error of its field at the surface."""
@@ -146,7 +145,11 @@ class Filled(Shape):
 
 
 def field_in(points, triangles, grid, winding=None, fewest=GRID):
-    """The field of the solid in a surface, of a grid that is fine enough for its walls; ``fewest`` cells by default."""
+    """The field of the solid in a surface, with ``grid`` cells, or as many as its walls ask for, from ``fewest`` on.
+
+    Walls that are too thin for a grid that is given, or for the finest that is chosen, are thickened: the whole solid
+    grows by an offset, so that depth is a distance still and the middle of each wall has `WALL` cells on each side.
+    """
     from ..boundary.field import field_of
 
     cells = grid or fewest
@@ -155,10 +158,17 @@ def field_in(points, triangles, grid, winding=None, fewest=GRID):
         if field.thickness >= WALL * field.spacing:
             return field
         more = min(max(1.1 * WALL * field.spacing / max(field.thickness, field.spacing), 1.25), 2.0)
-        finer, remedy = int(np.ceil(more * cells)), "or " if winding is None else 'take surface = "hull", or '
-        if grid or np.prod(np.array(field.counts, dtype=float)) * more**3 > MOST:
-            raise InputError(
-                f"grid = {cells} has cells of {field.spacing:.3g} m, and walls {2.0 * field.thickness:.3g} m thin need "
-                f"{2.0 * WALL:g} of them: give grid = {finer} or more, {remedy}thicken the walls"
-            )
-        cells = finer
+        if grid or math.prod(field.counts) * more**3 > MOST:
+            offset = (WALL + 0.5) * field.spacing - field.thickness
+            return field_of(points, triangles, cells, winding=winding, offset=offset)
+        cells = int(np.ceil(more * cells))
+
+
+def on_thin_walls(field):
+    """A remark on the walls of a solid that are thickened, or none."""
+    if field.offset > 0.0:
+        cells = max(field.counts) - 3 - round(2.0 * (field.margin + field.offset) / field.spacing)
+        yield (
+            f"some walls are thinner than {2.0 * WALL:g} cells of its grid, {2.0 * WALL * field.spacing:.2g} m: "
+            f"the body is {field.offset:.2g} m thicker on all sides; grid = {2 * cells} takes half of that"
+        )

@@ -72,8 +72,8 @@ class Mesh(Filled):
         Raises
         ------
         InputError
-            For a file that cannot be read or whose surface has no inside, a size that no body has, and a grid that is
-            too coarse for its walls or does not fit into memory.
+            For a file that cannot be read or whose surface has no inside, a size that no body has, and a grid that
+            does not fit into memory.
         """
         path = Path(self.file)
         try:

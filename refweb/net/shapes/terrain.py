@@ -75,8 +75,8 @@ class Terrain(Filled):
         Raises
         ------
         InputError
-            For a file that cannot be read or whose surface has two heights at a place, and a grid that is too coarse or
-            does not fit into memory.
+            For a file that cannot be read or whose surface has two heights at a place, and a grid that does not
+            fit into memory.
         """
         path = Path(self.heights)
         try:

@@ -116,6 +116,7 @@ CASES += [("adams", 12, "block", order, mass) for order in (1, 2, 3) for mass in
 CASES += [("adams", 12, "dense", 3, True), ("adams", 12, "sparse", 2, False)]
 
 
+@pytest.mark.ordinary("bdf-*", "adams-12-fixed-point-*", "adams-12-block-*")
 @pytest.mark.parametrize("family, highest, linear_solver, order, consistent", nets.some(CASES, 3))
 def test_error_falls_with_the_tolerance(family, highest, linear_solver, order, consistent):
     system, tolerances = small([PUSH], order=order, consistent=consistent, size=3), TOLERANCES[highest]
@@ -356,6 +357,7 @@ def pushed(times):
     return np.interp(times, fine, whole)
 
 
+@pytest.mark.ordinary("adams-consistent")
 @pytest.mark.parametrize(
     "family, mass", nets.some([("bdf", "lumped"), ("adams", "lumped"), ("adams", "consistent")], 2)
 )
@@ -743,6 +745,7 @@ def test_a_run_that_would_not_end(monkeypatch):
 NAMED = [*((Cvode, name) for name in SOLVERS), *((Ida, name) for name in ("block", "sparse", "dense"))]
 
 
+@pytest.mark.ordinary("Cvode-sparse", "*-block", "*-dense", "*-fixed-point")
 @pytest.mark.parametrize("method, linear_solver", NAMED)
 def test_a_number_that_is_not_finite_is_named(capfd, monkeypatch, method, linear_solver):
     """Where the forces on a node have no value from some time on, no step is taken over it."""
@@ -784,6 +787,7 @@ def test_consistent_mass_has_no_sparse_jacobian():
         Cvode(small(consistent=True), linear_solver="sparse")
 
 
+@pytest.mark.ordinary("cvode")
 @pytest.mark.parametrize("method", ["cvode", "ida"])
 def test_peaks_between_steps(method):
     """A mass on a spring, thrown along it: v/ω and t = π/2ω; the solver looks at it every 5 ms."""
