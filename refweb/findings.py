@@ -25,6 +25,7 @@ CODES = {
     "lines-in-doubt": "Lines may have passed through lines.",
     "loose-nodes": "Positions that the equilibrium leaves open.",
     "lowest-in-doubt": "Other equilibria may be lower.",
+    "material": "Values of the cable that its material gives, which are typical ones.",
     "mesh-file": "Lines of a file that lie on each other, or nodes that coincide.",
     "method-changed": 'Method = "auto" goes on with another method.',
     "moved-at-start": "Nodes that are elsewhere at the start than their places.",

@@ -271,6 +271,11 @@ def notices(scene, system):
         from .net.mesh_file import remarks
 
         yield from remarks(system.net.web)
+
+    from .net.materials import remarks as remarks_on_materials
+
+    for text in remarks_on_materials(scene.cable):
+        yield Finding("material", text, "cable", NOTE)
     for body in system.net.bodies:
         for text in body.shape.remarks():
             yield Finding("surface", f'body "{body.name}": {text}', "body")

@@ -353,12 +353,13 @@ class Table:
     """Base of all tables: checks its fields when made, and reads itself from a dict.
 
     Subclasses have `table` above them and fields made by the functions above. ``check`` may refuse combinations of
-    values; ``several`` says whether a scene may have more than one, ``[[load]]``, and ``excludes`` names tables that it
-    does not stand beside.
+    values; ``several`` says whether a scene may have more than one, ``[[load]]``, ``excludes`` names tables that it
+    does not stand beside, and ``either`` lists sets of keys of which one must be there.
     """
 
     several = False
     excludes = ()
+    either: ClassVar[tuple[tuple[str, ...], ...]] = ()
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __post_init__(self):

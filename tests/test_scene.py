@@ -418,7 +418,7 @@ WRONG = [
     ("tite", "x", 'tite = "x": unknown table or key, did you mean "title"?'),
     ("quux", {"a": 1}, "[quux]: unknown table or key, known: schema, title, seed, web"),
     ("links", [{"nodes": [0, 1]}], "[[links]]: unknown table or key"),
-    ("cable.groups", {"end": {"order": 2}}, "[cable] groups.end order = 2: unknown key, known: law, modulus"),
+    ("cable.groups", {"end": {"order": 2}}, "[cable] groups.end order = 2: unknown key, known: law, material, modulus"),
     ("solve.start", "equilibrium", '[solve] start = "equilibrium": unknown key, known: kind, method, load_steps, mass'),
     ("solve.duration", 0.25, "[solve] duration = 0.25: unknown key"),
     ("solve.rtol", 1e-6, "[solve] rtol = 1e-06: unknown key, known: kind, method, load_steps"),

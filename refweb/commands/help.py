@@ -1,9 +1,14 @@
 """Print what a table of a scene file may hold, or what a term means."""
 
+import textwrap
+
 
 def add_arguments(parser):
     """Declare the table, or term, and the format."""
-    text = "such as gravity, web.cable, solve.dynamic; a term, or glossary for all (default: a line for each table)"
+    text = (
+        "such as gravity, web.cable, solve.dynamic; a term, or glossary for all; materials "
+        "(default: a line for each table)"
+    )
     parser.add_argument("table", nargs="?", metavar="TABLE", help=text)
     parser.add_argument("--markdown", action="store_true", help="the whole reference, as Markdown")
 
@@ -18,6 +23,11 @@ def run(arguments):
         print(as_markdown(), end="")
     elif arguments.table is None:
         print(overview())
+    elif arguments.table == "materials":
+        from ..net.materials import as_text as as_table
+        from ..reference.words import MATERIALS_TEXT
+
+        print(f"{as_table()}\n\n{textwrap.fill(MATERIALS_TEXT.replace('`', ''), 100)}")
     elif arguments.table in names() or (text := explained(arguments.table)) is None:
         print(as_text(arguments.table))
     else:

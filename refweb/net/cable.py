@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from ..errors import InputError
 from ..messages import quote
 from ..tables import LARGEST, Table, by_group, choice, integer, real, table
 from .groups import givers
+from .materials import FILLED, MATERIALS
 from .tension_laws import NAMES, SMOOTH
 
 SMOOTH_LAW = {"slackness": 0.0, "smoothing": 1e-5}
@@ -25,6 +27,8 @@ class Group(Table):
     ----------
     law : {"smooth", "tension-only", "linear"}, optional
         Tension law; of the smooth one ε0 = 0 and η = 1e-5 where the cable has another and the group none of its own.
+    material : str, optional
+        As for `Cable`: modulus, density and strength of the group where it has none of its own.
     modulus : float, optional
         Asymptotic modulus E [Pa], > 0.
     area : float, optional
@@ -54,6 +58,7 @@ class Group(Table):
     """
 
     law: str | None = choice(*NAMES, default=None)
+    material: str | None = choice(*MATERIALS, default=None)
     modulus: float | None = real(default=None, above=0, unit="Pa")
     area: float | None = real(default=None, above=0, unit="m²")
     density: float | None = real(default=None, **_DENSE)
@@ -63,6 +68,10 @@ class Group(Table):
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float | None = real(default=None, above=0, unit="1")
     knot_factor: float | None = real(default=None, above=0, at_most=1, unit="1")
+
+    def check(self):
+        """Fill in what the material gives."""
+        _fill(self)
 
     def filled(self):
         """The group with the smooth law's parameters where it has none."""
@@ -78,12 +87,15 @@ class Cable(Table):
     law : {"smooth", "tension-only", "linear"}
         Tension law, see `refweb.net.tension_laws`. Groups may have others: struts beside cables. Lines that can push
         end the proven bound that statics has where all lines are tension-only.
+    material : str, optional
+        Gives the modulus, the density and the strength where these keys are absent: typical values of a fibre or rope,
+        which ``refweb help materials`` lists with their sources. A braid is softer and weaker than its fibre.
     modulus : float
-        Asymptotic modulus E [Pa], > 0.
+        Asymptotic modulus E [Pa], > 0; may be left out beside a material.
     area : float
         Cross section A [m²], > 0.
     density : float
-        ρ [kg/m³], ≥ 0; mass follows natural length.
+        ρ [kg/m³], ≥ 0; mass follows natural length. May be left out beside a material.
     slackness, smoothing : float
         Of the smooth law: the strain ε0 at which lines become taut, and the width η of the passage from slack to taut
         [1]; 0 and 1e-5 by default.
@@ -121,10 +133,13 @@ class Cable(Table):
         density = 200.0
     """
 
+    either = ("modulus", "density"), ("material",)
+
     law: str = choice(*NAMES, default="smooth")
-    modulus: float = real(above=0, unit="Pa")
+    material: str | None = choice(*MATERIALS, default=None)
+    modulus: Any = real(default=None, above=0, unit="Pa")
     area: float = real(above=0, unit="m²")
-    density: float = real(**_DENSE)
+    density: Any = real(default=None, **_DENSE)
     slackness: float | None = real(default=None, at_least=0, unit="1")
     smoothing: float | None = real(default=None, at_least=0, unit="1")
     prestrain: float = real(default=0.0, above=-1, unit="1")
@@ -136,7 +151,13 @@ class Cable(Table):
     groups: dict = by_group(Group, "cable", default_factory=dict)
 
     def check(self):
-        """Fill in the smooth law's parameters; refuse them for other laws."""
+        """Fill in what the material gives and the smooth law's parameters; refuse the latter for other laws."""
+        _fill(self)
+        for key, unit in (("modulus", "Pa"), ("density", "kg/m³")):
+            if getattr(self, key) is None:
+                raise InputError(
+                    f"{key} is missing: give {key} = ... [{unit}] or a material, see refweb help materials"
+                )
         for owner in (self, *self.groups.values()):
             for key in SMOOTH_LAW:
                 law, value = owner.law or self.law, getattr(owner, key)
@@ -190,7 +211,7 @@ class Cable(Table):
         """Values that the cable and its groups give to each line, by key."""
         given, values = givers(web.groups, self.groups, len(web.lines), "[cable.groups]"), {}
         missing = {"strength": np.inf, "slackness": 0.0, "smoothing": 0.0}
-        for key in (f.name for f in fields(Group)):
+        for key in (f.name for f in fields(Group) if f.name != "material"):
             values[key] = np.full(len(web.lines), _number(self, key, missing))
             for number, group in enumerate(self.groups.values()):
                 if key in given and getattr(group, key) is not None:
@@ -205,6 +226,13 @@ class Cable(Table):
                 )
             values[key][plain] = 0.0
         return values
+
+
+def _fill(table):
+    """Set the keys of a cable or a group that are absent to the values of its material."""
+    for key in FILLED if table.material else ():
+        if getattr(table, key) is None:
+            object.__setattr__(table, key, getattr(MATERIALS[table.material], key))
 
 
 def _smoothed(table, share):

@@ -78,7 +78,8 @@ def _table(kind, *more, fixed=None, without=(), optional=(), like=None) -> dict:
             if f.default is MISSING and f.default_factory is MISSING and f.name not in fixed:
                 required.append(key_of(f))
     schema_found = {"type": "object", "description": summary(kind), "properties": properties}
-    return schema_found | ({"required": required} if required else {}) | {"additionalProperties": False}
+    either = {"anyOf": [{"required": [*keys]} for keys in kind.either]} if kind.either else {}
+    return schema_found | ({"required": required} if required else {}) | either | {"additionalProperties": False}
 
 
 def _described(f, text):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
+from ..net import materials
 from . import glossary
 from .pages import header_of, line_of, names, pages_of
 
@@ -17,6 +18,12 @@ RULES = (
     "scene file with the line `#:schema ./refweb.schema.json`.",
 )
 """What holds for all tables."""
+MATERIALS_TEXT = (
+    "`[cable] material` and `[cable.groups.NAME] material` take modulus, density and strength from this table where a "
+    "scene does not give them. Values are typical ones of new, dry fibres at room temperature; a braid or a twisted "
+    "rope of them is softer and weaker."
+)
+"""Text above the table of materials."""
 
 
 def overview():
@@ -25,7 +32,8 @@ def overview():
     width = max(map(len, lines))
     listed = [f"{header:{width}}  {line}" for header, line in lines.items()]
     hint = "refweb help TABLE says what a table may hold, such as refweb help web"
-    return "\n".join([*listed, "", hint, "refweb help glossary explains terms"])
+    more = ["refweb help glossary explains terms", "refweb help materials lists materials"]
+    return "\n".join([*listed, "", hint, *more])
 
 
 def as_text(name, width=100):
@@ -67,7 +75,8 @@ def as_markdown():
         for page in pages:
             parts += [f"### `{page.header}`"] if page.name != name else []
             parts += _markdown(page)
-    return "\n\n".join([*parts, glossary.as_markdown()]) + "\n"
+    parts += ["## Materials", MATERIALS_TEXT, materials.as_markdown(), glossary.as_markdown()]
+    return "\n\n".join(parts) + "\n"
 
 
 def _markdown(page):

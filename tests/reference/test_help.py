@@ -141,7 +141,7 @@ def test_the_reference_is_what_help_prints():
 def test_markdown_has_all_of_it(capsys):
     assert main(["help", "--markdown"]) == 0
     text = capsys.readouterr().out
-    assert text == as_markdown() and text.count("\n## ") == len(names()) + 1
+    assert text == as_markdown() and text.count("\n## ") == len(names()) + 2  # materials and the glossary
     for page in PAGES.values():
         assert page.summary in text and page.example in text
         assert all(f"| `{key.name}` | " in text for key in page.keys)
@@ -152,7 +152,8 @@ def test_markdown_has_all_of_it(capsys):
 
 def test_overview_has_a_line_for_each_table(capsys):
     assert main(["help"]) == 0
-    *lines, empty, hint, glossary = capsys.readouterr().out.splitlines()
+    *lines, empty, hint, glossary, materials = capsys.readouterr().out.splitlines()
+    assert "help materials" in materials
     assert len(lines) == len(names()) and empty == "" and "refweb help TABLE" in hint and "help glossary" in glossary
     for line, name in zip(lines, names(), strict=True):
         header = line.split("  ")[0]

@@ -63,7 +63,7 @@ TEXTS = [
     "max",
     "a" * 81,
 ]
-TEXTS += ["a" * 201, "a" * 4097, "contact", "twin", "lumped", "bdf", "dynamic", "static", "square", *WEBS]
+TEXTS += ["a" * 201, "a" * 4097, "dyneema", "contact", "twin", "lumped", "bdf", "dynamic", "static", "square", *WEBS]
 LISTS_OF = [
     [],
     [1],
