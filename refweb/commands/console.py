@@ -11,6 +11,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from ..errors import InputError
+from ..findings import REFUSAL, read_findings
 from ..messages import quote
 from ..registry import EFFECTS, INTEGRATORS, name_of
 from ..results.provenance import web_of
@@ -154,7 +155,7 @@ def print_run(summary, more=()):
     rows += more
     rows += [("solver", text) for text in on_solver(solver)]
     rows.append(("cost", on_cost(cost)))
-    rows += [("warning", text) for text in summary["warnings"]]
+    rows += [(f.severity, f.text) for f in read_findings(summary) if f.severity != REFUSAL]
     if summary["status"] != "solved":
         resumed = "refweb resume continues from its last checkpoint" if solver["energy_drift"] is not None else ""
         rows.append((summary["status"], summary["message"] or resumed))
