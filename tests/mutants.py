@@ -263,6 +263,8 @@ MUTANTS = [
     Mutant(
         "effects/bending", "f[cells[c, 1], r] += first_pull + last_pull", "f[cells[c, 1], r] += first_pull - last_pull"
     ),
+    Mutant("effects/bending", "spring = 2.0 * self.stiffness", "spring = self.stiffness"),
+    Mutant("effects/bending", "inner = ~np.isin(rows[:, 1], clamped)", "inner = rows[:, 1] >= 0"),
     Mutant("effects/turning_axes", "to, m = cells[c, a], 2.0 * data", "to, m = cells[c, a], -2.0 * data"),
     Mutant("effects/turning_axes", "2.0 * data[c, at], 2.0 * data[c, at + 1]", "data[c, at], 2.0 * data[c, at + 1]"),
     Mutant(

@@ -71,7 +71,7 @@ EXAMPLES = {
         dict(node=0, line=0, force=2.0, factor=[(0.0, 0.0), (1.0, 2.0), (3.0, -1.0)]),
     ],
     "Damping": [dict(time=0.02), dict(rate=3.0)],
-    "Bending": [dict(stiffness=2.0)],
+    "Bending": [dict(stiffness=2.0), dict(stiffness=2.0, clamp=[1, 4])],
     "Attach": [dict(body="wall", node=[1, 3]), dict(body="wall", node=2, point=(0.1, 0.2, -0.3))],
     "Link": [dict(nodes=[0, 4]), dict(nodes=[5, 4, 2, 3])],
     "Reel": [
@@ -200,8 +200,8 @@ def check_term(net, system, term, seed):
         size = np.abs(force).sum()
         assert np.abs(force[:moment].sum(axis=0)).max() <= 1e-14 * size
         felt = [body for body in net.bodies if body.row in term.cells]
-        if any(not body.shape.once for body in felt):
-            return  # bodies with axes, which do not turn
+        if term.balance.twists or any(not body.shape.once for body in felt):
+            return  # what holds directions in space, and bodies with axes, which do not turn
         moments = np.vstack([np.cross(position, force)[:moment], force[moment:]])
         if term.velocity.damping is None or all(
             body.spin is not None for body in felt

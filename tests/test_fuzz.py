@@ -137,7 +137,7 @@ EFFECTS = {
     ),
     "link": st.lists(table(nodes=NUMBERS), min_size=1, max_size=1),
     "damping": table(optional={"time": ANY, "rate": ANY}),
-    "bending": table(stiffness=ANY),
+    "bending": table(stiffness=ANY, optional={"clamp": NODE}),
     "self_contact": table(radius=ANY, optional={"stiffness": ANY, "damping": ANY}),
     "frame": table(angular_velocity=VECTOR),
     "drag": table(density=ANY, optional={"wind": VECTOR, "normal": ANY}),

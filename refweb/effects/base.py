@@ -177,7 +177,7 @@ class Balance(NamedTuple):
     moment_free : bool
         Whether forces that are not internal have no moment about the centre of mass of all that there is.
     twists : bool
-        Whether forces that are internal have moments that the twist of lines would bear: they do not keep angular
+        Whether forces that are internal have moments that the twist of lines or a clamp bears: they do not keep angular
         momentum, and feel a rotation as a whole.
     """
 

@@ -11,6 +11,10 @@ of the force is that of rounding, or of none.
 
 This is the bending of the multi-particle model, whose states of rest are straight. n is evaluated from displacements,
 so that tiny deflections keep their digits.
+
+A clamp is a spring at the end of a line: a is a constant vector in the direction of the element, whose half bends, so
+that k = 2 B/L. A cantilever of n such elements has springs B n inside and 2 B n at the clamp, and under a load P at its
+tip it bends by P L³/(3 B) (1 + 1/(2 n²)).
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..tables import Table, real, table
+from ..tables import Several, Table, nodes, real, table
 from .base import Balance, CellElements, ForceTerm, Tangent, without
 from .vectors import cross, dot
 
@@ -29,6 +33,8 @@ LARGEST = math.radians(30.0)
 """Largest angle between elements that continue each other in the web's position."""
 ROUNDING = 1e-9
 """Angles that differ by less are the same [rad]."""
+FAR = 2.0**20
+"""Length of the constant vector of a clamp over that of its element: so long that the moment on it adds to no bound."""
 
 
 @kernel()
@@ -157,6 +163,16 @@ def springs(net):
     return rows, np.column_stack([element[first], element[second]])
 
 
+def clamps(net, nodes):
+    """Springs between a constant direction and every element that ends at some nodes, as `springs` has them.
+
+    The first node of a row stands in for a second one that does not move: it is the middle node as well.
+    """
+    side, element = np.nonzero(np.isin(net.cells.T, nodes))
+    middle, last = net.cells[element, side], net.cells[element, 1 - side]
+    return np.column_stack([middle, middle, last]), np.column_stack([element, element])
+
+
 @table
 class Bending(Table):
     """Bending stiffness of lines that continue each other at a node within 30°, and of the elements of each line.
@@ -165,12 +181,15 @@ class Bending(Table):
     ----------
     stiffness : float
         B = E I [N m²]. Springs are those of the natural lengths that the web is made with.
+    clamp : int, str or list, optional
+        Nodes at which every line keeps the direction in space that it has in the web, by number or name. A clamp does
+        not hold the node itself: supports do.
 
     Raises
     ------
     InputError
-        For a stiffness that is not > 0; from ``on``, for elements of an order above 1, and a web in which no element
-        continues another within 30°.
+        For a stiffness that is not > 0; from ``on``, for elements of an order above 1, a web without a clamp in which
+        no element continues another within 30°, and a clamp of a node that a free body carries.
 
     References
     ----------
@@ -181,12 +200,14 @@ class Bending(Table):
     --------
         [bending]
         stiffness = 1e-3
+        clamp = [0]
     """
 
     stiffness: float = real(above=0, unit="N·m²")
+    clamp: Several = nodes(default=None)
 
     def on(self, net):
-        """The term of all springs.
+        """The terms of all springs between elements, and of all clamps.
 
         Two supported nodes that follow each other clamp a line in the middle between them.
         """
@@ -196,22 +217,43 @@ class Bending(Table):
                 f"straight elements; use subdivide = {net.order * net.subdivide}, which has the same nodes"
             )
         rows, elements = springs(net)
-        if not len(rows):
+        clamped = np.zeros(0, dtype=int) if self.clamp is None else net.find(self.clamp, "clamp")
+        for node in np.intersect1d(clamped, net.carried):
+            raise InputError(
+                f"clamp = {node} is a node on a free body, which turns: leave it out, and attach the next node of the "
+                "line to the body as well"
+            )
+        inner = ~np.isin(rows[:, 1], clamped)  # at a clamp each element bends by itself
+        if not (len(clamped) or len(rows)):
             raise InputError(
                 f"stiffness = {self.stiffness:g} bends nothing: no line of this web continues another within 30°; "
                 "give [cable] subdivide > 1 for lines that bend between their nodes, or leave the table out"
             )
-        _, kind, beside = np.unique(np.sort(net.cells, axis=1), axis=0, return_inverse=True, return_counts=True)
-        beside = beside[kind.ravel()][elements].max(axis=1)  # of two lines beside each other each continues one
-        spring = self.stiffness / net.natural_length[elements].mean(axis=1) / beside
-        vectors = net.points[rows[:, 1:]] - net.points[rows[:, :-1]]
-        return ForceTerm(
-            name="bending",
-            cells=np.ascontiguousarray(rows, dtype=np.int32),
-            data=np.column_stack([spring, vectors.reshape(-1, 6)]),
-            force=force,
-            energy=energy,
-            tangent=Tangent(stiffness, bound),
-            balance=Balance("bending_energy", internal=True),
-            elements=CellElements(elements, without(0)),
-        )
+        terms = []
+        if inner.any():
+            rows, elements = rows[inner], elements[inner]
+            _, kind, beside = np.unique(np.sort(net.cells, axis=1), axis=0, return_inverse=True, return_counts=True)
+            beside = beside[kind.ravel()][elements].max(axis=1)  # of two lines beside each other each continues one
+            vectors = net.points[rows[:, 1:]] - net.points[rows[:, :-1]]
+            spring = self.stiffness / net.natural_length[elements].mean(axis=1) / beside
+            terms.append(_term(rows, elements, spring, vectors))
+        if len(clamped):
+            rows, elements = clamps(net, clamped)
+            vectors = net.points[rows[:, 2]] - net.points[rows[:, 1]]
+            spring = 2.0 * self.stiffness / net.natural_length[elements[:, 0]]
+            terms.append(_term(rows, elements, spring, np.hstack([FAR * vectors, vectors]), twists=True))
+        return terms
+
+
+def _term(rows, elements, spring, vectors, twists=False):
+    """The term of springs k [N m] between vectors that are so in the web's position [m], shape (springs, 2, 3)."""
+    return ForceTerm(
+        name="bending",
+        cells=np.ascontiguousarray(rows, dtype=np.int32),
+        data=np.column_stack([spring, vectors.reshape(-1, 6)]),
+        force=force,
+        energy=energy,
+        tangent=Tangent(stiffness, bound),
+        balance=Balance("bending_energy", internal=True, twists=twists),
+        elements=CellElements(elements, without(0)),
+    )

@@ -83,6 +83,7 @@ GLOSSARY = {
         "mean motion": "Angular velocity of a circular orbit [rad/s].",
         "gravity gradient": "Change of the pull of a planet over the size of the web.",
         "bending stiffness": "Moment between lines that continue each other, over their curvature [N m²].",
+        "clamp": "Node at which lines keep their direction in space.",
         "Rayleigh damping": "Forces proportional to velocity, by mass and by stiffness.",
         "Kelvin–Voigt damping": "Stress proportional to the rate of strain.",
     },

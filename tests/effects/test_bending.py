@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 from nets import skew_cable, skew_web
-from scipy.optimize import brentq
+from scipy.integrate import solve_bvp
+from scipy.optimize import brentq, fsolve
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
@@ -17,6 +18,7 @@ from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.bending import Bending, springs
 from refweb.errors import InputError
 from refweb.net import discretisation
+from refweb.system.broken_lines import torn
 from refweb.system.system import System
 
 
@@ -100,6 +102,151 @@ def test_elastica(load, table):
     assert abs(slope(errors, 1.0 / (counts + 0.5)) - 2.0) < 0.1 and errors[-1] < 1e-3
 
 
+def clamped(count, clamp=(0,), axial=1e6, density=1.0, supports=(0,), effects=(), **more):
+    """A beam of B = 1 and length 1 along x, clamped at nodes of ``count`` elements."""
+    return refweb.Scene(
+        web=chain(count, supports=list(supports)),
+        cable=bar(axial, density=density),
+        effects=[refweb.Bending(stiffness=1.0, clamp=list(clamp)), *effects],
+        observe=[refweb.Observe(name="bent", quantity="bending_energy")],
+        **{"solve": refweb.Static(), **more},
+    )
+
+
+@pytest.mark.parametrize("count", [1, 2, 10])
+def test_clamped_cantilever_under_a_small_load(count):
+    """PL³/3B (1 + 1/2n²): springs of k = B n bend by P (L − x)/k each, that of the clamp, of 2 B n, by half of it."""
+    load = 1e-6
+    solution = refweb.run(clamped(count, effects=[refweb.Load(node=count, force=(0.0, load, 0.0))]))
+    deflection = solution.displacement[-1, 1]
+    np.testing.assert_allclose(deflection, load / 3.0 * (1.0 + 0.5 / count**2), rtol=1e-9)  # less what is of load²
+    np.testing.assert_allclose(solution.results["bent"].value, 0.5 * load * deflection, rtol=1e-9)
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_a_clamp_does_not_hold_its_node(count):
+    """A beam whose other end is guided across: by Castigliano w = P h³/B (n²/4 + Σ (n/2 − m)²), which is PL³/12B."""
+    load = 1e-6
+    guided = clamped(count, (0, count), support=[refweb.Supports(nodes=[count], components=["x", "y"])]).replace(
+        effects=[refweb.Bending(stiffness=1.0, clamp=[0, count]), refweb.Load(node=count, force=(0, 0, load))]
+    )
+    squares = count**2 / 4 + sum((count / 2 - m) ** 2 for m in range(1, count))
+    deflection = refweb.run(guided).displacement[-1, 2]
+    np.testing.assert_allclose(deflection, load / count**3 * squares, rtol=1e-9)
+    np.testing.assert_allclose(squares / count**3, (1.0 + 2.0 / count**2) / 12.0, rtol=1e-14)
+
+
+def test_a_clamp_between_two_beams_parts_them():
+    """Each side of the clamp bends as a cantilever, with half of its first element, and does not feel the other."""
+    load = 1e-6
+    loads = [refweb.Load(node=node, force=(0.0, 0.0, force)) for node, force in ((0, load), (8, 3.0 * load))]
+    solution = refweb.run(clamped(8, [4], supports=[4], effects=loads))
+    expected = load / 24.0 * (1.0 + 0.5 / 4**2)
+    np.testing.assert_allclose(solution.displacement[[0, 8], 2], [expected, 3.0 * expected], rtol=1e-9)
+
+
+def sagging(count, weight):
+    """Tip of a chain of ``count`` links without strain, springs as those of a clamped beam, weight at its nodes.
+
+    Moments about each joint by the angles φ of the links: k_j (φ_j − φ_{j−1}) is h cos φ_j times the weights behind,
+    and that of the next joint.
+    """
+    h = 1.0 / count
+    weights = np.full(count, weight * h)
+    weights[-1] *= 0.5
+    behind, springs_of = np.cumsum(weights[::-1])[::-1], np.full(count, count)
+    springs_of[0] *= 2
+
+    def balance(angles):
+        moments = springs_of * np.diff(angles, prepend=0.0)
+        return moments - np.append(moments[1:], 0.0) - behind * h * np.cos(angles)
+
+    angles = fsolve(balance, np.zeros(count), xtol=1e-12)
+    return np.array([h * np.cos(angles).sum(), h * np.sin(angles).sum()])
+
+
+def test_clamped_cantilever_under_its_weight():
+    """0.981 N/m on a beam of B = L = 1, qL⁴/8B = 122.6 mm if it were small: links without strain and the elastica.
+
+    The elastica is θ'' = −q (1 − s) cos θ with θ(0) = θ'(1) = 0. An axial stiffness of 1e9 N stretches by 1e-9.
+    """
+    weight, counts, errors = 0.981, np.array([5, 10, 20]), []
+
+    def slopes(s, y):
+        return np.array([y[1], -weight * (1.0 - s) * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])])
+
+    start = np.linspace(0.0, 1.0, 41)
+    beam = solve_bvp(slopes, lambda a, b: np.array([a[0], b[1], a[2], a[3]]), start, np.zeros((4, 41)), tol=1e-10)
+    exact = beam.y[2:, -1]
+    for count in counts:
+        scene = clamped(
+            int(count), axial=1e9, density=weight / 9.81, effects=[refweb.Gravity(acceleration=(0.0, 0.0, -9.81))]
+        )
+        tip = refweb.run(scene).positions[-1]
+        np.testing.assert_allclose([tip[0], -tip[2]], sagging(count, weight), atol=2e-8)
+        errors.append(np.hypot(tip[0] - exact[0], tip[2] + exact[1]))
+        if count == 10:  # of (1 + 1/n²) by its springs, and less by the cosine of its slope, a sixth: 1.3 % together
+            np.testing.assert_allclose(tip[2], -0.1226, rtol=0.013)
+    assert abs(slope(errors, 1.0 / counts) - 2.0) < 0.05 and errors[-1] < 1e-3
+
+
+def transverse(count):
+    """Frequencies [1/s] and modes of small vibrations of a clamped chain of B = μ = L = 1, shape (count + 1, modes)."""
+    h = 1.0 / count
+    turns = np.zeros((count, count + 1))  # of joint j by displacements: that of its link less that of the one before
+    for j in range(count):
+        turns[j, j : j + 2] += [-1.0 / h, 1.0 / h]
+        if j:
+            turns[j, j - 1 : j + 1] -= [-1.0 / h, 1.0 / h]
+    springs_of = np.full(count, 1.0 / h)
+    springs_of[0] *= 2.0
+    K = (turns.T * springs_of @ turns)[1:, 1:]
+    M = np.full(count, h)
+    M[-1] *= 0.5
+    squares, modes = scipy.linalg.eigh(K, np.diag(M))
+    return np.sqrt(squares), np.vstack([np.zeros(count), modes])
+
+
+def test_modes_of_a_clamped_beam():
+    """Those of a chain by its own matrices, and 1.8751² √(B/μ)/L² of order 2; each bends along y and along z."""
+    counts, errors = np.array([5, 10, 20]), []
+    for count in counts:
+        modes = refweb.modes(clamped(int(count)), number=4, progress=False)
+        exact = transverse(count)[0][:2] / (2.0 * np.pi)
+        np.testing.assert_allclose(modes.frequency, np.repeat(exact, 2), rtol=1e-9)
+        errors.append(abs(modes.frequency[0] - 1.8751040687119611**2 / (2.0 * np.pi)))
+    assert abs(slope(errors, 1.0 / counts) - 2.0) < 0.05
+
+
+def test_motion_of_a_clamped_beam():
+    """Its first mode, by central differences with order 2 in the step, and by CVODE within its tolerance."""
+    count, small = 6, 1e-6
+    frequencies, modes = transverse(count)
+    omega, shape = frequencies[0], modes[:, :1] / modes[-1, 0] * [0.0, 1.0, 0.0]
+    system, end = clamped(count, axial=1e3, solve=refweb.Dynamic(duration=1.0)).build(), 2.3 * np.pi / omega
+    exact, errors, safeties = small / omega * np.sin(omega * end) * shape, [], (0.8, 0.4, 0.2)
+    for safety in safeties:
+        solver = CentralDifference(system, safety=safety)
+        run = solver.start(v=small * shape)
+        solver.advance(run, [end])
+        errors.append(np.abs(run.x - exact).max())
+    assert abs(slope(errors, safeties) - 2.0) < 0.05
+    solver = Cvode(system, rtol=1e-7, atol_position=1e-7 * small / omega, atol_velocity=1e-7 * small)
+    run = solver.start(v=small * shape)
+    solver.advance(run, [end])
+    np.testing.assert_allclose(run.x, exact, atol=3e-4 * small / omega)  # as that of a simply supported beam
+
+
+def test_a_broken_line_bends_no_clamp():
+    """Turned by a right angle, ½ 2B/L (π/2)² and a moment; nothing where the element is broken."""
+    system = clamped(1, solve=refweb.Dynamic(duration=1.0)).build()
+    x = np.array([[0.0, 0.0, 0.0], [-1.0, 0.0, 1.0]])
+    np.testing.assert_allclose(system.force(0.0, x)[1], [np.pi, 0.0, 0.0], rtol=1e-14, atol=1e-9)
+    np.testing.assert_allclose(sum(system.energy_of(f, 0.0, x).sum() for f in system.terms[1:]), np.pi**2 / 4)
+    broken = torn(system, np.array([0]), np.zeros(1))
+    assert not broken.force(0.0, x).any()
+
+
 @pytest.mark.parametrize("count", [2, 3, 10])
 def test_buckling(count):
     """A column with hinged ends: P w_j = k θ_j with θ = −Δ²w/a has w_j = sin(πj/n) at P = 4 (k/a) sin²(π/2n).
@@ -170,19 +317,20 @@ def test_bound_of_a_straight_chain():
     np.testing.assert_allclose(bound, 2.0 / np.sqrt(stiffness * count), rtol=1e-12)
 
 
-def skew_system(seed, pieces=3, size=0.1):
+def skew_system(seed, pieces=3, size=0.1, clamp=None):
     """A branching net of divided lines, in a state with turns of up to two rad."""
     net = discretisation.build(skew_web(), replace(skew_cable("linear"), subdivide=pieces))
     rng = np.random.default_rng(seed)
     net = replace(net, mass=10.0 ** rng.uniform(-3, 0, len(net.mass)))
-    system = System(net, [Bending(stiffness=2.0)], np.zeros((len(net.points), 3), dtype=bool))
+    system = System(net, [Bending(stiffness=2.0, clamp=clamp)], np.zeros((len(net.points), 3), dtype=bool))
     return system, size * rng.standard_normal(net.points.shape)
 
 
+@pytest.mark.parametrize("clamp", [None, (1, 4)])
 @pytest.mark.parametrize("size", [0.0, 0.02, 0.1, 0.3])
-def test_bound_bounds(size):
+def test_bound_bounds(size, clamp):
     for seed in range(5):
-        system, x = skew_system(seed, size=size)
+        system, x = skew_system(seed, size=size, clamp=clamp)
         K = system.pattern.matrix(system.stiffness(0.0, x)).toarray()
         largest = scipy.linalg.eigvalsh(K, np.diag(np.repeat(system.net.mass, 3)))[-1]
         assert CentralDifference(system).bound(x, reach=0.0) <= 2.0 / np.sqrt(largest) * (1.0 + 1e-12)
@@ -333,3 +481,8 @@ def test_refusals():
         scene.replace(web=square, cable=replace(cable, order=2)).build()
     with pytest.raises(InputError, match=r"stiffness = 0.0 must be > 0 \[N·m²\]"):
         Bending(stiffness=0)
+    with pytest.raises(InputError, match=r'\[bending\] clamp = "midle" names no node, did you mean "middle"'):
+        clamped(2).replace(web=chain(2, names={"middle": [1]}), effects=[Bending(stiffness=1.0, clamp="midle")]).build()
+    hub = [refweb.Body(name="hub", radius=0.1, mass=1.0, position=(1.0, 0.0, 0.0)), refweb.Attach(body="hub", node=2)]
+    with pytest.raises(InputError, match=r"\[bending\] clamp = 2 is a node on a free body, .* attach the next node"):
+        clamped(2, [2], effects=hub, solve=refweb.Dynamic(duration=1.0)).build()
