@@ -119,7 +119,9 @@ MIRRORS = {
     "results/observables/overlap": "results/test_contact_force.py results/test_every_number.py",
     "system/contact_forces": "results/test_every_number.py results/test_contact_force.py",
     "dynamics/integrators/contacts": "results/test_contact_force.py",
-    "results/observables": "results/test_observable_contract.py dynamics/test_accuracy.py statics/test_statics.py",
+    "results/probes": "results/test_observable_contract.py",
+    "results/observables": "results/test_observable_contract.py results/test_selections.py "
+    "dynamics/test_accuracy.py statics/test_statics.py",
     "runner": "results/test_remarks.py",
     "build": "test_build.py",
     "effects/self_contact/table": "effects/test_self_contact.py",
@@ -262,6 +264,13 @@ MUTANTS = [
     ),
     Mutant(
         "effects/bending", "f[cells[c, 1], r] += first_pull + last_pull", "f[cells[c, 1], r] += first_pull - last_pull"
+    ),
+    Mutant("results/probes", "-value if select == 1 else abs(value)", "-value if select == 1 else value"),
+    Mutant("results/observables/line", '"end": net.subdivide - 1', '"end": 0'),
+    Mutant(
+        "results/observables/nodal",
+        "best = np.maximum(*(self.scores(end) for end in ends))",
+        "best = self.scores([*ends][1])",
     ),
     Mutant("effects/bending", "spring = 2.0 * self.stiffness", "spring = self.stiffness"),
     Mutant("effects/bending", "inner = ~np.isin(rows[:, 1], clamped)", "inner = rows[:, 1] >= 0"),
@@ -447,7 +456,7 @@ MUTANTS = [
     Mutant("dynamics/integrators/step_limits", "stop = self._corners[ahead] if", "stop = self._corners[-1] if"),
     Mutant("dynamics/history", "SPREAD = 3.0", "SPREAD = 1.5"),
     Mutant("dynamics/twin_error", "MOST_CHANCE, TELLING = 10.0", "MOST_CHANCE, TELLING = 1.0"),
-    Mutant("dynamics/history", "distances[name] = 0.5 * time * float(along)", "distances[name] = 0.0"),
+    Mutant("dynamics/history", "distances[name] = 0.5 * time * float(along.max())", "distances[name] = 0.0"),
     Mutant(
         "dynamics/twin_error",
         "factor = 1.0 / (1.0 - simulation.integrator.error_share(first_run, refined))",

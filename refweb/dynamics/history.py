@@ -277,9 +277,10 @@ class Watch:
         placed = {o.name: o for o in self._observables if o.body is not None and o.unit == "m"}
         distances = {}
         for name, o in placed.items():
-            apart = (course.v - twin.v)[rows[o.body]]
-            along = np.linalg.norm(apart) if o.component is None else abs(apart[o.component])
-            distances[name] = 0.5 * time * float(along)
+            named = (o.body,) if isinstance(o.body, str) else o.body
+            apart = (course.v - twin.v)[[rows[body] for body in named]]
+            along = np.linalg.norm(apart, axis=1) if o.component is None else np.abs(apart[:, o.component])
+            distances[name] = 0.5 * time * float(along.max())
         return distances
 
     def _slot(self, observable):

@@ -78,8 +78,9 @@ def observed(summary, scene, quantity):
     tables = [step.get("results") or {} for step in steps] or [summary.get("results") or {}]
     results_found = []
     for observe in observes_of(scene):
-        keys = (observe.line, observe.node, observe.body, observe.component, observe.average)
-        every = keys == (None,) * len(keys) and (steps or observe.reduce == "max")
+        keys = (observe.line, observe.node, observe.body, observe.component, observe.average, observe.part)
+        largest = observe.select in (None, "max") and (steps or observe.reduce == "max")
+        every = keys == (None,) * len(keys) and largest
         if observe.quantity == quantity and every:
             results_found += [results[observe.name] for results in tables if observe.name in results]
     if not results_found:

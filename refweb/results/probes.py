@@ -180,9 +180,18 @@ def reaction(t, x, v, f, lines, rows, data, where):
 
 @kernel(PROBE)
 def contact_force(t, x, v, f, lines, rows, data, where):
-    """Component or magnitude of the force of contact on a body; ``rows`` is (component, row of what bodies feel)."""
-    where[0], r = -1, rows[1]
-    return component_of(rows[0], data[r, FORCE], data[r, FORCE + 1], data[r, FORCE + 2])
+    """Component or magnitude of the force of contact on bodies together.
+
+    ``rows`` is (component, row of what they feel, ...).
+    """
+    total0 = total1 = total2 = 0.0
+    where[0] = -1
+    for n in range(1, rows.size):
+        r = rows[n]
+        total0 += data[r, FORCE]
+        total1 += data[r, FORCE + 1]
+        total2 += data[r, FORCE + 2]
+    return component_of(rows[0], total0, total1, total2)
 
 
 @kernel(PROBE)
@@ -228,6 +237,65 @@ def line_of(t, x, v, f, lines, rows, data, where):
         if n == 1 or value > best:
             best, where[0] = value, rows[n]
     return best
+
+
+DISPLACEMENT, VELOCITY, REACTION = range(3)
+"""Sources of vectors of `selected_row`: x + data, v, and −data × f."""
+
+
+@kernel()
+def _score(select, value):
+    """Number that is largest of what counts, see `refweb.results.observables.observable.SELECTIONS`."""
+    return value if select == 0 else -value if select == 1 else abs(value)
+
+
+@kernel()
+def _counted(select, score):
+    """The value of a `_score`."""
+    return -score if select == 1 else score
+
+
+@kernel(PROBE)
+def selected_row(t, x, v, f, lines, rows, data, where):
+    """Component or magnitude that counts of vectors of rows; ``rows`` is (source, select, component, row, ...)."""
+    source, select, best = rows[0], rows[1], -math.inf
+    for n in range(data.shape[0]):
+        r = rows[3 + n]
+        a, b, c = x[r, 0] + data[n, 0], x[r, 1] + data[n, 1], x[r, 2] + data[n, 2]
+        if source == VELOCITY:
+            a, b, c = v[r, 0], v[r, 1], v[r, 2]
+        elif source == REACTION:
+            a, b, c = -data[n, 0] * f[r, 0], -data[n, 1] * f[r, 1], -data[n, 2] * f[r, 2]
+        score = _score(select, component_of(rows[2], a, b, c))
+        if score > best:
+            best, where[0] = score, r
+    return _counted(select, best)
+
+
+@kernel(PROBE)
+def selected_contact(t, x, v, f, lines, rows, data, where):
+    """Component or magnitude that counts of forces of contact on k bodies.
+
+    ``rows`` is (select, component, k, k rows of what they feel, k rows of the bodies).
+    """
+    select, count, best = rows[0], rows[2], -math.inf
+    for n in range(count):
+        r = rows[3 + n]
+        score = _score(select, component_of(rows[1], data[r, FORCE], data[r, FORCE + 1], data[r, FORCE + 2]))
+        if score > best:
+            best, where[0] = score, rows[3 + count + n]
+    return _counted(select, best)
+
+
+@kernel(PROBE)
+def selected_element(t, x, v, f, lines, rows, data, where):
+    """The value that counts of data × column over elements; ``rows`` is (select, column, element, ...)."""
+    select, best = rows[0], -math.inf
+    for n in range(2, rows.size):
+        score = _score(select, lines[rows[n], rows[1]] * data[rows[n], 0])
+        if score > best:
+            best, where[0] = score, rows[n]
+    return _counted(select, best)
 
 
 @kernel(PROBE)

@@ -42,7 +42,7 @@ class Result(NamedTuple):
     `refweb.Orbit`; None where there is none. ``interval`` are the least and the largest value in all equilibria, where
     parts of the web float; an end that nothing holds is infinite. ``within`` are the least and the largest value that ±
     leaves of those which are possible, where it goes beyond them: a length is not negative, and a share is 0 to 1.
-    ``at`` says what ``where`` is the number of, "node" or "line".
+    ``at`` says what ``where`` is the number of, "node", "line" or, of several bodies, "body".
     """
 
     value: float

@@ -63,7 +63,8 @@ TEXTS = [
     "max",
     "a" * 81,
 ]
-TEXTS += ["a" * 201, "a" * 4097, "dyneema", "contact", "twin", "lumped", "bdf", "dynamic", "static", "square", *WEBS]
+TEXTS += ["a" * 201, "a" * 4097, "middle", "dyneema", "contact", "twin", "lumped", "bdf", "dynamic", "static"]
+TEXTS += ["square", *WEBS]
 LISTS_OF = [
     [],
     [1],

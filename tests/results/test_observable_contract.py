@@ -4,6 +4,7 @@ Every entry of the table is found by itself, and looked at in random states of n
 turns, and several elements a line.
 """
 
+import itertools
 import re
 
 import numpy as np
@@ -34,10 +35,12 @@ EFFECTS = (
 FRAME = refweb.Frame(angular_velocity=(0.3, -0.5, 0.7))
 WHERE = {
     "node": [{}, {"node": 3}, {"node": [1, 2, 4]}, {"node": [5, 0, 3]}],
-    "body": [{"body": "ball"}, {"body": "wall"}],
+    "body": [{"body": "ball"}, {"body": "wall"}, {"body": ["wall", "ball"]}],
     "line": [{}, {"line": 0}, {"line": 7}],
     "component": [{}, *({"component": axis} for axis in "xyz")],
     "to": [{"to": "ball"}],
+    "select": [{}, *({"select": choice} for choice in ("max", "min", "abs"))],
+    "part": [{}, *({"part": part} for part in ("start", "middle", "end"))],
 }
 """What each key of ``[[observe]]`` is given as; a quantity is looked at for every mixture of those it takes."""
 OWN = {
@@ -45,6 +48,7 @@ OWN = {
     **dict.fromkeys(("mouth_area", "mouth_perimeter"), WHERE["node"][2:]),
 }
 """Places of quantities that are of a few of them together."""
+ONE_BODY = ("orientation", "angular_velocity", "angular_momentum")
 
 
 def tables(name):
@@ -52,8 +56,13 @@ def tables(name):
     keys = refweb.Observe(name="_", quantity=name).observable.keys
     places = [place for key in ("node", "body", "line") if key in keys for place in WHERE[key]] or [{}]
     places = OWN.get(name, places)
-    axes = WHERE["component"] if "component" in keys else [{}]
-    return [refweb.Observe(name="_", quantity=name, **place, **axis) for place in places for axis in axes]
+    if name in ONE_BODY:
+        places = [place for place in places if not isinstance(place.get("body"), list)]
+    mixed = [places, *(WHERE[key] for key in ("component", "select", "part") if key in keys)]
+    return [
+        refweb.Observe(name="_", quantity=name, **{key: value for given in parts for key, value in given.items()})
+        for parts in itertools.product(*mixed)
+    ]
 
 
 def random_state(law, seed, pieces=2, turning=False):

@@ -21,7 +21,7 @@ class TotalAngularMomentum(Nodal):
     against the turning axes, and it does not stay.
     """
 
-    unit = "N m s"
+    unit, keys = "N m s", ("node", "body", "component")
     dynamic = True
 
     def _parts(self, system):
@@ -32,7 +32,8 @@ class TotalAngularMomentum(Nodal):
         masses[[body.row for body in net.bodies if body.fixed]] = 0.0
         every = observe.node is None and observe.body is None
         counted = np.arange(linear) if every else self.rows(system)
-        turning = [b for b in net.bodies if b.spin is not None and not b.fixed and (every or b.name == observe.body)]
+        named = net.bodies if every else self.bodies(net)
+        turning = [body for body in named if body.spin is not None and not body.fixed]
         return np.column_stack([masses, net.points[:linear]]), counted, [(b.spin, b.moment) for b in turning]
 
     def of(self, state):

@@ -28,6 +28,8 @@ class Between(Observable):
 
     def _number_of(self, system, name):
         """Row of a body."""
+        if not isinstance(name, str):
+            raise InputError(f'body names {len(name)} bodies: quantity = "{self.observe.quantity}" needs one')
         names = [body.name for body in system.net.bodies]
         if name not in names:
             hint = nearest(name, names) if names else "the scene has no [[body]]"

@@ -1,16 +1,17 @@
-"""Tension, stress and strain: of a line its largest, of several lines the largest of all of these."""
+"""Tension, stress and strain of elements of lines, of which one counts, see ``select`` of `refweb.Observe`."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...effects.base import STRAIN
+from ...errors import InputError
 from ...net.tension_laws import TENSION_ONLY
-from .observable import ANY, NOT_NEGATIVE, Observable, Value
+from .observable import ANY, NOT_NEGATIVE, SELECTIONS, Observable, Value
 
 
 class Line(Observable):
-    """A number of each line.
+    """A number of each element.
 
     Subclasses have `values`, `bound` and `scale`, by which ``column`` of tension and strain of each element is
     multiplied.
@@ -21,11 +22,11 @@ class Line(Observable):
         Whether it has the sign of the tension.
     """
 
-    keys, at = ("line",), "line"
+    keys, at = ("line", "part", "select"), "line"
     pull = True
 
     def values(self, state):
-        """Value of each line in a state, shape (lines,)."""
+        """Value of each element in a state, shape (cells,)."""
         raise NotImplementedError
 
     def bound(self, tension, net):
@@ -33,8 +34,13 @@ class Line(Observable):
         raise NotImplementedError
 
     def on(self, system):
-        """Refuse lines that the net does not have."""
+        """Refuse lines that the net does not have, and parts of lines of one element."""
         self.lines(system.net)
+        if self.observe.part is not None and system.net.subdivide == 1:
+            raise InputError(
+                f'part = "{self.observe.part}" needs [cable] subdivide > 1: a line of one element has no parts; leave '
+                "it out, or name lines where they end"
+            )
 
     def lines(self, net):
         """Numbers of the lines that are looked at, increasing; None for all."""
@@ -42,21 +48,29 @@ class Line(Observable):
         return None if line is None else net.web.find_lines(line, "line")
 
     def elements(self, net):
-        """Numbers of their elements, increasing, shape (k,)."""
-        lines = self.lines(net)
+        """Numbers of their elements, or of the part of each that is asked for, increasing, shape (k,)."""
+        lines, part = self.lines(net), self.observe.part
+        if part is not None:
+            lines = np.arange(len(net.web.lines)) if lines is None else lines
+            ends = {"start": 0, "end": net.subdivide - 1}
+            return net.middle_of(lines) if part == "middle" else lines * net.subdivide + ends[part]
         return np.arange(len(net.line)) if lines is None else np.flatnonzero(np.isin(net.line, lines))
 
     def of(self, state):
-        """The largest of its lines, or of all."""
-        values, lines = self.values(state), self.lines(state.system.net)
-        at = int(np.argmax(values) if lines is None else lines[np.argmax(values[lines])])
-        return Value(float(values[at]), at)
+        """The value that counts of its elements."""
+        net = state.system.net
+        elements = self.elements(net)
+        value, at = self.selected(self.values(state)[elements])
+        return Value(value, int(net.line[elements[at]]))
 
     def probe(self, system):
         """Make the probe of the elements of its lines, or of all."""
-        from ..probes import Probe, line, line_of
+        from ..probes import Probe, line, line_of, selected_element
 
         elements, scale = self.elements(system.net), self.scale(system.net)[:, None]
+        if self.selects:
+            numbers = [SELECTIONS[self.observe.select], self.column(system), *elements.tolist()]
+            return Probe(selected_element, numbers, scale)
         first, last = int(elements[0]), int(elements[-1])
         if len(elements) == last + 1 - first:
             return Probe(line, [self.column(system), first, last + 1], scale)
@@ -67,13 +81,21 @@ class Line(Observable):
         return int(system.net.line[at])
 
     def bounds(self, system):
-        """Lines that can only pull have tensions that are not negative, damping apart, and the largest has none."""
-        pulls = (system.net.laws[self.elements(system.net)] == TENSION_ONLY).any()
+        """Lines that can only pull have tensions that are not negative, damping apart.
+
+        Where such a line is among others the largest is not negative, and where there is no other the smallest.
+        """
+        if self.observe.select == "abs":
+            return NOT_NEGATIVE
+        pulls = system.net.laws[self.elements(system.net)] == TENSION_ONLY
         alone = sum(term.over_lines for term in system.terms) == 1
-        return NOT_NEGATIVE if self.pull and pulls and alone else ANY
+        certain = pulls.all() if self.observe.select == "min" else pulls.any()
+        return NOT_NEGATIVE if self.pull and certain and alone else ANY
 
     def bounds_by_tables(self, tables):
         """The same where the law of all lines is known without the net: one law, of the cable and of its groups."""
+        if self.observe.select == "abs":
+            return NOT_NEGATIVE
         cable = tables.get("cable", {})
         laws = {table["law"] for table in (cable, *cable.get("groups", {}).values()) if "law" in table}
         damped = tables.get("damping", {}).get("time", 0.0) > 0.0
@@ -106,8 +128,8 @@ class Tension(Line):
     unit = "N"
 
     def values(self, state):
-        """Tension [N], shape (lines,)."""
-        return state.tension
+        """Tension [N], shape (cells,)."""
+        return state.element_tension
 
     def bound(self, tension, net):
         """Its own [N], shape (cells,)."""
@@ -120,8 +142,8 @@ class Stress(Line):
     unit = "Pa"
 
     def values(self, state):
-        """Stress [Pa], shape (lines,)."""
-        return state.stress
+        """Stress [Pa], shape (cells,)."""
+        return state.element_tension / state.system.net.area
 
     def scale(self, net):
         """Inverse of the area [1/m²], shape (cells,)."""
@@ -147,11 +169,9 @@ class StressShare(Line):
         super().__init__(Observe(name=over, quantity="stress"))
         self._over = over
 
-    def of(self, state):
-        """The largest of all lines."""
-        shares = state.element_tension * self.scale(state.system.net)
-        at = int(shares.argmax())
-        return Value(float(shares[at]), int(state.system.net.line[at]))
+    def values(self, state):
+        """Shares of the limit, shape (cells,)."""
+        return state.element_tension * self.scale(state.system.net)
 
     def scale(self, net):
         """Inverse of the tension at the limit [1/N], 0 where there is no limit, shape (cells,)."""
@@ -172,8 +192,8 @@ class Strain(Line):
         return STRAIN
 
     def values(self, state):
-        """Strain [1], shape (lines,)."""
-        return state.strain
+        """Strain [1], shape (cells,)."""
+        return state.element_strain
 
     def bound(self, tension, net):
         """Error bound of tension over EA [1], shape (cells,)."""
@@ -184,4 +204,6 @@ class Strain(Line):
         error = super().error(state, equilibrium)
         if error is None or equilibrium.duality_bound is None:
             return error
-        return None if self.of(state).value <= error else error
+        values = self.values(state)[self.elements(state.system.net)]
+        counts = values.min() if self.selects else values.max()
+        return None if counts <= error else error

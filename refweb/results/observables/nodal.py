@@ -1,12 +1,10 @@
-"""Displacement, position and velocity: of several nodes that with the largest value counts."""
+"""Displacement, position and velocity: of several nodes or bodies one counts, see ``select`` of `refweb.Observe`."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...errors import InputError
-from ...messages import nearest
-from .observable import Observable, Value
+from .observable import SELECTIONS, Observable, Value
 
 
 class Nodal(Observable):
@@ -15,7 +13,11 @@ class Nodal(Observable):
     Subclasses have `vectors` and a probe.
     """
 
-    keys = ("node", "body", "component")
+    keys = ("node", "body", "component", "select")
+
+    def __init__(self, observe):
+        super().__init__(observe)
+        self.at = "node" if observe.body is None else "body"
 
     def vectors(self, state):
         """Vector of each row in a state, shape (rows, 3)."""
@@ -27,13 +29,9 @@ class Nodal(Observable):
 
     def rows(self, system):
         """Rows it is looked at, shape (k,)."""
-        net, body = system.net, self.observe.body
-        if body is not None:
-            names = [body.name for body in net.bodies]
-            if body not in names:
-                hint = nearest(body, names) if names else "the scene has no [[body]]"
-                raise InputError(f'body = "{body}" is not a body, {hint}')
-            return np.array([net.bodies[names.index(body)].row])
+        net = system.net
+        if self.observe.body is not None:
+            return np.array([body.row for body in self.bodies(net)])
         return np.arange(net.nodes) if self.observe.node is None else net.find(self.observe.node)
 
     def sizes(self, vectors):
@@ -42,15 +40,26 @@ class Nodal(Observable):
         return np.linalg.norm(vectors, axis=1) if component is None else vectors[:, component]
 
     def of(self, state):
-        """The largest over its rows."""
+        """The value that counts of its rows."""
         rows = self.rows(state.system)
-        sizes = self.sizes(self.vectors(state)[rows])
-        at = int(np.argmax(sizes))
-        return Value(float(sizes[at]), self.position(state.system, int(rows[at])))
+        value, at = self.selected(self.sizes(self.vectors(state)[rows]))
+        return Value(value, self.position(state.system, int(rows[at])))
 
     def position(self, system, at):
-        """The node; none of a body."""
-        return at if self.observe.body is None else None
+        """The node, or of several bodies the number of the one; nowhere of one body, which is named."""
+        if self.observe.body is None:
+            return at
+        rows = [body.row for body in system.net.bodies]
+        return None if isinstance(self.observe.body, str) else rows.index(at)
+
+    def probe_of(self, kernel, source, rows, data):
+        """The probe of rows by a kernel of the largest, or by that of another choice, of a ``source`` of vectors."""
+        from ..probes import MAGNITUDE, Probe, selected_row
+
+        if not self.selects:
+            return Probe(kernel, self.numbers(rows), data)
+        component = MAGNITUDE if self.observe.component is None else self.observe.component
+        return Probe(selected_row, [source, SELECTIONS[self.observe.select], component, *rows], data)
 
     def numbers(self, rows):
         """Component and rows, as `refweb.results.probes.largest_of` takes them."""
@@ -65,7 +74,7 @@ class Place(Nodal):
     """A vector of each row that its position makes: open where the row floats."""
 
     def floats(self, state, equilibrium):
-        """Tell if the row with the largest value may move at no cost, or another one pass it."""
+        """Tell if the row whose value counts may move at no cost, or another one pass it."""
         floating = equilibrium.floating
         if floating is None:
             return bool(np.isin(self.rows(state.system), state.slack_nodes).any())
@@ -74,14 +83,17 @@ class Place(Nodal):
         open_ = floating.free[rows][:, axes].any(axis=1)
         if not open_.any():
             return False
-        sizes = self.sizes(self.vectors(state)[rows])
-        if open_[np.argmax(sizes)] or floating.parts is None:
+        scores = self.scores(self.sizes(self.vectors(state)[rows]))
+        if open_[np.argmax(scores)] or floating.parts is None:
             return True
         smallest, largest = floating.parts.reach[:, rows] + (self.vectors(state) - state.position)[rows]
-        largest_move = (
-            np.linalg.norm(np.maximum(-smallest, largest), axis=1) if component is None else largest[:, component]
-        )
-        return bool((largest_move[open_] > sizes.max()).any())
+        if component is not None:
+            ends = smallest[:, component], largest[:, component]
+        else:  # the nearest and the farthest corner of what is in reach
+            nearest = np.maximum(np.maximum(smallest, -largest), 0.0)
+            ends = (np.linalg.norm(side, axis=1) for side in (nearest, np.maximum(-smallest, largest)))
+        best = np.maximum(*(self.scores(end) for end in ends))
+        return bool((best[open_] > scores.max()).any())
 
     def interval(self, state, equilibrium):
         """Range of one row along one axis, see `refweb.statics.floating.Parts.limits`."""
@@ -109,10 +121,10 @@ class Displacement(Place):
 
     def probe(self, system):
         """Make the probe of x alone."""
-        from ..probes import Probe, displacement
+        from ..probes import DISPLACEMENT, displacement
 
         rows = self.rows(system)
-        return Probe(displacement, self.numbers(rows), np.zeros((len(rows), 3)))
+        return self.probe_of(displacement, DISPLACEMENT, rows, np.zeros((len(rows), 3)))
 
 
 class Position(Place):
@@ -126,10 +138,10 @@ class Position(Place):
 
     def probe(self, system):
         """Make the probe of x and the reference position."""
-        from ..probes import Probe, displacement
+        from ..probes import DISPLACEMENT, displacement
 
         rows = self.rows(system)
-        return Probe(displacement, self.numbers(rows), system.net.points[rows])
+        return self.probe_of(displacement, DISPLACEMENT, rows, system.net.points[rows])
 
 
 class Velocity(Nodal):
@@ -144,7 +156,7 @@ class Velocity(Nodal):
 
     def probe(self, system):
         """Make the probe of v alone."""
-        from ..probes import Probe, velocity
+        from ..probes import VELOCITY, velocity
 
         rows = self.rows(system)
-        return Probe(velocity, self.numbers(rows), np.zeros((len(rows), 3)))
+        return self.probe_of(velocity, VELOCITY, rows, np.zeros((len(rows), 3)))

@@ -11,6 +11,8 @@ from ...messages import nearest
 
 ANY, NOT_NEGATIVE = (-np.inf, np.inf), (0.0, np.inf)
 """Least and largest value that are possible."""
+SELECTIONS = {"max": 0, "min": 1, "abs": 2}
+"""Numbers of choices among several values in compiled probes, by ``select``."""
 ROUNDING, SHARE = 4.0 * np.finfo(float).eps, 1e-7
 """Rounding of a strain by that of positions and lengths, and the change of a length by which its effect is found."""
 
@@ -35,7 +37,8 @@ class Observable:
     unit : str
         Unit of its value.
     keys : tuple of str
-        Which of ``node``, ``body``, ``to``, ``component`` and ``line`` have a meaning; one of the whole net has none.
+        Which of ``node``, ``body``, ``to``, ``component``, ``line``, ``part`` and ``select`` have a meaning; one of the
+        whole net has none.
     dynamic : bool
         Whether it has no meaning in statics.
     at : str
@@ -67,17 +70,45 @@ class Observable:
 
     def body(self, net):
         """The body it is of: the one that is named or the only one. Refused where it is none, or one of several."""
-        name, names = self.observe.body, [body.name for body in net.bodies]
-        if name is None and len(names) > 1:
-            quantity = self.observe.quantity
-            raise InputError(f'body is missing: quantity = "{quantity}" needs one body, {nearest("", names)}')
-        if name is not None and name not in names:
-            raise InputError(f'body = "{name}" is not a body, {nearest(name, names)}')
-        return next(body for body in net.bodies if name in (None, body.name))
+        names = [body.name for body in net.bodies]
+        if self.observe.body is None and len(names) == 1:
+            return net.bodies[0]
+        named = self.bodies(net)
+        if len(named) != 1:
+            quantity, missing = self.observe.quantity, "is missing" if not named else f"names {len(named)} bodies"
+            raise InputError(f'body {missing}: quantity = "{quantity}" needs one body, {nearest("", names)}')
+        return named[0]
+
+    def bodies(self, net):
+        """The bodies that are named, a list. Refused where one is none."""
+        named, bodies = self.observe.body, {body.name: body for body in net.bodies}
+        named = (named,) if isinstance(named, str) else named or ()
+        for name in named:
+            if name not in bodies:
+                hint = nearest(name, bodies) if bodies else "the scene has no [[body]]"
+                raise InputError(f'body = "{name}" is not a body, {hint}')
+        return [bodies[name] for name in dict.fromkeys(named)]
+
+    def scores(self, values):
+        """Numbers of which the largest is that of the value that counts, see ``select`` of `refweb.Observe`."""
+        if self.observe.select == "abs":
+            return np.abs(values)
+        return -values if self.observe.select == "min" else values
+
+    def selected(self, values):
+        """The value that counts, and its number."""
+        at = int(np.argmax(self.scores(values)))
+        return float(abs(values[at]) if self.observe.select == "abs" else values[at]), at
+
+    @property
+    def selects(self):
+        """True where a value counts that is not the largest."""
+        return self.observe.select not in (None, "max")
 
     def bounds(self, system):
         """Least and largest value that are possible, whatever the state: a magnitude is not negative."""
-        return NOT_NEGATIVE if "component" in self.keys and self.observe.component is None else ANY
+        magnitude = "component" in self.keys and self.observe.component is None
+        return NOT_NEGATIVE if magnitude or self.observe.select == "abs" else ANY
 
     def bounds_by_tables(self, tables):
         """Least and largest value that the tables of a scene file leave, a dict; where they say less, any value."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...accepted import accepts
+from ...accepted import accepts, any_of, array
 from ...errors import InputError
 from ...messages import nearest, quote
 from ...registry import OBSERVABLES, load
@@ -19,6 +19,18 @@ def _quantity(name, value):
     return value
 
 
+_name = text().metadata["read"]
+
+
+@accepts(any_of(_name.accepts, array(_name.accepts, 1)))
+def _bodies(name, value):
+    if not isinstance(value, (list, tuple)):
+        return _name(name, value)
+    if not value:
+        raise InputError(f"{name} = [] must be at least one body")
+    return tuple(_name(f"{name}[{i}]", body) for i, body in enumerate(value))
+
+
 @table
 class Observe(Table):
     """A named number, followed over time.
@@ -30,17 +42,24 @@ class Observe(Table):
     quantity : str
         What is followed, one of `refweb.registry.OBSERVABLES`.
     node : int, str or list, optional
-        Node of a nodal quantity. Of several nodes the one with the largest value counts, for a reaction their sum;
-        without ``node`` that is over all.
-    body : str, optional
-        Body of a nodal quantity. Its reaction is the force of contact on it, of lines and other bodies together: 0
-        where nothing touches it, whatever drag, gravity, a frame or the lines that it holds by ``[[attach]]`` do to it.
-        The force with which it holds these is the reaction of their nodes.
+        Node of a nodal quantity, or several, see ``select``; without ``node`` all.
+    body : str or list of str, optional
+        Body of a nodal quantity, or several. Its reaction is the force of contact on it, of lines and other bodies
+        together: 0 where nothing touches it, whatever drag, gravity, a frame or the lines that it holds by
+        ``[[attach]]`` do to it. The force with which it holds these is the reaction of their nodes.
     to : str, optional
         Body that a distance ends at, of one node or another body; without it that of two nodes.
     line : int, str or list, optional
-        Lines of a line quantity, by number or group, see `refweb.net.groups`. Of several the one with the largest
-        value counts; without ``line`` that is over all.
+        Lines of a line quantity, by number or group, see `refweb.net.groups`; without ``line`` all.
+    part : {"start", "middle", "end"}, optional
+        Element of each line that a line quantity is looked at in: that at its first node, that at its middle or behind
+        it, or that at its last node; without it all elements. A value of an element of order 1 is that of its middle;
+        of a higher order it is the largest of its quadrature points. What a support bears, with the mass that is lumped
+        there, is its reaction.
+    select : {"max", "min", "abs"}, optional
+        Value that counts of several nodes, bodies or lines: the largest, which is the default, the smallest, or the
+        largest absolute value, without its sign. The reaction of several is their sum, and with ``select`` that of the
+        one that counts.
     component : {0, 1, 2, "x", "y", "z", "w"}, optional
         Axis of a nodal quantity, or of one of a body that turns; without it the magnitude. Of an orientation it is the
         component of the quaternion that takes the axes x, y and z to those of the body, "w" or 3 being its scalar part;
@@ -53,8 +72,8 @@ class Observe(Table):
         history holds the mean until its time, and ``reduce`` takes the largest, smallest or final mean, which belongs
         to no node or line. Before the first window is full the mean is over the time that has passed, at t = 0 the
         value itself; "max" and "min" look at full windows only. With several nodes or lines it is the mean of the
-        largest value, not the largest of the means. Energies, work and step size have no window: they are summed over
-        steps.
+        value that counts, such as the largest, not the largest of the means. Energies, work and step size have no
+        window: they are summed over steps.
 
     Raises
     ------
@@ -77,20 +96,22 @@ class Observe(Table):
     name: str = text(limit=80)
     quantity: str = field(_quantity)
     node: Several = nodes(default=None)
-    body: str | None = text(default=None)
+    body: Several = field(_bodies, default=None)
     to: str | None = text(default=None)
     line: Several = nodes(default=None, what="line")
+    part: str | None = choice("start", "middle", "end", default=None)
+    select: str | None = choice("max", "min", "abs", default=None)
     component: int | None = component(default=None, axes="xyzw")
     reduce: str = choice("max", "min", "final", default="final")
     average: float | None = real(default=None, above=0.0, unit="s")
 
     def check(self):
-        """Refuse a node, line or component that the quantity does not have."""
+        """Refuse a node, line, component or choice that the quantity does not have."""
         if "," in self.name or '"' in self.name:
             raise InputError(
                 f"name = {quote(self.name)} must have no commas and no quotes: it heads a column of history.csv"
             )
-        for key in ("node", "body", "to", "component", "line"):
+        for key in ("node", "body", "to", "component", "line", "part", "select"):
             if getattr(self, key) is not None and key not in self.observable.keys:
                 value = quote(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')

@@ -1,4 +1,4 @@
-"""Depth of lines in a body."""
+"""Depth of lines in bodies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .observable import NOT_NEGATIVE, Observable, Value
 
 
 class Overlap(Observable):
-    """Depth of the deepest contact of a body with lines, 0 where no line touches it; it stands at the line.
+    """Depth of the deepest contact of a body, or of several, with lines, 0 where none touches; it stands at the line.
 
     How deep two bodies overlap stands in ``pairs`` of ``run.json``.
 
@@ -23,11 +23,15 @@ class Overlap(Observable):
         """Refuse a scene without contact, a body that is none, and none where there are several."""
         if not system.contact:
             raise InputError('quantity = "overlap" needs [contact] in the scene')
-        self.body(system.net)
+        self._touched(system.net)
+
+    def _touched(self, net):
+        """The bodies that are named, or the only one."""
+        return self.bodies(net) if isinstance(self.observe.body, tuple) else [self.body(net)]
 
     def of(self, state):
         """The deepest over all lines."""
-        deep = state.overlap(self.body(state.system.net))
+        deep = np.max([state.overlap(body) for body in self._touched(state.system.net)], axis=0)
         at = int(np.argmax(deep))
         return Value(float(deep[at]), self.position(state.system, at if deep[at] > 0.0 else -1))
 
@@ -37,7 +41,7 @@ class Overlap(Observable):
 
     def probe(self, system):
         """Make the probe of the contact of its body."""
-        return probe_of(system, self.body(system.net))
+        return _deepest_of([system.contact_forces.row(body) for body in self._touched(system.net)])
 
     def position(self, system, at):
         """The line of an element, None where nothing is touched."""

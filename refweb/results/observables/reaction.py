@@ -1,4 +1,4 @@
-"""Reactions: the force of supports on nodes, of several nodes their sum, and the force of contact on a body.
+"""Reactions: the force of supports on nodes and of contact on bodies, of several their sum or that of one.
 
 A kernel has the whole force f on each row, and what supports add to it is −f. What contact adds to a body is the
 sum over its contacts, see `refweb.system.contact_forces`: where nothing touches it that is zero, whatever else acts.
@@ -10,7 +10,7 @@ import numpy as np
 
 from ...effects.base import CONTACT
 from .nodal import Nodal
-from .observable import Value
+from .observable import SELECTIONS, Value
 
 
 class Reaction(Nodal):
@@ -18,23 +18,35 @@ class Reaction(Nodal):
 
     unit = "N"
 
+    def vectors(self, state):
+        """Reactions [N], shape (rows, 3)."""
+        return state.reaction
+
     def of(self, state):
-        """The sum over its rows."""
+        """The sum over its rows, or the value that counts of them."""
         rows = self.rows(state.system)
-        total = state.reaction[rows] if len(rows) == 1 else state.reaction[rows].sum(axis=0, keepdims=True)
-        return Value(float(self.sizes(total)[0]), self.position(state.system, int(rows[0])))
+        if self.observe.select is not None or len(rows) == 1:
+            return super().of(state)
+        return Value(float(self.sizes(state.reaction[rows].sum(axis=0, keepdims=True))[0]), None)
 
     def position(self, system, at):
-        """The node, where it is one; a sum stands nowhere."""
-        return super().position(system, at) if len(self.rows(system)) == 1 else None
+        """The node or body, where it is one; a sum stands nowhere."""
+        stands = self.observe.select is not None or len(self.rows(system)) == 1
+        return super().position(system, at) if stands else None
 
     def probe(self, system):
-        """Make the probe of the support forces on nodes, or of all contact forces on a body."""
-        from ..probes import Probe, contact_force, reaction
+        """Make the probe of the support forces on nodes, or of all contact forces on bodies."""
+        from ..probes import REACTION, Probe, contact_force, reaction, selected_contact, selected_row
 
-        rows = self.rows(system)
-        numbers = self.numbers(rows)
+        rows, select = self.rows(system), self.observe.select
+        component = self.numbers(rows)[0]
         if self.observe.body is None:
-            return Probe(reaction, numbers, np.where(system.supported[rows], 1.0, 0.0))
-        row = system.contact_forces.row(self.body(system.net))
-        return Probe(contact_force, [numbers[0], row], np.zeros((0, 0)), term=CONTACT)
+            data = np.where(system.supported[rows], 1.0, 0.0)
+            if select is None:
+                return Probe(reaction, self.numbers(rows), data)
+            return Probe(selected_row, [REACTION, SELECTIONS[select], component, *rows], data)
+        felt, none = [system.contact_forces.row(body) for body in self.bodies(system.net)], np.zeros((0, 0))
+        if select is None:
+            return Probe(contact_force, [component, *felt], none, term=CONTACT)
+        numbers = [SELECTIONS[select], component, len(felt), *felt, *rows]
+        return Probe(selected_contact, numbers, none, term=CONTACT)
