@@ -13,6 +13,15 @@ _before = os.environ.get("PYTHONPATH")
 os.environ["PYTHONPATH"] = os.pathsep.join([str(pathlib.Path(__file__).parents[1]), *([_before] if _before else [])])
 os.environ.setdefault("REFWEB_COMPILERS", "1")
 
+
+@pytest.fixture(autouse=True, scope="session")
+def quiet():
+    """No line of progress in what tests read of the error stream, however long a busy machine takes."""
+    from refweb.results import progress
+
+    progress.EVERY = 1e6
+
+
 MANY = 5000
 """Number of tests from which on all files are collected whole, so that each variant that is named must be there."""
 

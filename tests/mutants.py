@@ -120,6 +120,7 @@ MIRRORS = {
     "system/contact_forces": "results/test_every_number.py results/test_contact_force.py",
     "dynamics/integrators/contacts": "results/test_contact_force.py",
     "results/probes": "results/test_observable_contract.py",
+    "results/progress": "results/test_loaded.py",
     "results/observables": "results/test_observable_contract.py results/test_selections.py "
     "dynamics/test_accuracy.py statics/test_statics.py",
     "runner": "results/test_remarks.py",
@@ -483,6 +484,8 @@ MUTANTS = [
     Mutant("dynamics/budget", "if spent > left or", "if"),
     Mutant("dynamics/budget", "last.price * (last.knob / knob) ** power", "last.price"),
     Mutant("dynamics/budget", "max(LEAST, RUNS * first)", "LEAST"),
+    Mutant("results/progress", "share < self._last:", "False:"),
+    Mutant("results/progress", "/ (share - self._first))", "/ share)"),
     Mutant("results/units", "scale_of(larger(value, error), unit)", "scale_of(value, unit)"),
     Mutant("results/solution", "max(self.value - lower, upper - self.value, 0.0)", "np.inf"),
     Mutant("results/columns", ", *dynamic_energies(system), *components(VECTORS)]", ", *dynamic_energies(system)]"),

@@ -85,7 +85,7 @@ def run_within_drift(simulation, folder, tell):
         simulation.budget.begin()
         with _twin_of(simulation) as twin:
             try:
-                run = simulation.run(folder, functools.partial(tell, text))
+                run = simulation.run(folder, functools.partial(_tell_phase, tell, text))
             except EnergyDriftError as error:
                 pays = error.drift <= PAYS * standing.drift and standing.repeated < MOST_ATTEMPTS - 1
                 if scene.solve.step_size is not None or standing.repeated >= ATTEMPTS - 1 and not pays:
@@ -96,8 +96,7 @@ def run_within_drift(simulation, folder, tell):
                 solution.findings.append(Finding("repeated", message, "solve", NOTE))
                 simulation.again(folder)
                 continue
-            tell("finding errors by step refinement", 1.0)
-            ended = twin.ended() if twin else None
+            ended = twin.ended(tell) if twin else None
         break
     if twin and isinstance(twin.failure, Spent):
         raise twin.failure
@@ -119,6 +118,11 @@ def run_within_drift(simulation, folder, tell):
         solution.findings.append(Finding("no-error", message, "accuracy"))
     if scene.throw is not None:
         solution.throw = _throw(simulation, run, ended, rows, known)
+
+
+def _tell_phase(tell, phase, text, share):
+    """Call ``tell`` with the name of a phase before a text."""
+    tell(f"{phase}, {text}", share)
 
 
 def _throw(simulation, run, ended, rows, known):

@@ -17,6 +17,7 @@ from ..results.observables.observe import SIGN, Observe
 from ..results.solution import Result
 from ..results.state import State, margin_of
 from ..results.strength import Utilisation
+from ..results.units import readable
 from .integrators.crossings import PAIRS
 from .integrators.events import Event
 from .integrators.integrator import History, Sum
@@ -214,6 +215,18 @@ class Watch:
             left_out = None if neglected is None else abs(value) * neglected
             results[o.name] = Result(value, None, o.unit, when, where, neglected=left_out, at=at)
         return results
+
+    def progress(self, course, tables):
+        """The largest or smallest value so far of the first result that is one, in words, a list of one text.
+
+        Without such a result it is the value of the first one in the last row of ``tables``.
+        """
+        for o in self._observables:
+            slot = self._slot(o)
+            if slot is not None and o.reduce != "final" and np.isfinite(value := course.extremes.values[slot]):
+                return [f"{'largest' if o.reduce == 'max' else 'smallest'} {o.name} {readable(value, None, o.unit)}"]
+        first = self._observables[0]
+        return [f"{first.name} {readable(tables[-1][-1, 1], None, first.unit)}"] if tables else []
 
     def state(self, course):
         """The `refweb.results.state.State` that a course is in."""

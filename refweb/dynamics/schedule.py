@@ -89,6 +89,11 @@ def row_times(scene):
     return times
 
 
+def time_of(t, end):
+    """The time that a run has come to [s], in words."""
+    return f"t = {t:.4g} of {end:.4g} s"
+
+
 def times_between(times):
     """Times that cut rows which are fewer than `FEW` into about `COMPARED` parts [s], equal in each row."""
     parts = -(-COMPARED // max(len(times) - 1, 1)) if len(times) <= FEW else 1

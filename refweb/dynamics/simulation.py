@@ -19,7 +19,7 @@ from .history import Watch
 from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored
 from .integrators.crossings import APART, BESIDE, THROUGH
 from .integrators.integrator import MAX_STEPS_PER_ROW, IntegratorState
-from .schedule import FEW_CORNERS, Schedule, blocks
+from .schedule import FEW_CORNERS, Schedule, blocks, time_of
 
 NO_TWIN = (
     "the run that it starts from had no step-refinement run: ± holds the error that this run adds, not that of "
@@ -191,17 +191,21 @@ class Simulation:
             passage.overlaps.refuse()
 
     def run(self, folder, tell):
-        """Run once from start to end and return an `RunResult`; ``tell`` is called with the share that is done."""
+        """Run once from start to end and return an `RunResult`.
+
+        ``tell`` is called with what the run has come to, in words, and the share that is done.
+        """
         times, integrator = self.schedule.times, self.integrator
         course, ahead = self._set_off(folder)
         self._refuse_overlap(course)
-        tell(ahead / len(times))
+        end = float(times[-1])
 
-        def report(share):
-            tell(share)
-            check_budget(self, share)
+        def report(t):
+            tell(", ".join([time_of(t, end), *self.watch.progress(course, self._tables)]), t / end)
+            check_budget(self, t / end)
 
-        integrator.on_progress = lambda t: report(t / times[-1])
+        report(course.time)
+        integrator.on_progress = report
         try:
             for first, history, compared in blocks(integrator, course, self.schedule, ahead):
                 table = self.watch.table(history)
@@ -220,7 +224,7 @@ class Simulation:
                         folder.row(row)
                 if last in self.schedule.frames or course.stopped:
                     self._frame(last, folder, course)
-                report((last + 1) / len(times))
+                report(course.time)
         except SolverError:
             self._refuse_overlap(course)  # whatever stopped it: what comes of a line within a body is nonsense
             raise

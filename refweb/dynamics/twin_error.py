@@ -17,11 +17,12 @@ from .budget import check_budget
 from .divergence import divergence
 from .history import SPREAD
 from .integrators.integrator import IntegratorState
-from .schedule import blocks
+from .schedule import blocks, time_of
 
 THREADS = True
 """Whether twins may have a thread of their own: not in processes that share a machine as it is."""
-
+PAUSE = 0.2
+"""Time between two looks at a twin that is waited for [s]."""
 
 MOST_CHANCE, TELLING = 10.0, 0.3
 """Most that differences which agree by chance are multiplied by, and the error of energy in a part of the time, over
@@ -74,6 +75,7 @@ class Twin:
     def __init__(self, simulation):
         self._simulation, self._stop = simulation, threading.Event()
         self._thread = self._course = self._last = self._rows = self._share_rows = self.failure = None
+        self._time, self._tell = 0.0, lambda text, share: None
 
     def __enter__(self):
         integrator = self._simulation.integrator
@@ -91,7 +93,15 @@ class Twin:
     def _on_progress(self, t):
         if self._stop.is_set():
             raise InterruptedError(f"the step-refinement run was ended at t = {t:g} s")
+        self._time = t
+        if self._thread is None:
+            self._report()
         check_budget(self._simulation, t / self._simulation.schedule.times[-1], twin=True)
+
+    def _report(self):
+        """Tell how far it is."""
+        end = float(self._simulation.schedule.times[-1])
+        self._tell(f"step refinement, {time_of(self._time, end)}", self._time / end)
 
     def _run(self, made):
         simulation, rows, share_rows = self._simulation, [], []
@@ -111,10 +121,14 @@ class Twin:
         except Exception as error:  # whatever it is, it belongs into the warnings of the run itself
             self.failure = error
 
-    def ended(self):
-        """Wait for it; what came of it, a `TwinRun`, None where it has failed."""
+    def ended(self, tell):
+        """Wait for it; what came of it, a `TwinRun`, None where it has failed; ``tell`` is called with its progress."""
+        self._tell = tell
+        self._report()
         if self._thread is not None:
-            self._thread.join()
+            while self._thread.is_alive():
+                self._thread.join(PAUSE)
+                self._report()
         else:
             self._run(self._simulation.integrator.refined)
         if self._course is None or self._rows is None or self._share_rows is None:

@@ -21,7 +21,7 @@ from ..messages import quote, short
 from ..results import case_rows
 from ..results.files import as_toml, write_text
 from ..results.folder import check_folder, is_alive, read_summary
-from ..results.progress import followed
+from ..results.progress import duration, followed
 from ..results.run_status import Clock, recorded
 from ..scene import Scene, file_of
 from .case import Job, keep_outcome, kept_files, machine
@@ -182,7 +182,7 @@ def _run(study_run, base, kept, workers, tell):
             rest = left * (now - began) / (start - left) if start > left else None
             bad = sum(row["status"] != "solved" for row in kept.rows.values())
             words = f"{total - left} of {total} cases" + (f", {bad} without results" if bad else "")
-            tell(words + (f", {_span(rest)} left" if rest is not None and left else ""), (total - left) / total)
+            tell(words + (f", {duration(rest)} left" if rest is not None and left else ""), (total - left) / total)
 
 
 def _job(study, base, case, workers):
@@ -195,13 +195,6 @@ def _job(study, base, case, workers):
                 files[path] = pathlib.Path(path).read_bytes()
     text = ", ".join(f"{short(key)} = {quote(value)}" for key, value in case.values.items())
     return Job(case.key, case.given, folder, f"{base.file} with {text}", study.keep, machine(), files)
-
-
-def _span(seconds):
-    """A time in words."""
-    if seconds < 90.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def _done(study_run, kept):

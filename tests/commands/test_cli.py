@@ -348,7 +348,8 @@ def test_statuses_as_the_shell_sees_them(tmp_path):
     (tmp_path / "wrong.toml").write_text(SCENE.replace("area = 1e-4", "area = -1e-4"), encoding="utf-8")
     program = pathlib.Path(sys.executable).with_name("refweb")
     done = subprocess.run([program, "run", "web.toml"], capture_output=True, text=True, cwd=tmp_path, timeout=120)
-    assert done.returncode == 0 and done.stderr == "" and (tmp_path / "small-web" / "run.json").is_file()
+    said = [line for line in done.stderr.splitlines() if " %  " not in line]  # but for progress on a busy machine
+    assert done.returncode == 0 and not said and (tmp_path / "small-web" / "run.json").is_file()
     done = python("-m", "refweb", "run", "wrong.toml", "--out", "no", cwd=tmp_path)
     assert done.returncode == 2 and done.stdout == "" and not (tmp_path / "no").exists()
     assert done.stderr == "refweb: wrong.toml: [cable] area = -0.0001 must be > 0 [m²]\n"

@@ -1,10 +1,13 @@
 """A solution read back from its folder, as meshes, as tables, in a notebook; and what is said of it."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
 import textwrap
+import threading
+import time
 import xml.etree.ElementTree as ElementTree
 
 import numba
@@ -14,7 +17,7 @@ import pytest
 import refweb
 from refweb.__main__ import main
 from refweb.results.folder import is_alive
-from refweb.results.progress import followed
+from refweb.results.progress import RemainingTime, followed
 from refweb.results.run_status import Clock
 from refweb.results.units import readable, with_error
 
@@ -243,7 +246,7 @@ def test_a_folder_does_not_hide_a_shipped_scene(tmp_path, monkeypatch, capsys):
 
 
 def test_progress_where_somebody_looks(monkeypatch, capsys):
-    """A bar in a terminal, a line in a notebook, nothing in a pipe; what is given is called itself."""
+    """A bar in a terminal, a line in a notebook, none so soon in a pipe; what is given is called itself."""
     told = []
     with followed(lambda text, share: told.append((text, share))) as tell:
         tell("so far", 0.5)
@@ -259,6 +262,88 @@ def test_progress_where_somebody_looks(monkeypatch, capsys):
     with followed(True) as tell:
         tell("so far", 0.5)
     assert capsys.readouterr().err.startswith("\r 50 %  so far")
+
+
+def test_lines_where_there_is_no_terminal(monkeypatch, capsys):
+    """One every `EVERY`, of what was last told, and of loading where nothing was."""
+    monkeypatch.setattr("refweb.results.progress.EVERY", 0.02)
+    shown = []
+    with followed(True) as tell:
+        while len(shown) < 2:
+            shown += capsys.readouterr().err.splitlines()
+            time.sleep(0.005)
+        tell("running, t = 0.5 of 1 s", 0.5)
+        while "running" not in shown[-1]:
+            shown += capsys.readouterr().err.splitlines()
+            time.sleep(0.005)
+    assert set(shown) == {"  0 %  loading", " 50 %  running, t = 0.5 of 1 s"}
+    count = threading.active_count()
+    with followed(True):
+        assert threading.active_count() == count + 1
+    assert threading.active_count() == count
+
+
+def test_remaining_time():
+    """What a phase still takes at the rate since it was first seen; each phase, and each repetition, by itself."""
+    now = [0.0]
+    remaining = RemainingTime(lambda: now[0])
+    told = []
+    for seconds, text, share in [
+        (0.0, "running, t = 0 of 1 s", 0.0),
+        (1.0, "running, t = 0.01 of 1 s", 0.01),  # of so little no rate is known
+        (10.0, "running, t = 0.1 of 1 s", 0.1),
+        (20.0, "running, t = 0.5 of 1 s", 0.5),
+        (21.0, "step refinement, t = 0.4 of 1 s", 0.4),
+        (41.0, "step refinement, t = 0.5 of 1 s", 0.5),
+        (42.0, "running with safety = 0.2, t = 0 of 1 s", 0.0),
+        (142.0, "running with safety = 0.2, t = 0.1 of 1 s", 0.1),
+        (143.0, "running with safety = 0.1, t = 0 of 1 s", 0.0),
+        (3143.0, "running with safety = 0.1, t = 0.2 of 1 s", 0.2),
+        (3143.0, "3 of 4 cases, 10 s left", 0.75),
+        (3144.0, "4 of 4 cases, 0 s left", 1.0),
+    ]:
+        now[0] = seconds
+        told.append(remaining.added_to(text, share)[len(text) :])
+    assert told == [
+        *("", "", ", 90 s left".replace("90 s", "2 min"), ", 20 s left", "", ", 100 s left".replace("100 s", "2 min")),
+        *("", ", 15 min left", "", ", 3.3 h left", "", ""),
+    ]
+
+
+def test_phases_of_a_run_are_told():
+    """Simulated time and the largest value so far, rising; then the step refinement, with a share of its own."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2]),
+        cable=refweb.Cable(law="tension-only", modulus=1e7, area=1e-4, density=100.0),
+        effects=[refweb.Load(node=1, force=(0.0, 0.0, 1.0))],
+        solve=refweb.Dynamic(duration=0.05),
+        output=refweb.Output(interval=0.01, frames=1),
+        observe=[
+            refweb.Observe(name="energy", quantity="strain_energy"),
+            refweb.Observe(name="sag", quantity="displacement", reduce="max"),
+        ],
+    )
+    told = []
+    solution = refweb.run(scene, progress=lambda text, share: told.append((text, share)))
+    told = [(text, share) for text, share in told if not text.startswith("compiling")]
+    running = [(text, share) for text, share in told if text.startswith("running")]
+    refined = told[len(running) :]
+    assert told[: len(running)] == running and len(running) >= 6 and refined
+    times, sags = [], []
+    for text, share in running:
+        found = re.fullmatch(r"running, t = (\S+) of 0.05 s, largest sag (\S+) (µ|n|m|)m", text)
+        times.append(float(found[1]))
+        sags.append(float(found[2]) * {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0}[found[3]])
+        assert abs(share - times[-1] / 0.05) < 1e-3
+    assert times[0] == sags[0] == 0.0 and times[-1] == 0.05 and sags == sorted(sags) and times == sorted(times)
+    np.testing.assert_allclose(sags[-1], solution.results["sag"].value, rtol=1e-5)  # of six digits
+    assert all(re.fullmatch(r"step refinement, t = \S+ of 0.05 s", text) for text, _ in refined)
+    assert [share for _, share in refined] == sorted(share for _, share in refined)
+    plain = scene.replace(observe=scene.observe[:1], accuracy=refweb.Accuracy(error="none"))
+    told.clear()
+    refweb.run(plain, progress=lambda text, share: told.append((text, share)))
+    assert not any(text.startswith("step refinement") for text, _ in told)
+    assert re.fullmatch(r"running, t = 0.05 of 0.05 s, energy \S+ \w*J", told[-1][0])
 
 
 def test_compiling_is_told_apart():
