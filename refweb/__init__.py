@@ -56,6 +56,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .solution import Solution as Solution
     from .solution import load as load
     from .studies.cost import Cost as Cost
+    from .studies.form import form as form
     from .studies.modes import Modes as Modes
     from .studies.modes import modes as modes
     from .studies.work_precision import cost as cost

@@ -15,6 +15,7 @@ from .effects.elasticity import Elasticity
 from .errors import InputError, refused_at
 from .messages import nearest, quote
 from .net import discretisation
+from .net.tension_laws import CONSTANT_FORCE, NAMES
 from .net.web import Web
 from .registry import EFFECTS, INTEGRATORS, load, name_of
 from .results.columns import taken
@@ -67,6 +68,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     _check_history(solve, output, len(observables))
     net = discretisation.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
     net = replace(net, end=float(max(solve.load_steps) if net.quasi_static else solve.duration))
+    _check_forming(net, solve)
     supported = _supported(net, supports, support)
     system = System(net, [Elasticity(), *_acting(effects)], supported, solve.factorization)
     if len(net.web.broken):
@@ -136,6 +138,22 @@ def _check_history(solve, output, observables):
         rows = solve.duration / output.interval
         size = rows * memory.BYTES_PER_ROW * (memory.NUMBERS_PER_ROW + observables)
         memory.check(size, f"[output] interval = {output.interval:g}: {rows:.3g} rows of {observables} observables")
+
+
+def _check_forming(net, solve):
+    """Refuse laws of form finding for what is no form finding."""
+    for element in np.flatnonzero(net.forming)[:1]:
+        law = f'[cable] law = "{list(NAMES)[net.laws[element]]}"'
+        if solve.kind != "static":
+            raise InputError(
+                f'{law} is for form finding, [solve] kind = "static": run what refweb.form makes of that, which has '
+                "elastic lines"
+            )
+        if solve.method == "relaxation" and (net.laws == CONSTANT_FORCE).any():
+            law = 'law = "constant-force"'
+            raise InputError(
+                f'[solve] method = "relaxation" must be "newton" with {law}: no step is short enough for it'
+            )
 
 
 def _supported(net, supports, support):

@@ -180,6 +180,7 @@ EXPORTS = (
     "refweb.pictures.pictures:picture",
     "refweb.studies.modes:modes",
     "refweb.studies.modes:Modes",
+    "refweb.studies.form:form",
     "refweb.studies.work_precision:cost",
     "refweb.runner:trust",
     "refweb.studies.cost:Cost",

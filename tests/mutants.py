@@ -38,7 +38,9 @@ MIRRORS = {
     "net/single_cable": "net/test_webs.py",
     "net/discretisation": "net/test_elements.py system/test_orders.py",
     "net/elements": "net/test_elements.py system/test_orders.py",
-    "net/cable": "net/test_elements.py test_scene.py",
+    "net/cable": "net/test_elements.py test_scene.py studies/test_form.py",
+    "net/sag": "studies/test_form.py",
+    "statics/bars": "studies/test_form.py statics/test_statics.py",
     "net/tension_laws": "net/test_laws.py net/test_elements.py",
     "net/rigid_body": "effects/test_contact.py test_contract.py effects/test_tumbling.py",
     "net/rotation": "net/test_rotation.py effects/test_tumbling.py",
@@ -243,7 +245,15 @@ MUTANTS = [
     Mutant("net/discretisation", "quadrature=gauss(element.maxdeg))", "quadrature=gauss(element.maxdeg + 1))"),
     Mutant("net/discretisation", "np.array([0.5, 0.5])", "np.array([0.6, 0.4])"),
     Mutant("net/discretisation", "g0 = 2.0 * smoothing**2", "g0 = smoothing**2"),
-    Mutant("net/cable", "web.natural_length / (1.0 + prestrain)", "web.natural_length * (1.0 - prestrain)"),
+    Mutant("net/cable", "web.natural_length / (1.0 + strain)", "web.natural_length * (1.0 - strain)"),
+    Mutant("net/cable", 'density * values["natural_length"], force)', "density, force)"),
+    Mutant("net/sag", "return np.sinh(u) / u", "return np.sinh(u) / u + u * u"),
+    Mutant("statics/bars", "np.where(forming, 0.0, self.natural)", "self.natural"),
+    Mutant(
+        "studies/form",
+        "lengths, before = np.where(net.forming, natural, web.natural_length), change",
+        "before = change",
+    ),
     # Laws, forces and tangents
     Mutant(
         "net/tension_laws",
@@ -415,7 +425,7 @@ MUTANTS = [
     Mutant("statics/duality_bound", "_gaps(bars, force, size).sum() + rounding)", "_gaps(bars, force, size).sum())"),
     Mutant("statics/duality_bound", "np.sqrt(2.0 * bars.stiffness * gap)", "np.sqrt(bars.stiffness * gap)"),
     Mutant(
-        "statics/duality_bound", "np.where(bars.tension > 0.0, 0.0, bars.natural - bars.length)", "0.0 * bars.length"
+        "statics/duality_bound", "np.where(bars.tension > 0.0, 0.0, bars.unstressed - bars.length)", "0.0 * bars.length"
     ),
     Mutant("statics/floating", "tension > equilibrium.duality_bound.tension[:, None]", "tension > -1.0"),
     Mutant("statics/floating", "limits[side, open_, axis] = sign * far[open_]", "pass"),

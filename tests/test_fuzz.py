@@ -97,6 +97,9 @@ CABLE = table(
         "subdivide": st.integers(1, 2),
     },
 )
+FORMED = [{"pretension": 1.0}, {"sag": 0.1}, {"law": "constant-force", "pretension": 10.0}]
+FORMED += [{"law": "force-density", "force_density": density} for density in (2.0, -2.0)]
+CABLE = st.builds(lambda cable, more: cable | more, CABLE, st.sampled_from([{}] * 8 + FORMED))
 SHAPES = st.one_of(
     table(shape=st.just("sphere"), radius=PLAIN),
     table(shape=st.just("ring"), radius=PLAIN, normal=VECTOR),

@@ -50,6 +50,9 @@ def print_scene(scene, system):
     law = cable.law
     if law == "smooth":
         law += f", ε0 = {cable.slackness:g}, η = {cable.smoothing:g}"
+    of_form = {"force-density": (cable.force_density, "N/m"), "constant-force": (cable.pretension, "N")}
+    value, unit = of_form.get(law, (None, ""))
+    law += f", {value:g} {unit}" if value is not None else ""
     present = [name_of(EFFECTS, effect) for effect in scene.effects]
     count = {name: present.count(name) for name in present}
     counted = [f"{name} × {times}" if times > 1 else f"{name}" for name, times in count.items()]

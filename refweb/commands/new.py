@@ -26,11 +26,11 @@ columns = 12
 side = 0.1                  # length of each line [m]
 
 [cable]
-law = "tension-only"        # smooth | tension-only | linear
+law = "tension-only"        # smooth | tension-only | linear | force-density | constant-force
 modulus = 7e7               # E [Pa]
 area = 1e-4                 # A [m²]
 density = 200.0             # [kg/m³]
-# prestrain = 1e-3          # natural length = distance/(1 + prestrain)
+# prestrain = 1e-3          # natural length = distance/(1 + prestrain); or pretension [N], or sag
 # strength = 2e8            # [Pa], for the utilisation
 
 # In place of the web's own supports: node numbers, "rim", "corners", "centre", "all", or none, [].

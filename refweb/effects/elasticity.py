@@ -114,7 +114,7 @@ def kernels(law, gradients, weights):
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
             line = line_at(data, c)
-            axial = line.ea / line.natural_length
+            axial = abs(line.ea) / line.natural_length
             for q in range(points):
                 total = 0.0
                 for a in range(nodes):

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..errors import InputError
 from ..kernels import (
     ENERGY,
     INDICES,
@@ -101,8 +102,19 @@ def with_factor(net, lines, table):
         Lines of the web; all elements of a line share the factor.
     table : sequence of (t, factor)
         Linear in between, end values held.
+
+    Raises
+    ------
+    InputError
+        For a line with a law of form finding.
     """
-    return replace(net, factors=(*net.factors, (np.flatnonzero(np.isin(net.line, lines)), table)))
+    elements = np.flatnonzero(np.isin(net.line, lines))
+    for element in elements[net.forming[elements]][:1]:
+        raise InputError(
+            f"line {net.line[element]} has a law of form finding, whose tension does not depend on its natural length: "
+            "leave it out"
+        )
+    return replace(net, factors=(*net.factors, (elements, table)))
 
 
 def shortest_of(net):

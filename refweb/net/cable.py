@@ -1,4 +1,4 @@
-"""The cable a web is made of: material, section and slackness of every line, by group."""
+"""The cable a web is made of: material, section, slackness and natural length of every line, by group."""
 
 from __future__ import annotations
 
@@ -7,16 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, refused_at
 from ..messages import quote
 from ..tables import LARGEST, Table, by_group, choice, integer, real, table
 from .groups import givers
 from .materials import FILLED, MATERIALS
-from .tension_laws import NAMES, SMOOTH
+from .tension_laws import CONSTANT_FORCE, FORCE_DENSITY, FORM_FINDING, NAMES, SMOOTH, strains_of
 
 SMOOTH_LAW = {"slackness": 0.0, "smoothing": 1e-5}
 """Parameters of the smooth law where none are given."""
 _DENSE: dict = dict(at_least=0, unit="kg/m³")
+LENGTHS = ("prestrain", "pretension", "sag")
+"""Keys that say what natural length a line has."""
+DENSITY = "force_density"
+DEEPEST = 100.0
+"""Largest sag over the distance of the ends of a line."""
 
 
 @table
@@ -25,7 +30,7 @@ class Group(Table):
 
     Parameters
     ----------
-    law : {"smooth", "tension-only", "linear"}, optional
+    law : {"smooth", "tension-only", "linear", "force-density", "constant-force"}, optional
         Tension law; of the smooth one ε0 = 0 and η = 1e-5 where the cable has another and the group none of its own.
     material : str, optional
         As for `Cable`: modulus, density and strength of the group where it has none of its own.
@@ -38,8 +43,10 @@ class Group(Table):
     slackness, smoothing : float, optional
         Of the smooth law: the strain ε0 at which lines become taut, and the width η of the passage from slack to taut
         [1], ≥ 0.
-    prestrain : float, optional
-        Natural length = distance/(1 + prestrain) [1], > −1.
+    prestrain, pretension, sag : float, optional
+        Natural length, see `Cable`; one of them takes the place of what the cable gives.
+    force_density : float, optional
+        Of the law "force-density" [N/m], not 0.
     strength : float, optional
         Stress at which a line breaks [Pa], > 0.
     safety_factor, knot_factor : float, optional
@@ -48,7 +55,7 @@ class Group(Table):
     Raises
     ------
     InputError
-        For a number that is not finite or out of these bounds.
+        For a number that is not finite or out of these bounds, and for two keys of natural length.
 
     Examples
     --------
@@ -65,13 +72,17 @@ class Group(Table):
     slackness: float | None = real(default=None, at_least=0, unit="1")
     smoothing: float | None = real(default=None, at_least=0, unit="1")
     prestrain: float | None = real(default=None, above=-1, unit="1")
+    pretension: float | None = real(default=None, unit="N")
+    sag: float | None = real(default=None, at_least=0, at_most=DEEPEST, unit="1")
+    force_density: float | None = real(default=None, unit="N/m")
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float | None = real(default=None, above=0, unit="1")
     knot_factor: float | None = real(default=None, above=0, at_most=1, unit="1")
 
     def check(self):
-        """Fill in what the material gives."""
+        """Fill in what the material gives; refuse two keys of natural length, and a force density that is none."""
         _fill(self)
+        _check_lengths(self)
 
     def filled(self):
         """The group with the smooth law's parameters where it has none."""
@@ -84,14 +95,17 @@ class Cable(Table):
 
     Parameters
     ----------
-    law : {"smooth", "tension-only", "linear"}
+    law : {"smooth", "tension-only", "linear", "force-density", "constant-force"}
         Tension law, see `refweb.net.tension_laws`. Groups may have others: struts beside cables. Lines that can push
-        end the proven bound that statics has where all lines are tension-only.
+        end the proven bound that statics has where all lines are tension-only. The last two are those of form finding,
+        for statics: the tension of a line is ``force_density`` times its length, or ``pretension``, whatever its
+        natural length is, and `refweb.form` makes a net of elastic lines of the shape.
     material : str, optional
         Gives the modulus, the density and the strength where these keys are absent: typical values of a fibre or rope,
         which ``refweb help materials`` lists with their sources. A braid is softer and weaker than its fibre.
     modulus : float
-        Asymptotic modulus E [Pa], > 0; may be left out beside a material.
+        Asymptotic modulus E [Pa], > 0; of the laws of form finding that of the lines that `refweb.form` makes. It may
+        be left out beside a material.
     area : float
         Cross section A [m²], > 0.
     density : float
@@ -101,6 +115,16 @@ class Cable(Table):
         [1]; 0 and 1e-5 by default.
     prestrain : float
         Natural length = distance/(1 + prestrain) [1], > −1; negative is slack.
+    pretension : float, optional
+        Natural length such that this is the tension of each line in the web's position [N]; below 0 with the linear law
+        alone. With the law "constant-force" it is that force, not 0; negative pushes.
+    sag : float, optional
+        Natural length of a line that hangs by this share of the distance of its ends [1], as an inextensible rope under
+        its weight does between ends of one height; 0 to 100. It shows with ``subdivide`` above 1.
+    force_density : float, optional
+        Of the law "force-density": tension over length of a line, or of its chord where it is in several elements
+        [N/m], not 0; negative pushes. Where it is above 0 on all lines, beside lines of the law "tension-only", the
+        equilibrium under dead loads is the only one and its errors are proven; where it is negative they are estimates.
     strength : float, optional
         Stress at which a line breaks [Pa]; utilisation is reported against it.
     safety_factor : float
@@ -119,10 +143,11 @@ class Cable(Table):
     Raises
     ------
     InputError
-        For an unknown law or order, a number out of these bounds, and slackness or smoothing, of a group as well, with
-        another law than the smooth one; from ``properties``, the same of a line in several groups, for a group that no
-        line has, two groups that give one key to the same line, prestrain of a web whose natural lengths are given, and
-        a line whose stiffness or mass is above `refweb.tables.LARGEST`.
+        For an unknown law or order, a number out of these bounds, slackness or smoothing, of a group as well, with
+        another law than the smooth one, and two of prestrain, pretension and sag; from ``properties``, the same of a
+        line in several groups, for a group that no line has, two groups that give one key to the same line, a key that
+        the law of a line does not take or does not have, prestrain, pretension or sag of a web whose natural lengths
+        are given, and a line whose stiffness or mass is above `refweb.tables.LARGEST`.
 
     Examples
     --------
@@ -143,6 +168,9 @@ class Cable(Table):
     slackness: float | None = real(default=None, at_least=0, unit="1")
     smoothing: float | None = real(default=None, at_least=0, unit="1")
     prestrain: float = real(default=0.0, above=-1, unit="1")
+    pretension: float | None = real(default=None, unit="N")
+    sag: float | None = real(default=None, at_least=0, at_most=DEEPEST, unit="1")
+    force_density: float | None = real(default=None, unit="N/m")
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float = real(default=1.0, above=0, unit="1")
     knot_factor: float = real(default=1.0, above=0, at_most=1, unit="1")
@@ -151,8 +179,9 @@ class Cable(Table):
     groups: dict = by_group(Group, "cable", default_factory=dict)
 
     def check(self):
-        """Fill in what the material gives and the smooth law's parameters; refuse the latter for other laws."""
+        """Fill in what the material gives and the smooth law's parameters; refuse what does not fit together."""
         _fill(self)
+        _check_lengths(self)
         for key, unit in (("modulus", "Pa"), ("density", "kg/m³")):
             if getattr(self, key) is None:
                 raise InputError(
@@ -189,17 +218,18 @@ class Cable(Table):
         Raises
         ------
         InputError
-            For a group that no line has, two groups that give the same key to one line, or prestrain beside given
-            natural lengths.
+            For a group that no line has, two groups that give the same key to one line, a key that the law of a line
+            does not take or does not have, or one of natural length beside given natural lengths.
         """
         values = self._values(web)
-        prestrain = values.pop("prestrain")
-        if web.length_given and prestrain.any():
-            worst = prestrain[np.argmax(np.abs(prestrain))]
-            raise InputError(f"[cable] prestrain = {worst:g} cannot be used: the web's natural lengths are given")
-        values["natural_length"] = web.natural_length / (1.0 + prestrain)
+        _check_laws(values)
+        values["natural_length"] = _natural_lengths(web, values)
+        forming, area = np.isin(values["law"], FORM_FINDING), values["area"]
+        density, force = values.pop("force_density"), values.pop("pretension")
         with np.errstate(over="ignore"):
-            stiffness = values["modulus"] * values["area"] / values["natural_length"]
+            size = np.where(values["law"] == FORCE_DENSITY, density * values["natural_length"], force)
+            values["modulus"] = np.where(forming, size / area, values["modulus"])
+            stiffness = np.abs(values["modulus"]) * area / values["natural_length"]
             mass = values["density"] * values["area"] * values["natural_length"]
         for name, value, unit in (("stiffness modulus × area / length", stiffness, "N/m"), ("mass", mass, "kg")):
             bad = np.flatnonzero(~(value <= LARGEST))
@@ -210,12 +240,28 @@ class Cable(Table):
     def _values(self, web):
         """Values that the cable and its groups give to each line, by key."""
         given, values = givers(web.groups, self.groups, len(web.lines), "[cable.groups]"), {}
-        missing = {"strength": np.inf, "slackness": 0.0, "smoothing": 0.0}
+        missing = {
+            "strength": np.inf,
+            "slackness": 0.0,
+            "smoothing": 0.0,
+            **dict.fromkeys((*LENGTHS[1:], DENSITY), np.nan),
+        }
         for key in (f.name for f in fields(Group) if f.name != "material"):
             values[key] = np.full(len(web.lines), _number(self, key, missing))
             for number, group in enumerate(self.groups.values()):
                 if key in given and getattr(group, key) is not None:
                     values[key][given[key] == number] = _number(group, key, missing)
+        _replace_lengths(values, given)
+        by_group, forming = given.get("law", np.full(len(web.lines), -1)) >= 0, np.isin(values["law"], FORM_FINDING)
+        left_out = {  # of what the cable gives to lines of its own law
+            DENSITY: values["law"] != FORCE_DENSITY,
+            "pretension": values["law"] == FORCE_DENSITY,
+            "prestrain": forming,
+            "sag": forming,
+        }
+        for key, lines in left_out.items():
+            by_key = given.get(key, np.full(len(by_group), -1)) >= 0
+            values[key][lines & by_group & ~by_key] = 0.0 if key == "prestrain" else np.nan
         plain = values["law"] != SMOOTH
         for key in SMOOTH_LAW:
             for line in np.flatnonzero(plain & (given.get(key, np.full(len(plain), -1)) >= 0))[:1]:
@@ -233,6 +279,76 @@ def _fill(table):
     for key in FILLED if table.material else ():
         if getattr(table, key) is None:
             object.__setattr__(table, key, getattr(MATERIALS[table.material], key))
+
+
+def _check_lengths(table):
+    """Refuse two keys of natural length in one table, and a force density that is none."""
+    keys = [key for key in LENGTHS if getattr(table, key) not in (None, 0.0 if key == "prestrain" else None)]
+    if len(keys) > 1:
+        first, second = (f"{key} = {getattr(table, key):g}" for key in keys[:2])
+        raise InputError(f"{first} and {second} both say what the natural length is: leave one of them out")
+    if table.force_density == 0.0:
+        raise InputError("force_density = 0 must not be 0 [N/m]: leave the line out of the web")
+
+
+def _replace_lengths(values, given):
+    """Leave to lines whose natural length groups give nothing of what the cable gives of it."""
+    by = [given[key] >= 0 for key in LENGTHS if key in given]
+    if not by:
+        return
+    for line in np.flatnonzero(np.sum(by, axis=0) > 1)[:1]:
+        raise InputError(f"[cable.groups] line {line} has two of {', '.join(LENGTHS)}: give it one of them")
+    for key, none in zip(LENGTHS, (0.0, np.nan, np.nan), strict=True):
+        values[key][np.any(by, axis=0) & ~(given.get(key, np.full(len(by[0]), -1)) >= 0)] = none
+
+
+def _check_laws(values):
+    """Refuse what the law of a line does not take, and what it does not have."""
+    law, density, force = values["law"], values[DENSITY], values["pretension"]
+    forming, needs = np.isin(law, FORM_FINDING), {FORCE_DENSITY: density, CONSTANT_FORCE: force}
+    taken = [
+        (DENSITY, ~np.isnan(density) & (law != FORCE_DENSITY)),
+        ("pretension", ~np.isnan(force) & (law == FORCE_DENSITY)),
+        ("prestrain", forming & (values["prestrain"] != 0.0)),
+        ("sag", forming & ~np.isnan(values["sag"])),
+    ]
+    for key, wrong in taken:
+        for line in np.flatnonzero(wrong)[:1]:
+            name = list(NAMES)[law[line]]
+            raise InputError(
+                f'[cable] {key} = {values[key][line]:g} has no meaning with law = "{name}", which line {line} has: '
+                "leave it out"
+            )
+    for number, key in ((FORCE_DENSITY, DENSITY), (CONSTANT_FORCE, "pretension")):
+        missing = np.isnan(needs[number]) | (needs[number] == 0.0)
+        for line in np.flatnonzero((law == number) & missing)[:1]:
+            unit, name = ("N/m" if key == DENSITY else "N"), list(NAMES)[number]
+            raise InputError(f'[cable] law = "{name}" of line {line} needs {key} = ..., not 0 [{unit}]')
+
+
+def _natural_lengths(web, values):
+    """Natural length of each line [m], shape (lines,); takes the keys that say so out of the values."""
+    prestrain, sag = values.pop("prestrain"), values.pop("sag")
+    tension, forming = values["pretension"], np.isin(values["law"], FORM_FINDING)
+    tense, hangs = ~np.isnan(tension) & ~forming, ~np.isnan(sag)
+    for key, given, value in (
+        ("prestrain", prestrain != 0.0, prestrain),
+        ("pretension", tense, tension),
+        ("sag", hangs, sag),
+    ):
+        for line in np.flatnonzero(given)[:1] if web.length_given else ():
+            raise InputError(f"[cable] {key} = {value[line]:g} cannot be used: the web's natural lengths are given")
+    strain = prestrain.copy()
+    if tense.any():
+        numbers = (values[key] for key in ("modulus", "area", "slackness", "smoothing"))
+        with refused_at("[cable] pretension:"):
+            strain += strains_of(values["law"], np.where(tense, tension, 0.0), *numbers)
+    length = web.natural_length / (1.0 + strain)
+    if hangs.any():
+        from .sag import over_chord
+
+        length[hangs] *= over_chord(sag[hangs])
+    return length
 
 
 def _smoothed(table, share):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .tension_laws import MIXED
+from .tension_laws import FORM_FINDING, MIXED
 
 if TYPE_CHECKING:
     from .line_data import LineData
@@ -114,6 +114,16 @@ class Net:
     def laws(self):
         """Number of the law of each element, shape (cells,)."""
         return np.full(len(self.cells), self.law.number) if self.law else self.line_data.law.astype(np.int64)
+
+    @cached_property
+    def forming(self):
+        """True for each element with a law of form finding, shape (cells,)."""
+        return np.isin(self.laws, FORM_FINDING)
+
+    @property
+    def axial(self):
+        """Size of EA of each element [N], of what stands in its place for laws of form finding, shape (cells,)."""
+        return np.abs(self.line_data.ea)
 
     @property
     def heavy(self):

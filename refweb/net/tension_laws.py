@@ -8,6 +8,9 @@ g = (s + r)/2 (for s < 0: 2η²/(r − s)) and g0, r0 its values at ε = 0 the s
 
 which has a relative error of a few units of round-off everywhere. Under compression the stress tends to the floor −αE.
 
+Two laws are those of form finding. Their tension does not depend on natural length: T = q l of a force density q, and
+a constant force. In place of EA they have q L, L the natural length, and the force, so that T = EA (1 + ε) and T = EA.
+
 Scalar functions, one formula for the compiled kernels and for `Law`.
 """
 
@@ -22,9 +25,17 @@ from ..errors import InputError
 from ..kernels import Vector, kernel
 from ..messages import nearest
 
-SMOOTH, TENSION_ONLY, LINEAR = 0, 1, 2
-NAMES = {"smooth": SMOOTH, "tension-only": TENSION_ONLY, "linear": LINEAR}
-MIXED = 3
+SMOOTH, TENSION_ONLY, LINEAR, FORCE_DENSITY, CONSTANT_FORCE = range(5)
+NAMES = {
+    "smooth": SMOOTH,
+    "tension-only": TENSION_ONLY,
+    "linear": LINEAR,
+    "force-density": FORCE_DENSITY,
+    "constant-force": CONSTANT_FORCE,
+}
+FORM_FINDING = (FORCE_DENSITY, CONSTANT_FORCE)
+"""Laws of form finding."""
+MIXED = len(NAMES)
 """Number of no law, for kernels over lines of several: that of each line stands among its own numbers."""
 
 
@@ -44,6 +55,10 @@ def prepared_stress(law, strain, modulus, slackness, smoothing, g0, r0):
         return modulus * strain
     if law == TENSION_ONLY:
         return 0.0
+    if law == FORCE_DENSITY:
+        return modulus * (1.0 + strain)
+    if law == CONSTANT_FORCE:
+        return modulus
     g, r = branch(strain - slackness, smoothing)
     if r + r0 == 0.0:
         return 0.0
@@ -60,9 +75,9 @@ def stress(law, strain, modulus, slackness, smoothing):
 @kernel()
 def tangent(law, strain, modulus, slackness, smoothing):
     """dσ/dε [Pa]; at the kink of a law without smoothing the taut side's."""
-    if law == LINEAR or (law == TENSION_ONLY and strain >= 0.0):
+    if law == LINEAR or law == FORCE_DENSITY or (law == TENSION_ONLY and strain >= 0.0):
         return modulus
-    if law == TENSION_ONLY:
+    if law == TENSION_ONLY or law == CONSTANT_FORCE:
         return 0.0
     g, r = branch(strain - slackness, smoothing)
     if r == 0.0:
@@ -82,8 +97,8 @@ def curvature(law, strain, modulus, slackness, smoothing):
 
 @kernel()
 def above_floor(law, strain, modulus, slackness, smoothing):
-    """σ(ε) + αE, how far the stress is above the law's floor [Pa]; infinite for the linear law."""
-    return math.inf if law == LINEAR else modulus * branch(strain - slackness, smoothing)[0]
+    """σ(ε) + αE, how far the stress is above the law's floor [Pa]; infinite for laws without a floor."""
+    return math.inf if law >= LINEAR else modulus * branch(strain - slackness, smoothing)[0]
 
 
 @kernel()
@@ -93,6 +108,10 @@ def energy_density(law, strain, modulus, slackness, smoothing):
         return 0.5 * modulus * strain * strain
     if law == TENSION_ONLY:
         return 0.0
+    if law == FORCE_DENSITY:
+        return modulus * strain * (1.0 + 0.5 * strain)
+    if law == CONSTANT_FORCE:
+        return modulus * strain
     s = strain - slackness
     g0, r0 = branch(-slackness, smoothing)
     if abs(strain) < 1e-4 * max(slackness, 2.0 * smoothing):
@@ -131,9 +150,9 @@ class Law:
 
     Parameters
     ----------
-    name : {"smooth", "tension-only", "linear"}
+    name : {"smooth", "tension-only", "linear", "force-density", "constant-force"}
         ``smooth`` has slackness ε0 ≥ 0 and smoothing η ≥ 0; ``tension-only`` is its limit η → 0 at ε0 = 0, of convex
-        energy; ``linear`` resists compression like a bar.
+        energy; ``linear`` resists compression like a bar; the others are those of form finding.
 
     Raises
     ------
@@ -169,8 +188,10 @@ class Law:
         return self._evaluate(STRESS, strain, modulus, slackness, smoothing)
 
     def strain(self, stress, modulus=1.0, slackness=0.0, smoothing=0.0):
-        """Strain of a tension, stress σ > 0 [Pa]: ε = ε0 + g − η²/g with g = σ/E + α."""
-        g = stress / modulus + (0.0 if self.name == "linear" else self.floor(1.0, slackness, smoothing))
+        """Strain of a tension, stress σ > 0 [Pa]: ε = ε0 + g − η²/g with g = σ/E + α; of the linear law of any σ."""
+        if self.name == "linear":
+            return stress / modulus
+        g = stress / modulus + self.floor(1.0, slackness, smoothing)
         return slackness + g - smoothing * smoothing / g
 
     def tangent(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
@@ -182,9 +203,30 @@ class Law:
         return self._evaluate(ENERGY, strain, modulus, slackness, smoothing)
 
     def floor(self, modulus=1.0, slackness=0.0, smoothing=0.0):
-        """Largest stress under compression, αE [Pa]; 0 for tension-only, infinite for linear."""
+        """Largest stress under compression, αE [Pa]; 0 for tension-only, infinite for laws without a floor."""
         if self.name != "smooth":
             return 0.0 * modulus if self.name == "tension-only" else math.inf * modulus
         root = (slackness * slackness + 4.0 * smoothing * smoothing) ** 0.5
         total = root + slackness
         return modulus * (2.0 * smoothing * smoothing / (total + (total == 0.0)))
+
+
+def strains_of(law, tension, modulus, area, slackness, smoothing):
+    """Strain of each line that has a tension [N], 0 of none; arrays of shape (lines,).
+
+    Raises
+    ------
+    InputError
+        For a law of form finding, a line that pushes and whose law does not, and one that pushes with more than its EA.
+    """
+    strain, stress = np.zeros(len(tension)), tension / area
+    for number in np.unique(law):
+        name, lines = list(NAMES)[number], (law == number) & (tension != 0.0)
+        if number in FORM_FINDING and lines.any():
+            raise InputError(f'law = "{name}" is for form finding: give "tension-only", "linear" or "smooth"')
+        for line in np.flatnonzero(lines & (tension < 0.0))[:1] if number != LINEAR else ():
+            raise InputError(f'line {line} pushes with {-tension[line]:g} N, and law = "{name}" does not: use "linear"')
+        strain[lines] = Law(name).strain(stress[lines], modulus[lines], slackness[lines], smoothing[lines])
+    for line in np.flatnonzero(strain <= -1.0)[:1]:
+        raise InputError(f"line {line} pushes with {-tension[line]:g} N, more than its EA: give it a larger area")
+    return strain

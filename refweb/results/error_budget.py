@@ -144,12 +144,12 @@ def digits_of(value, error):
 def scales_of(system):
     """Sizes by unit that results of a system have, below `ZERO` of which they are zero."""
     net = system.net
-    axial = float(net.line_data.ea.max())
-    energy = float((net.line_data.ea * net.line_data.natural_length).sum())
+    axial = float(net.axial.max())
+    energy = float((net.axial * net.line_data.natural_length).sum())
     return {
         "m": float(np.ptp(net.points, axis=0).max()),
         "N": axial,
-        "Pa": float((net.line_data.ea / net.area).max()),
+        "Pa": float((net.axial / net.area).max()),
         "J": energy,
     }
 

@@ -81,8 +81,8 @@ class State:
 
     @cached_property
     def element_slack(self):
-        """True for each element that is slack all along, as `slack`, shape (cells,)."""
-        return self.element_strain <= self.system.net.slackness
+        """True for each element that is slack all along, as `slack`, shape (cells,); none of form finding is."""
+        return (self.element_strain <= self.system.net.slackness) & ~self.system.net.forming
 
     @cached_property
     def strain(self):

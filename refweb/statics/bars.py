@@ -9,7 +9,9 @@ from ..kernels import kernel
 
 
 class Bars:
-    """State of the bars of a net with the tension-only law at a displacement: arrays over them.
+    """State of the bars of a net at a displacement: arrays over them.
+
+    Their law is that of tension alone or, with no length in place of the natural one, that of a force density.
 
     Parameters
     ----------
@@ -20,8 +22,8 @@ class Bars:
 
     Attributes
     ----------
-    natural, stiffness : ndarray, shape (bars,)
-        Natural length [m] and EA over it [N/m].
+    natural, unstressed, stiffness : ndarray, shape (bars,)
+        Natural length [m], length up to which the bar is slack [m], and EA over the natural length [N/m].
     length, tension : ndarray, shape (bars,)
         Length [m] and tension [N].
     direction : ndarray, shape (bars, 3)
@@ -35,14 +37,18 @@ class Bars:
         vector = net.bar_vectors(x)
         self.length = np.linalg.norm(vector, axis=1)
         self._strain = strains(net, x).ravel()
-        self.tension = axial * np.maximum(self._strain, 0.0)
+        forming = net.per_bar(net.forming)
+        self.unstressed = np.where(forming, 0.0, self.natural)
+        self.tension = axial * np.maximum(self._strain + forming, 0.0)
+        self._stretch = np.where(forming, self.length, self.natural * self._strain)
+        self._strain[forming] = 0.0  # neither slack nor taut
         self.direction = vector / np.where(self.length > 0, self.length, 1.0)[:, None]
         self._net = net
 
     def ahead(self, change):
         """Tensions to first order in a change of the displacement, of shape (rows, 3) [m]; none is negative [N]."""
         along = ((self._net.bars @ change) * self.direction).sum(axis=1)
-        return np.maximum(self.stiffness * (self.natural * self._strain + along), 0.0)
+        return np.maximum(self.stiffness * (self._stretch + along), 0.0)
 
     def lent(self, share):
         """Stiffness that slack bars are lent [N/m]: that of a smooth law, η a share of the mean strain of the taut."""

@@ -10,7 +10,8 @@ evaluated here without cancellation: with T = k (l − L)₊, (T − |s|)²/2k o
 ones, plus (|s| l − s·d) for the direction. The stress energy of the element forces is quadratic and its gradient
 Lipschitz with k, so Σ |T t − s*|²/2k ≤ Π − Π* ≤ gap, which bounds every tension: |T − T*| ≤ √(2 k gap).
 
-Of curved elements every quadrature point is such a line, a bar of natural length w L whose vector is w dx/dξ.
+A force density q > 0 is the same with k = q and L = 0. Of curved elements every quadrature point is such a line, a bar
+of natural length w L whose vector is w dx/dξ.
 
 The balancing correction of the computed forces is what a displacement p makes of them, s += D B p with the vectors B p
 of the lines, where Bᵀ D B p is unbalanced. With the tangent, D = k t⊗t + (T/l)(1 − t⊗t), the correction is the one of
@@ -181,5 +182,5 @@ def _gaps(bars, force, size):
     across = force - along[:, None] * bars.direction
     turned = (across**2).sum(axis=1) / np.where(size + along > 0, size + along, 1.0)
     turned = np.where(along > 0, turned, size - along) * bars.length
-    slack = np.where(bars.tension > 0.0, 0.0, bars.natural - bars.length)
+    slack = np.where(bars.tension > 0.0, 0.0, bars.unstressed - bars.length)
     return (bars.tension - size) ** 2 / (2 * bars.stiffness) + size * np.maximum(slack, 0.0) + turned

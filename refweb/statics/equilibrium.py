@@ -145,7 +145,7 @@ def force_scale(system, t, x, tension):
     At least 1/`LIMIT` of what rounding of the displacements makes of EA, which is more than those where a net is slack
     under loads below 1e-7 EA.
     """
-    stiffness = system.net.line_data.ea / system.natural_length(t)
+    stiffness = system.net.axial / system.natural_length(t)
     rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()
     outer = [f for f in system.terms if not f.over_lines]
     loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in outer]

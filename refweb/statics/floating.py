@@ -126,7 +126,7 @@ def between_slack_lines(system, equilibrium):
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
     tension = net.line_data.ea[:, None] * strains(net, x)
-    taut = (tension > equilibrium.duality_bound.tension[:, None]).all(axis=1)
+    taut = (tension > equilibrium.duality_bound.tension[:, None]).all(axis=1) | net.forming
     pairs = np.vstack([net.cells[:, [0, k]] for k in range(1, net.cells.shape[1])])
     joined = np.tile(taut, net.cells.shape[1] - 1)
     graph = coo_array((joined[joined], tuple(pairs[joined].T)), shape=(system.rows, system.rows))

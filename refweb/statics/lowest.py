@@ -47,7 +47,7 @@ def lowest(newton, state):
     system = newton.system
     pushes = bool((state.tension < 0.0).any())
     state.stats["above_lowest"] = None if pushes else 0.0
-    if not pushes or (system.net.laws == LINEAR).any():
+    if not pushes or (system.net.laws >= LINEAR).any():
         return state
     try:
         plain = _without_smoothing(newton, state)

@@ -85,7 +85,7 @@ class Newton:
     Attributes
     ----------
     follows : bool
-        Whether there are forces without a potential.
+        Whether there are forces without a potential, or struts of form finding, whose potential has no minimum.
     turns : bool
         Whether centrifugal forces act; ``drifting`` is the number of negative pivots that they bring to an equilibrium.
     anchors : ndarray of int
@@ -99,9 +99,10 @@ class Newton:
         self.progress = progress or (lambda text: None)
         net = system.net if first is None else system.at(first).net
         self.geometric = system.assemble_lines(net.unit_tension / net.natural_length[:, None, None])
-        self.stiffest = (net.line_data.ea / net.natural_length).max()
-        self.axial = net.line_data.ea.max()
-        self.follows, self.turns, self.drifting = not system.conservative, bool(system.rotating), 0
+        self.stiffest = (net.axial / net.natural_length).max()
+        self.axial = net.axial.max()
+        struts = (net.forming & (net.line_data.ea < 0.0)).any()
+        self.follows, self.turns, self.drifting = bool(struts) or not system.conservative, bool(system.rotating), 0
         self.factor = (Lu if self.follows else Factor)(system.pattern)
         if self.turns:
             from .critical_speed import drifting
@@ -350,7 +351,7 @@ class Newton:
     def _disturbing(self, state):
         """Forces on the unknowns [N]: what is left of the residual, and what rounding makes, of random sign, thrice."""
         system, net = self.system, self.system.net
-        stiffness = net.line_data.ea / system.natural_length(state.step)
+        stiffness = net.axial / system.natural_length(state.step)
         moved = np.linalg.norm(state.x, axis=1)[net.cells].max(axis=1)
         size = np.zeros(system.rows)
         np.add.at(size, net.cells, np.finfo(float).eps * (np.abs(state.tension) + stiffness * moved)[:, None])

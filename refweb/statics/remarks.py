@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..findings import Finding
-from ..net.tension_laws import LINEAR, NAMES, TENSION_ONLY
+from ..net.tension_laws import CONSTANT_FORCE, FORCE_DENSITY, LINEAR, NAMES, TENSION_ONLY
 from ..results.state import floor_remark, strain_remark
 from ..results.strength import strength_remark
 
@@ -107,13 +107,7 @@ def remarks_on(state, stats, utilisation, equilibrium):
     yield from floor_remark(net, float(state.stress.max()))
     yield from on_stability(state, equilibrium)
     yield from remark_on_open(state, equilibrium)
-    if state.system.dead and (others := np.flatnonzero(net.laws != TENSION_ONLY)).size < len(net.laws) and others.size:
-        law = list(NAMES)[net.laws[others[0]]]
-        yield Finding(
-            "not-proven",
-            f'line {net.line[others[0]]} can push (law = "{law}"): ± are estimates, as the proven '
-            'bound asks for law = "tension-only" on all lines',
-        )
+    yield from _not_proven(state)
     if starts := equilibrium.stats.get("starts"):
         apart = max(starts) - min(starts)
         if apart > 1e-9 * max(map(abs, starts)):
@@ -123,13 +117,31 @@ def remarks_on(state, stats, utilisation, equilibrium):
                 'lower still; law = "tension-only" has no such states',
             )
     yield from strength_remark(utilisation)
-    yield from strain_remark((float(state.strain.max()), int(state.strain.argmax())))
+    strain = np.where(net.forming, -np.inf, state.element_strain)
+    yield from strain_remark((float(strain.max()), int(net.line[strain.argmax()])))
     yield from collapse_remark(state)
+
+
+def _not_proven(state):
+    """A finding where one line keeps the errors of dead loads from being proven."""
+    net = state.system.net
+    proven = (net.laws == TENSION_ONLY) | ((net.laws == FORCE_DENSITY) & (net.line_data.ea > 0.0))
+    if not state.system.dead or proven.all() or not (proven.any() or net.forming.any()):
+        return
+    first = proven.argmin()
+    law, how = list(NAMES)[net.laws[first]], "can push"
+    if net.laws[first] == CONSTANT_FORCE:
+        how = "has a force that does not depend on its length"
+    yield Finding(
+        "not-proven",
+        f'line {net.line[first]} {how} (law = "{law}"): ± are estimates, as the proven bound asks for law = '
+        '"tension-only", or a force density above 0, on all lines',
+    )
 
 
 def _bars_push(state):
     """Tell if a line of the linear law pushes, or all lines have that law."""
-    bars = state.system.net.laws == LINEAR
+    bars = state.system.net.laws >= LINEAR
     return bool((bars & (state.element_tension < 0.0)).any() or bars.all())
 
 
@@ -141,7 +153,7 @@ def collapse_remark(state):
     no shape that it was given.
     """
     system, net = state.system, state.system.net
-    if (net.laws == LINEAR).all():
+    if (net.laws == LINEAR).all() or net.forming.any():
         return
     moved, points = np.linalg.norm(state.x[: net.nodes], axis=1), net.points[: net.nodes]
     driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(int)

@@ -158,7 +158,7 @@ class Question:
     def _ridge(self):
         """Values of what stiffness counts as none."""
         rest, net = self.rest, self.rest.at(self.t).net
-        axial = net.line_data.ea / net.natural_length
+        axial = net.axial / net.natural_length
         ridge = TINY * rest.assemble_lines(net.unit_tension * axial[:, None, None])
         for part in rest.unsupported_parts:  # which no pivot is to be 0 for
             ridge[rest.pattern.diagonal[part.unknowns]] += HELD * axial.max()

@@ -152,6 +152,8 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
 def _at_rest(system):
     """The system that vibrates; refuses what has no modes."""
     rest = at_rest(system)
+    if system.net.forming.any():
+        raise InputError("[cable] law: lines of form finding do not vibrate: take the scene that refweb.form makes")
     if rest.constraints:
         raise InputError("[[link]]: modes cannot hold lengths exactly: make it a stiff line")
     for term in rest.terms:

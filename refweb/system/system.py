@@ -22,7 +22,7 @@ from ..effects.base import DAMPED_TENSION, TENSION, BreakLimits, Constraint, For
 from ..effects.elasticity import length_force
 from ..findings import Finding
 from ..net.rigid_body import row_names, with_rotations
-from ..net.tension_laws import TENSION_ONLY
+from ..net.tension_laws import FORCE_DENSITY, TENSION_ONLY
 from .forces import Forces, PerCell
 from .start import initial_velocity, laid
 
@@ -365,7 +365,8 @@ class System:
     @property
     def convex(self):
         """True if the potential is convex and the loads are dead: `refweb.statics.duality_bound` then bounds errors."""
-        return bool((self.net.laws == TENSION_ONLY).all()) and self.dead
+        laws, ea = self.net.laws, self.net.line_data.ea
+        return bool(((laws == TENSION_ONLY) | ((laws == FORCE_DENSITY) & (ea > 0.0))).all()) and self.dead
 
     @property
     def contact(self):

@@ -370,7 +370,7 @@ def first_stiffness(system, body, exponent, load_steps=()):
     net, deep = system.net, aim(system.net, body)
     if not math.isfinite(deep):
         raise InputError(f'stiffness is missing for body "{body.name}", whose size is infinite: give stiffness = ...')
-    lines = net.line_data.ea / (net.natural_length * exponent * deep ** (exponent - 1.0))
+    lines = net.axial / (net.natural_length * exponent * deep ** (exponent - 1.0))
     push = max(_push(system, body, t) for t in (*load_steps, *_times(system)))
     asked = push / deep**exponent
     if net.quasi_static:

@@ -88,7 +88,7 @@ def first_stiffness(system):
         With any stiffness of lines.
     """
     net, touch = system.net, system.terms[pressed(system)].contact.crossing.touch
-    lines = float((net.line_data.ea / net.line_data.natural_length).max())
+    lines = float((net.axial / net.line_data.natural_length).max())
     if net.quasi_static:
         return lines
     v = system.initial_velocity()[: system.rows - net.spins]

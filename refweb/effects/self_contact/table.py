@@ -155,7 +155,7 @@ class SelfContact(Table):
         """Its stiffness [N/m], chosen where it is left out."""
         if self.stiffness is not None:
             return self.stiffness
-        return float((net.line_data.ea / net.line_data.natural_length).max())
+        return float((net.axial / net.line_data.natural_length).max())
 
     def _elements(self, net, beside):
         """Nodes and numbers of all elements with those beside them, see `refweb.effects.self_contact.pair`."""

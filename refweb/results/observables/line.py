@@ -204,6 +204,9 @@ class Strain(Line):
         error = super().error(state, equilibrium)
         if error is None or equilibrium.duality_bound is None:
             return error
-        values = self.values(state)[self.elements(state.system.net)]
+        elements = self.elements(state.system.net)
+        values = self.values(state)[elements[~state.system.net.forming[elements]]]
+        if not len(values):
+            return error
         counts = values.min() if self.selects else values.max()
         return None if counts <= error else error
