@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .net.tension_laws import Law as Law
     from .net.web import Web as Web
     from .pictures.pictures import picture as picture
+    from .registry import register as register
     from .results.observables.observe import Observe as Observe
     from .results.throw import Throw as Throw
     from .runner import resume as resume

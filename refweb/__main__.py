@@ -16,7 +16,7 @@ import warnings
 
 from .errors import InputError
 from .messages import nearest, short
-from .registry import COMMANDS, load
+from .registry import COMMANDS, known, load, load_installed, possible
 
 THRESHOLDS = (50_000, 20, 100)
 """When Python looks for unreachable objects, see `gc.set_threshold`: imports make 100 000 that stay."""
@@ -49,10 +49,18 @@ def main(arguments=None):
     for stream in (sys.stdout, sys.stderr):
         if (reconfigure := getattr(stream, "reconfigure", None)) is not None:
             reconfigure(errors="replace")
-    top = parser()
     given = sys.argv[1:] if arguments is None else list(arguments)
-    if given and not given[0].startswith("-") and given[0] not in COMMANDS:
-        top.error(f"{short(given[0])}: there is no such command, {nearest(given[0], COMMANDS)}")
+    name = given[0] if given and not given[0].startswith("-") else None
+    try:
+        exists = name is None or known(COMMANDS, name)
+    except InputError as error:
+        print(f"refweb: {error}", file=sys.stderr)
+        return 2
+    for message in load_installed("verb") if name is None and "--version" not in given else ():
+        print(f"refweb: {message}", file=sys.stderr)
+    top = parser()
+    if not exists:
+        top.error(f"{short(name)}: there is no such command, {nearest(name, possible(COMMANDS))}")
     arguments = top.parse_args(given)
     if arguments.version:
         from . import __version__

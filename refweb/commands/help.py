@@ -1,5 +1,6 @@
 """Print what a table of a scene file may hold, or what a term means."""
 
+import sys
 import textwrap
 
 
@@ -18,7 +19,10 @@ def run(arguments):
     from ..reference.glossary import explained
     from ..reference.pages import names
     from ..reference.words import as_markdown, as_text, overview
+    from ..registry import load_installed
 
+    for message in load_installed():
+        print(f"refweb: {message}", file=sys.stderr)
     if arguments.markdown:
         print(as_markdown(), end="")
     elif arguments.table is None:

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 
 from .. import __version__
+from ..registry import PACKAGES
 
 
 def web_of(system):
@@ -35,10 +36,10 @@ def web_of(system):
 
 
 def versions():
-    """Versions of refweb, Python and the libraries that solve, by name."""
+    """Versions of refweb, Python, the libraries that solve and the packages of plug-ins, by name."""
     names = ("numpy", "scipy", "scikit-fem", "scikit-sundae", "numba", "meshio", "qdldl")
     base = {"refweb": __version__, "python": sys.version.split()[0]}
     versions_found = {**base, **{name: importlib.metadata.version(name) for name in names}}
     with contextlib.suppress(importlib.metadata.PackageNotFoundError):
         versions_found["rslab"] = importlib.metadata.version("rslab")
-    return versions_found
+    return versions_found | PACKAGES
