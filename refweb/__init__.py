@@ -3,7 +3,7 @@
 Names are imported when they are used: ``import refweb`` loads nothing that a scene does not need.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 TYPE_CHECKING = False  # as of `typing`, which is not imported for it
 if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same names

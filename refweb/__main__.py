@@ -28,7 +28,9 @@ def parser():
         prog="refweb",
         description="Equilibrium and dynamics of space webs: cable nets, often slack, flat and tensionless.",
     )
-    top.add_argument("--version", action="store_true", help="show the version and exit")
+    top.add_argument(
+        "--version", action="store_true", help="show the versions of refweb and of what it stands on, and exit"
+    )
     verbs = top.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, reference in COMMANDS.items():
         verb = load(reference)
@@ -63,9 +65,10 @@ def main(arguments=None):
         top.error(f"{short(name)}: there is no such command, {nearest(name, possible(COMMANDS))}")
     arguments = top.parse_args(given)
     if arguments.version:
-        from . import __version__
+        from .results.provenance import LIBRARIES, PLOTTING, versions
 
-        print(f"refweb {__version__}")
+        for package, version in versions((*LIBRARIES, *PLOTTING)).items():
+            print(package, version)
         return 0
     if arguments.command is None:
         top.print_help()
