@@ -21,6 +21,9 @@ ROOT = Path(__file__).parents[3]
 PICTURES = re.compile(r"validation/pictures/[\w.-]+")
 KNOWN = {"validation/REFERENCE.md": "scene-files.md", "validation/REPORT.md": "validation.md", "CONTRIBUTING.md": ""}
 """Pages of the site for what the README links to."""
+FIRST = """[Quick start](start.md) · [A net of your own](own-net.md) · [How far can I trust it?](trust.md) ·
+[Scene files](scene-files.md) · [Python](api.md) · [Theory](theory.md) · [Plug-ins](plug-ins.md)"""
+"""Pages to begin with."""
 HOW_TO = {
     "effect": ("An effect", "refweb.effects"),
     "shape": ("A body shape", "refweb.net.rigid_body"),
@@ -111,7 +114,7 @@ def text_of(name):
 
 
 PAGES = {
-    "index.md": lambda: readme("") + "\n\n" + readme("More"),
+    "index.md": lambda: f"{readme('')}\n\n{FIRST}\n\n{readme('More')}",
     "start.md": lambda: "# Quick start\n\n" + readme("Two commands", "What it prints", "An example", "Recipes"),
     "trust.md": lambda: readme("How far can I trust it?").replace("## ", "# ", 1),
     "command-line.md": lambda: readme("Command line", "What it does not do").replace("## ", "# ", 1),
