@@ -275,7 +275,7 @@ PACKAGES: dict[str, str] = {}
 """Versions of the packages whose entry points have been loaded, by name."""
 
 
-def register(kind, name, value=None):
+def register(kind: str, name: str, value: Any = None) -> Any:
     """Make an effect, a shape, an observable, an integrator or a verb known to scenes, checks, messages and help.
 
     Parameters

@@ -121,11 +121,11 @@ def choice(*values, default=MISSING) -> Any:
 
     @accepts(lambda: {"type": "string" if isinstance(valid()[0], str) else "integer", "enum": valid()})
     def read(name, value):
-        if isinstance(value, str) and any(known(given, value) for given in registered):
-            return value
         for allowed in valid():
             if type(value) is type(allowed) and value == allowed:
                 return allowed
+        if isinstance(value, str) and any(known(given, value) for given in registered):
+            return value
         choices = valid(possible)
         close = closest(value, [n for n in choices if isinstance(n, str)]) if isinstance(value, str) else None
         hint = f' — did you mean "{close}"?' if close else ""
@@ -341,7 +341,9 @@ def table(cls):
     InputError
         From the class, where a key is unknown or missing.
     """
+    described = cls.__doc__
     made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    made.__doc__ = described or ""  # not the signature that a dataclass has in place of one
     initial, keys = made.__init__, {f.name: key_of(f) for f in dataclasses.fields(made)}
 
     @functools.wraps(initial)

@@ -78,6 +78,8 @@ def test_a_package_is_known_to_the_command_line(folder):
     assert done.returncode == 0 and "[[current]]" in done.stdout and done.stderr == ""
     done = process(folder, "-m", "refweb", "--help")
     assert done.returncode == 0 and "mass of a web" in done.stdout
+    for name, words in (("body.wall", "All that lies behind a plane"), ("observe", "Moment of inertia of the nodes")):
+        assert words in process(folder, "-m", "refweb", "help", name).stdout
 
 
 def test_machine_code_of_a_package_is_kept_and_noticed_when_it_changes(folder, tmp_path):
@@ -116,6 +118,7 @@ def test_nothing_is_read_for_a_scene_of_what_refweb_ships(folder):
     """Neither entry points nor the package."""
     lines = (
         "import sys, refweb.registry as registry; from refweb.__main__ import main; main(['check', 'square-load']);"
+        "import refweb; refweb.Dynamic(method='auto', duration=1.0);"
         "print(registry.installed.cache_info().currsize, 'my_webs' in sys.modules)"
     )
     assert process(folder, "-c", lines).stdout.splitlines()[-1] == "0 False"
@@ -240,6 +243,7 @@ def test_an_integrator_names_keys_of_solve_and_itself(keys, method):
 @pytest.mark.slow
 def test_a_package_that_pip_installs(folder, tmp_path):
     """The same package from a ``pyproject.toml`` with the entry points as the pages have them."""
+    pytest.importorskip("setuptools", minversion="70.1")
     source, target = tmp_path / "source", tmp_path / "target"
     (source / "my_webs").mkdir(parents=True)
     modules, _ = modules_and_entries()

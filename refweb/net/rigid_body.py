@@ -16,6 +16,7 @@ A shape is a class whose fields are its keys in ``[[body]]``. All that lies behi
 
     @table
     class Wall(Shape):
+        '''All that lies behind a plane through its position.'''
         normal: Several = vector()  # a key that it needs
         drawn: float = real(default=2.0, above=0, unit="m")  # one with a default: edge of the square that is drawn
         def check(self):  # raises `refweb.errors.InputError` for what cannot be, here a normal that is zero

@@ -11,7 +11,7 @@ import re
 import textwrap
 from pathlib import Path
 
-from mkdocs.structure.files import File
+from mkdocs.structure.files import File  # pyright: ignore[reportMissingImports]
 
 from refweb import registry
 from refweb.reference import glossary, words
@@ -82,7 +82,7 @@ def report():
 
 def how_to(title, module):
     """The part of the docstring of a module that says how to write one, in Markdown."""
-    text = inspect.getdoc(registry.load(module)).split("\n\n", 1)[1]
+    text = (inspect.getdoc(registry.load(module)) or "").split("\n\n", 1)[1]
     text = re.sub(r"^How to write [^\n]*\n-+\n", "", text)
     parts = [f"# {title} of your own"]
     for block in re.split(r"\n\n(?=\S)", text):
@@ -90,7 +90,8 @@ def how_to(title, module):
         parts.append(prose.replace("``", "`") + (":" if marked else ""))
         if marked:
             language = "toml" if code.lstrip().startswith(("[", "observe")) else "python"
-            parts.append(f"```{language}\n{textwrap.dedent(code).strip()}\n```")
+            code = textwrap.dedent(code).strip().replace("'''", '"""')
+            parts.append(f"```{language}\n{code}\n```")
     return "\n\n".join(parts)
 
 
@@ -139,7 +140,7 @@ def on_config(config):
 
 def equation(source, language, css_class, options, md, **more):
     """An equation in TeX as MathML."""
-    from latex2mathml.converter import convert
+    from latex2mathml.converter import convert  # pyright: ignore[reportMissingImports]
 
     return f'<div class="{css_class}">{convert(source, display="block")}</div>'
 

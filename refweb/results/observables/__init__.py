@@ -5,8 +5,6 @@ How to write an observable
 An observable has two faces that say the same: ``of(state)``, its value in a `refweb.results.state.State`, and
 ``probe(system)``, a kernel that dynamics calls in every step. A whole file, ``my_webs/moment_of_inertia.py``::
 
-    '''Moment of inertia of a net's nodes about the axis ``component`` through the origin; without one, about it.'''
-
     import numpy as np
 
     from refweb.kernels import kernel
@@ -15,6 +13,8 @@ An observable has two faces that say the same: ``of(state)``, its value in a `re
 
 
     class MomentOfInertia(Observable):
+        '''Moment of inertia of the nodes about the axis ``component`` through the origin; without one, about it.'''
+
         unit, keys = "kg m²", ("component",)
 
         def of(self, state):
