@@ -116,8 +116,8 @@ def choice(*values, default=MISSING) -> Any:
     """Accept one of a few values; a table of `refweb.registry` among them stands for its names."""
     registered = [given for given in values if isinstance(given, dict)]
 
-    def valid(of=list):
-        return [value for given in values for value in (of(given) if isinstance(given, dict) else [given])]
+    def valid(names_of=lambda given: given):
+        return [value for given in values for value in (names_of(given) if isinstance(given, dict) else [given])]
 
     @accepts(lambda: {"type": "string" if isinstance(valid()[0], str) else "integer", "enum": valid()})
     def read(name, value):
