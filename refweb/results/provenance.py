@@ -44,8 +44,8 @@ def web_of(system):
 
 def versions(libraries=LIBRARIES):
     """Versions of refweb, Python, some libraries and the packages of plug-ins, by name; nothing is imported."""
-    found = {"refweb": __version__, "python": sys.version.split()[0]}
+    versions_by_name = {"refweb": __version__, "python": sys.version.split()[0]}
     for name in (*libraries, *OPTIONAL):
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-            found[name] = importlib.metadata.version(name)
-    return found | PACKAGES
+            versions_by_name[name] = importlib.metadata.version(name)
+    return versions_by_name | PACKAGES
