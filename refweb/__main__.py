@@ -64,13 +64,7 @@ def main(arguments=None):
     if not exists:
         top.error(f"{short(name)}: there is no such command, {nearest(name, possible(COMMANDS))}")
     arguments = top.parse_args(given)
-    if arguments.version:
-        from .results.provenance import LIBRARIES, PLOTTING, versions
-
-        for package, version in versions((*LIBRARIES, *PLOTTING)).items():
-            print(package, version)
-        return 0
-    if arguments.command is None:
+    if arguments.command is None and not arguments.version:
         top.print_help()
         return 2
     if threading.current_thread() is threading.main_thread():
@@ -79,7 +73,7 @@ def main(arguments=None):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # overflow: what it leads to is found and named
             warnings.filterwarnings("ignore", message="Glyph")  # a title in a script the font of pictures lacks
-            status = load(COMMANDS[arguments.command]).run(arguments)
+            status = _print_versions() if arguments.version else load(COMMANDS[arguments.command]).run(arguments)
         sys.stdout.flush()
     except InputError as error:
         print(f"refweb: {error}", file=sys.stderr)
@@ -97,6 +91,14 @@ def main(arguments=None):
         print(f"refweb: {_reason(error)}", file=sys.stderr)
         return 1
     return status or 0
+
+
+def _print_versions():
+    """Print versions of refweb and of what it stands on, a line each."""
+    from .results.provenance import LIBRARIES, PLOTTING, versions
+
+    for package, version in versions((*LIBRARIES, *PLOTTING)).items():
+        print(package, version)
 
 
 def _reason(error):
