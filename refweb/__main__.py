@@ -16,7 +16,7 @@ import warnings
 
 from .errors import InputError
 from .messages import nearest, short
-from .registry import COMMANDS, known, load, load_installed, possible
+from .registry import COMMANDS, known, load, load_installed, possible, registered_packages
 
 THRESHOLDS = (50_000, 20, 100)
 """When Python looks for unreachable objects, see `gc.set_threshold`: imports make 100 000 that stay."""
@@ -102,14 +102,22 @@ def _print_versions():
 
 
 def _reason(error):
-    """A message without a traceback; a fault of refweb's own is named as one, with its place."""
+    """A message without a traceback; a fault of refweb's own, or of a plug-in, is named as one, with its place."""
     if type(error).__module__.startswith("refweb"):
         return str(error)
-    last = error.__traceback__
-    while last.tb_next is not None:
-        last = last.tb_next
-    location = f"{os.path.basename(last.tb_frame.f_code.co_filename)}:{last.tb_lineno}"
-    return f"internal error, {type(error).__name__}: {error} ({location}); please report it with the scene"
+    import traceback
+
+    frames = [
+        (frame.f_globals.get("__name__", ""), frame.f_code.co_filename, line)
+        for frame, line in traceback.walk_tb(error.__traceback__)
+    ]
+    packages = registered_packages()
+    of_plug_ins = [frame for frame in frames if frame[0].partition(".")[0] in packages]
+    module, path, line = (of_plug_ins or frames)[-1]
+    reason = f"{type(error).__name__}: {error} ({os.path.basename(path)}:{line})"
+    if of_plug_ins:
+        return f"plug-in {module}: {reason}"
+    return f"internal error, {reason}; please report it with the scene"
 
 
 def alone():

@@ -418,6 +418,14 @@ def possible(table):
     return [*dict.fromkeys([*table, *(name for kind, name in installed() if kind == _kind_of(table))])]
 
 
+def registered_packages():
+    """Packages of all that `register` and entry points have added, a set of names."""
+    entries = (value for entry in KINDS.values() for value in entry.table.values() if not isinstance(value, str))
+    values = (entry.integrator if isinstance(entry, Method) else entry for entry in entries)
+    modules = (getattr(value, "__module__", None) or value.__name__ for value in values if not isinstance(value, str))
+    return {module.partition(".")[0] for module in modules}
+
+
 def load_installed(*kinds):
     """Load all entry points of some kinds, by default of all; return a message for each that cannot be."""
     from .errors import InputError

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -208,6 +209,16 @@ def test_a_script_registers_its_own(clean):
     again = refweb.run(built.replace(effects=(refweb.Load(node="all", force=(0, 0, 0.2)),)))
     np.testing.assert_allclose(solution.positions, again.positions, atol=1e-12)
     assert solution.positions[:, 2].max() > 0.0
+
+
+def test_a_fault_of_a_plug_in_is_named_as_its_own(clean, tmp_path, capsys):
+    """With its module and line, and not as one to report to refweb."""
+    refweb.register("effect", "uplift", type("Faulty", (Uplift,), {"on": lambda self, net: self.force / 0.0}))
+    tables = {key: SCENE[key] for key in ("web", "cable")}
+    (tmp_path / "scene.toml").write_text(tomli_w.dumps({**tables, "solve": {"kind": "static"}, "uplift": {"force": 1}}))
+    assert main(["check", str(tmp_path / "scene.toml")]) == 1
+    err = capsys.readouterr().err
+    assert re.fullmatch(r"refweb: plug-in test_plugins: ZeroDivisionError: .* \(test_plugins.py:\d+\)\n", err), err
 
 
 WRONG = [
