@@ -3,7 +3,7 @@
 Names are imported when they are used: ``import refweb`` loads nothing that a scene does not need.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 TYPE_CHECKING = False  # as of `typing`, which is not imported for it
 if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same names
@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .net.tension_laws import Law as Law
     from .net.web import Web as Web
     from .pictures.pictures import picture as picture
+    from .registry import register as register
     from .results.observables.observe import Observe as Observe
     from .results.throw import Throw as Throw
     from .runner import resume as resume

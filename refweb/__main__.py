@@ -16,7 +16,7 @@ import warnings
 
 from .errors import InputError
 from .messages import nearest, short
-from .registry import COMMANDS, load
+from .registry import COMMANDS, known, load, load_installed, possible, registered_packages
 
 THRESHOLDS = (50_000, 20, 100)
 """When Python looks for unreachable objects, see `gc.set_threshold`: imports make 100 000 that stay."""
@@ -28,7 +28,9 @@ def parser():
         prog="refweb",
         description="Equilibrium and dynamics of space webs: cable nets, often slack, flat and tensionless.",
     )
-    top.add_argument("--version", action="store_true", help="show the version and exit")
+    top.add_argument(
+        "--version", action="store_true", help="show the versions of refweb and of what it stands on, and exit"
+    )
     verbs = top.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, reference in COMMANDS.items():
         verb = load(reference)
@@ -49,17 +51,20 @@ def main(arguments=None):
     for stream in (sys.stdout, sys.stderr):
         if (reconfigure := getattr(stream, "reconfigure", None)) is not None:
             reconfigure(errors="replace")
-    top = parser()
     given = sys.argv[1:] if arguments is None else list(arguments)
-    if given and not given[0].startswith("-") and given[0] not in COMMANDS:
-        top.error(f"{short(given[0])}: there is no such command, {nearest(given[0], COMMANDS)}")
+    name = given[0] if given and not given[0].startswith("-") else None
+    try:
+        exists = name is None or known(COMMANDS, name)
+    except InputError as error:
+        print(f"refweb: {error}", file=sys.stderr)
+        return 2
+    for message in load_installed("verb") if name is None and "--version" not in given else ():
+        print(f"refweb: {message}", file=sys.stderr)
+    top = parser()
+    if not exists:
+        top.error(f"{short(name)}: there is no such command, {nearest(name, possible(COMMANDS))}")
     arguments = top.parse_args(given)
-    if arguments.version:
-        from . import __version__
-
-        print(f"refweb {__version__}")
-        return 0
-    if arguments.command is None:
+    if arguments.command is None and not arguments.version:
         top.print_help()
         return 2
     if threading.current_thread() is threading.main_thread():
@@ -68,7 +73,7 @@ def main(arguments=None):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # overflow: what it leads to is found and named
             warnings.filterwarnings("ignore", message="Glyph")  # a title in a script the font of pictures lacks
-            status = load(COMMANDS[arguments.command]).run(arguments)
+            status = _print_versions() if arguments.version else load(COMMANDS[arguments.command]).run(arguments)
         sys.stdout.flush()
     except InputError as error:
         print(f"refweb: {error}", file=sys.stderr)
@@ -88,15 +93,31 @@ def main(arguments=None):
     return status or 0
 
 
+def _print_versions():
+    """Print versions of refweb and of what it stands on, a line each."""
+    from .results.provenance import LIBRARIES, PLOTTING, versions
+
+    for package, version in versions((*LIBRARIES, *PLOTTING)).items():
+        print(package, version)
+
+
 def _reason(error):
-    """A message without a traceback; a fault of refweb's own is named as one, with its place."""
+    """A message without a traceback; a fault of refweb's own, or of a plug-in, is named as one, with its place."""
     if type(error).__module__.startswith("refweb"):
         return str(error)
-    last = error.__traceback__
-    while last.tb_next is not None:
-        last = last.tb_next
-    location = f"{os.path.basename(last.tb_frame.f_code.co_filename)}:{last.tb_lineno}"
-    return f"internal error, {type(error).__name__}: {error} ({location}); please report it with the scene"
+    import traceback
+
+    frames = [
+        (frame.f_globals.get("__name__", ""), frame.f_code.co_filename, line)
+        for frame, line in traceback.walk_tb(error.__traceback__)
+    ]
+    packages = registered_packages()
+    of_plug_ins = [frame for frame in frames if frame[0].partition(".")[0] in packages]
+    module, path, line = (of_plug_ins or frames)[-1]
+    reason = f"{type(error).__name__}: {error} ({os.path.basename(path)}:{line})"
+    if of_plug_ins:
+        return f"plug-in {module}: {reason}"
+    return f"internal error, {reason}; please report it with the scene"
 
 
 def alone():

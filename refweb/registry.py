@@ -3,11 +3,17 @@
 A line is a name and the ``"module:name"`` that brings it, or the ``"module"`` that it is; it is imported when it is
 called for and not before. What is in a table is known to scene files, checks, messages and help; nothing else has to be
 told.
+
+Other packages, scripts and notebooks add to the tables of `KINDS` by `register`. An installed package does so by an
+entry point of the groups ``refweb.effects``, ``refweb.shapes``, ``refweb.observables``, ``refweb.integrators`` and
+``refweb.verbs``. Entry points are read when a scene, or the command line, names what no table has, and for help.
 """
 
 from __future__ import annotations
 
+import functools
 import importlib
+import re
 from typing import Any, NamedTuple
 
 WEBS = {
@@ -203,17 +209,21 @@ EXPORTS = (
     "refweb.net.web:Web",
     "refweb.errors:InputError",
     "refweb.errors:SolverError",
+    "refweb.registry:register",
 )
 """What ``refweb.NAME`` may be besides webs and effects."""
 
 
 def exports():
     """Modules of the names of the package: classes of webs and effects, and `EXPORTS`."""
-    return {reference.split(":")[1]: reference for reference in (*EXPORTS, *WEBS.values(), *EFFECTS.values())}
+    shipped = (*EXPORTS, *WEBS.values(), *EFFECTS.values())
+    return {reference.split(":")[1]: reference for reference in shipped if isinstance(reference, str)}
 
 
 def load(reference) -> Any:
-    """Object that a ``"module:name"`` or a ``"module"`` stands for."""
+    """Object that a ``"module:name"`` or a ``"module"`` stands for; what is registered stands for itself."""
+    if not isinstance(reference, str):
+        return reference
     module, _, name = reference.partition(":")
     loaded = importlib.import_module(module)
     return getattr(loaded, name) if name else loaded
@@ -221,8 +231,214 @@ def load(reference) -> Any:
 
 def name_of(table, value):
     """Name under which the class of a value stands in a table, None where it is not in it."""
-    own_reference = f"{type(value).__module__}:{type(value).__qualname__}"
-    return next((name for name, reference in table.items() if reference == own_reference), None)
+    reference = _reference(type(value))
+    return next((name for name, known in table.items() if _reference(known) == reference), None)
+
+
+def _reference(value):
+    """``"module:name"`` of a class; any other value as it is."""
+    return f"{value.__module__}:{value.__qualname__}" if isinstance(value, type) else value
+
+
+class Kind(NamedTuple):
+    """A table that other packages may add to.
+
+    Attributes
+    ----------
+    table : dict
+        The table.
+    base : str
+        ``"module:name"`` of the class that classes of this kind derive from; "" of a module with the functions
+        ``add_arguments`` and ``run``.
+    pattern : str
+        Regular expression of its names.
+    """
+
+    table: dict
+    base: str
+    pattern: str
+
+
+_WORD, _WORDS = "[a-z][a-z0-9_]*", "[a-z][a-z0-9_-]*"
+KINDS = {
+    "effect": Kind(EFFECTS, "refweb.tables:Table", _WORD),
+    "shape": Kind(SHAPES, "refweb.net.rigid_body:Shape", _WORDS),
+    "observable": Kind(OBSERVABLES, "refweb.results.observables.observable:Observable", _WORDS),
+    "integrator": Kind(INTEGRATORS, "refweb.dynamics.integrators.integrator:Integrator", _WORDS),
+    "verb": Kind(COMMANDS, "", _WORDS),
+}
+"""What `register` and entry points, of the group ``refweb.`` + kind + ``s``, may add."""
+SHIPPED = {kind: frozenset(entry.table) for kind, entry in KINDS.items()}
+"""Names of what refweb ships, by kind."""
+RESERVED = {"effect": {"schema", "title", "seed", "web", "solve", *PARTS, *LISTS}, "integrator": {"auto"}}
+"""Names that scenes use otherwise, by kind."""
+PACKAGES: dict[str, str] = {}
+"""Versions of the packages whose entry points have been loaded, by name."""
+
+
+def register(kind: str, name: str, value: Any = None) -> Any:
+    """Make an effect, a shape, an observable, an integrator or a verb known to scenes, checks, messages and help.
+
+    Parameters
+    ----------
+    kind : {"effect", "shape", "observable", "integrator", "verb"}
+        What it is.
+    name : str
+        Its name in scenes: of the table of an effect, and of a value of ``shape``, ``quantity`` or ``method``; or on
+        the command line. What had the name by `register` before is replaced.
+    value : class or module, optional
+        The class; of a verb a module, or what else has ``add_arguments`` and ``run``. Without it, `register` is a
+        decorator.
+
+    Returns
+    -------
+    class or module
+        ``value``.
+
+    Raises
+    ------
+    InputError
+        For another kind, a name that refweb ships or that scenes use otherwise, and a value that is not of this kind.
+
+    Notes
+    -----
+    Names of effects are small letters, digits and ``_``, others may have ``-``. An integrator has ``keys``, those of
+    ``[solve]`` that it takes, the one that trades accuracy for time first, and its ``method`` is its name.
+
+    Workers of a study are processes of their own, which do not know what a script has registered: an installed package
+    with an entry point is known to them.
+
+    Examples
+    --------
+        refweb.register("effect", "current", Current)
+    """
+    from .errors import InputError, refused_at
+    from .messages import nearest, quote
+
+    if kind not in KINDS:
+        raise InputError(f"register: kind = {quote(kind)}: there is no such kind, {nearest(kind, KINDS)}")
+    if value is None:
+        return functools.partial(register, kind, name)
+    with refused_at(f"register: {kind} {quote(name)}:"):
+        KINDS[kind].table[name] = _entry(kind, name, value)
+    return value
+
+
+def _entry(kind, name, value):
+    """Entry of a class or module in a table; refuse a name that is taken, and what is not of this kind."""
+    from .errors import InputError
+    from .messages import quote
+
+    _, base, pattern = KINDS[kind]
+    if not isinstance(name, str) or not re.fullmatch(pattern, name):
+        marks = "digits and _" if pattern == _WORD else "digits, _ and -"
+        raise InputError(f"the name must be small letters, {marks}, a letter first")
+    if name in SHIPPED[kind] or name in RESERVED.get(kind, ()):
+        raise InputError("refweb has one of this name, choose another")
+    if base and load(base) not in getattr(value, "__mro__", ()):
+        raise InputError(f"{quote(_reference(value))} must be a class derived from {base.replace(':', '.')}")
+    if not base and not (hasattr(value, "add_arguments") and hasattr(value, "run")):
+        raise InputError(f"{quote(str(value))} must be a module with the functions add_arguments and run")
+    return _method(name, value) if kind == "integrator" else value
+
+
+def _method(name, integrator):
+    """The `Method` of a class of integrators."""
+    from .errors import InputError
+    from .messages import quote
+
+    known_keys = {key for shipped in SHIPPED["integrator"] for key in INTEGRATORS[shipped].keys}
+    keys = tuple(getattr(integrator, "keys", ()))
+    if not keys or keys[0] not in ("safety", "rtol") or not known_keys >= set(keys):
+        listed = ", ".join(sorted(known_keys))
+        raise InputError(f'keys = {quote(list(keys))} must be "safety" or "rtol", and then some of {listed}')
+    if integrator.method != name:
+        raise InputError(f"method = {quote(integrator.method)} of the class must be the same name")
+    return Method(integrator, keys)
+
+
+@functools.cache
+def installed():
+    """Entry points that installed packages have, a dict of tuples by kind and name."""
+    from importlib.metadata import entry_points
+
+    every, entries = entry_points(), {}
+    for kind in KINDS:
+        for entry in every.select(group=f"refweb.{kind}s"):
+            entries[kind, entry.name] = (*entries.get((kind, entry.name), ()), entry)
+    return entries
+
+
+def _kind_of(table):
+    """Kind of a table, "" of one that is closed."""
+    return next((kind for kind, entry in KINDS.items() if entry.table is table), "")
+
+
+def known(table, name):
+    """Tell if a name is in a table, or comes into it by an entry point.
+
+    Raises
+    ------
+    InputError
+        Where a package has such an entry point that cannot be loaded, or several packages have one.
+    """
+    if name not in table and isinstance(name, str) and (entries := installed().get((_kind_of(table), name))):
+        _load_entry(_kind_of(table), name, entries)
+    return name in table
+
+
+def knows_class_of(table, value):
+    """Tell if the class of a value is in a table, or comes into it by an entry point of the package that it is from."""
+    for (kind, name), entries in installed().items() if name_of(table, value) is None else ():
+        package = type(value).__module__.partition(".")[0]
+        if kind == _kind_of(table) and any(entry.module.partition(".")[0] == package for entry in entries):
+            known(table, name)
+    return name_of(table, value) is not None
+
+
+def _load_entry(kind, name, entries):
+    """Register what an entry point stands for."""
+    from .errors import InputError, refused_at
+
+    packages = [entry.dist.name if entry.dist else "an unnamed package" for entry in entries]
+    with refused_at(f'plug-in {kind} "{name}" of {" and ".join(packages)}:'):
+        if len(entries) > 1:
+            raise InputError("several packages have one of this name, uninstall all but one")
+        try:
+            value = entries[0].load()
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise InputError(f"{entries[0].value} cannot be loaded, {reason}") from error
+        KINDS[kind].table[name] = _entry(kind, name, value)
+    if entries[0].dist:
+        PACKAGES[packages[0]] = entries[0].dist.version
+
+
+def possible(table):
+    """Names in a table, and those that entry points can bring into it."""
+    return [*dict.fromkeys([*table, *(name for kind, name in installed() if kind == _kind_of(table))])]
+
+
+def registered_packages():
+    """Packages of all that `register` and entry points have added, a set of names."""
+    entries = (value for entry in KINDS.values() for value in entry.table.values() if not isinstance(value, str))
+    values = (entry.integrator if isinstance(entry, Method) else entry for entry in entries)
+    modules = (getattr(value, "__module__", None) or value.__name__ for value in values if not isinstance(value, str))
+    return {module.partition(".")[0] for module in modules}
+
+
+def load_installed(*kinds):
+    """Load all entry points of some kinds, by default of all; return a message for each that cannot be."""
+    from .errors import InputError
+
+    messages = []
+    for (kind, name), entries in installed().items():
+        if kind in (kinds or KINDS) and (name in SHIPPED[kind] or name not in KINDS[kind].table):
+            try:
+                _load_entry(kind, name, entries)
+            except InputError as error:
+                messages.append(str(error))
+    return messages
 
 
 FILES = {"web": ("path", "lines"), "body": ("file", "heights"), "fold": ("file",)}

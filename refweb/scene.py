@@ -15,7 +15,20 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import InputError, in_file, refused_at
 from .messages import nearest, quote, short
-from .registry import EFFECTS, LISTS, PARTS, SOLVES, WEBS, load, name_of, with_files, with_fold
+from .registry import (
+    EFFECTS,
+    LISTS,
+    PARTS,
+    SOLVES,
+    WEBS,
+    known,
+    knows_class_of,
+    load,
+    name_of,
+    possible,
+    with_files,
+    with_fold,
+)
 from .settings import START_STATES, Accuracy, Dynamic, Head, Output, Static, Supports
 from .tables import Several, Table, table
 
@@ -116,9 +129,10 @@ class Scene:
                 raise InputError(f"{key} = {quote(getattr(self, key))} must be a list")
             object.__setattr__(self, key, tuple(getattr(self, key)))
         for effect in self.effects:
-            if name_of(EFFECTS, effect) is None:
+            if not knows_class_of(EFFECTS, effect):
                 kind = type(effect).__name__
-                raise InputError(f"{kind} is not an effect, {nearest(kind, EFFECTS)}")
+                hint = f'refweb.register("effect", NAME, {kind}) makes it one' if isinstance(effect, Table) else ""
+                raise InputError(f"{kind} is not an effect, {hint or nearest(kind, possible(EFFECTS))}")
         for key, kinds in CLASSES_OF_PARTS.items():
             value = getattr(self, key)
             for item in value if isinstance(value, tuple) else [value]:
@@ -197,12 +211,13 @@ class Scene:
         given = with_fold(given)
         if folder is not None:
             given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body", "fold"])
-        known = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS, *EFFECTS]
+        tables = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS]
         if "web" not in given and {"scene", "parameters"} <= given.keys():
             raise InputError(IS_STUDY.format(file or "STUDY"))
         for key in given:
-            if key not in known:
-                raise InputError(f"{_as_given(key, given[key])}: unknown table or key, {nearest(key, known)}")
+            if key not in tables and not known(EFFECTS, key):
+                hint = nearest(key, [*tables, *possible(EFFECTS)])
+                raise InputError(f"{_as_given(key, given[key])}: unknown table or key, {hint}")
         Head(schema=given.get("schema", 1))
         parts = {key: given[key] for key in ("title", "seed") if key in given}
         parts |= {"folder": folder, "file": file}

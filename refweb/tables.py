@@ -18,6 +18,7 @@ from typing import Any, ClassVar, dataclass_transform
 from .accepted import accepts, any_of, array, by_name, limits
 from .errors import InputError, refused_at
 from .messages import closest, nearest, quote, short
+from .registry import known, possible
 
 LARGEST = 1e100
 """Largest value of a number with a unit: products of three stay finite."""
@@ -111,20 +112,24 @@ def integer(default=MISSING, *, at_least=None, at_most=None) -> Any:
     return field(read, default=default)
 
 
-def choice(*names, default=MISSING) -> Any:
-    """Accept one of a few names (or numbers); a dict among them stands for the names it has when a value is read."""
+def choice(*values, default=MISSING) -> Any:
+    """Accept one of a few values; a table of `refweb.registry` among them stands for its names."""
+    registered = [given for given in values if isinstance(given, dict)]
 
-    def valid():
-        return [name_i for given in names for name_i in (given if isinstance(given, dict) else [given])]
+    def valid(names_of=lambda given: given):
+        return [value for given in values for value in (names_of(given) if isinstance(given, dict) else [given])]
 
     @accepts(lambda: {"type": "string" if isinstance(valid()[0], str) else "integer", "enum": valid()})
     def read(name, value):
-        for known in valid():
-            if type(value) is type(known) and value == known:
-                return known
-        close = closest(value, [n for n in valid() if isinstance(n, str)]) if isinstance(value, str) else None
+        for allowed in valid():
+            if type(value) is type(allowed) and value == allowed:
+                return allowed
+        if isinstance(value, str) and any(known(given, value) for given in registered):
+            return value
+        choices = valid(possible)
+        close = closest(value, [n for n in choices if isinstance(n, str)]) if isinstance(value, str) else None
         hint = f' — did you mean "{close}"?' if close else ""
-        _refuse(name, value, ("one of " if len(valid()) > 1 else "") + ", ".join(map(quote, valid())) + hint)
+        _refuse(name, value, ("one of " if len(choices) > 1 else "") + ", ".join(map(quote, choices)) + hint)
 
     return field(read, default=default)
 
@@ -336,7 +341,9 @@ def table(cls):
     InputError
         From the class, where a key is unknown or missing.
     """
+    described = cls.__doc__
     made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    made.__doc__ = described or ""  # not the signature that a dataclass has in place of one
     initial, keys = made.__init__, {f.name: key_of(f) for f in dataclasses.fields(made)}
 
     @functools.wraps(initial)

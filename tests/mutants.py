@@ -168,6 +168,7 @@ MIRRORS = {
     "__main__": "commands/test_cli.py",
     "scene": "test_scene.py dynamics/test_default_rows.py",
     "solution": "dynamics/test_starts.py",
+    "registry": "test_plugins.py",
 }
 """Test files of a file or a folder, that with the longest name that fits; ``{}`` is the name of the file."""
 
@@ -221,6 +222,9 @@ MUTANTS = [
     Mutant("net/faces", "cells[:, [0, 1, 3, 2]]", "cells[:, [0, 1, 2, 3]]"),
     Mutant("net/obj_file", "else count + corner", "else count + corner - 1"),
     Mutant("net/csv_files", "for end in pairs]) - first", "for end in pairs])"),
+    Mutant("registry", "if len(entries) > 1:", "if len(entries) > 2:"),
+    Mutant("registry", "(name in SHIPPED[kind] or name not in", "(name not in"),
+    Mutant("compiled/keys", "not in LIBRARIES:", "in LIBRARIES:"),
     Mutant("commands/doubts", "0.5 * high**2 * np.sin(", "high**2 * np.sin("),
     Mutant("commands/doubts", "distances[0] > 0.0", "distances[0] < 0.0"),
     Mutant("scene", "min(max(SHORTEST_INTERVAL, ", "min(min(SHORTEST_INTERVAL, "),

@@ -62,6 +62,14 @@ def test_what_is_linked_is_there():
         assert (ROOT / link).is_file(), link
 
 
+def test_the_version_stands_in_one_place():
+    """In the package; that of the citation is the same, and the build reads it."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["project"]["dynamic"] == ["version"]
+    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "refweb.__version__"}
+    assert f"\nversion: {refweb.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
 def test_it_is_short():
     assert README.count("\n") <= 150
 

@@ -2,8 +2,8 @@
 
 How to write a verb of the command line
 ---------------------------------------
-A verb is a module, and a line in the table of verbs. A whole file, ``refweb/commands/weigh.py``, which weighs the web
-of a scene, ``refweb weigh SCENE``::
+A verb is a module that an entry point names. A whole file, ``my_webs/weigh.py``, which weighs the web of a scene,
+``refweb weigh SCENE``::
 
     \"""Mass of a web.\"""
 
@@ -35,7 +35,9 @@ the ``net.nodes`` nodes with point masses first, then of bodies.
 A verb that writes a result folder may have ``show(summary)``: ``refweb info`` calls it with the content of a
 ``run.json`` whose ``kind`` is the name of the verb.
 
-The line is one of ``COMMANDS`` in ``refweb/registry.py``, which has the order of the help::
+The entry point of your package, whose verbs stand behind those of refweb, which are lines in
+`refweb.registry.COMMANDS`::
 
-    "weigh": "refweb.commands.weigh",
+    [project.entry-points."refweb.verbs"]
+    weigh = "my_webs.weigh"
 """

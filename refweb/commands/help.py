@@ -1,12 +1,13 @@
-"""Print what a table of a scene file may hold, or what a term means."""
+"""Print what a table of a scene file may hold, what a term means, or a guide."""
 
+import sys
 import textwrap
 
 
 def add_arguments(parser):
     """Declare the table, or term, and the format."""
     text = (
-        "such as gravity, web.cable, solve.dynamic; a term, or glossary for all; materials "
+        "such as gravity, web.cable, solve.dynamic; a term, or glossary for all; materials; a guide "
         "(default: a line for each table)"
     )
     parser.add_argument("table", nargs="?", metavar="TABLE", help=text)
@@ -17,8 +18,11 @@ def run(arguments):
     """Print the pages."""
     from ..reference.glossary import explained
     from ..reference.pages import names
-    from ..reference.words import as_markdown, as_text, overview
+    from ..reference.words import as_markdown, as_text, guide, guides, overview
+    from ..registry import load_installed
 
+    for message in load_installed():
+        print(f"refweb: {message}", file=sys.stderr)
     if arguments.markdown:
         print(as_markdown(), end="")
     elif arguments.table is None:
@@ -28,6 +32,8 @@ def run(arguments):
         from ..reference.words import MATERIALS_TEXT
 
         print(f"{as_table()}\n\n{textwrap.fill(MATERIALS_TEXT.replace('`', ''), 100)}")
+    elif arguments.table in guides():
+        print(guide(arguments.table), end="")
     elif arguments.table in names() or (text := explained(arguments.table)) is None:
         print(as_text(arguments.table))
     else:

@@ -4,7 +4,7 @@ import json
 import pathlib
 
 from ..errors import InputError
-from ..registry import COMMANDS, load
+from ..registry import COMMANDS, known, load
 from .arguments import add_json, print_json, print_study
 
 
@@ -38,7 +38,9 @@ def _folder(folder, as_json):
         if as_json:
             print_json(summary)
         else:
-            load(COMMANDS[summary.get("kind", "run")]).show(summary)
+            verb = summary.get("kind", "run")
+            known(COMMANDS, verb)
+            load(COMMANDS[verb]).show(summary)
     except FileNotFoundError:
         raise InputError(f"{folder}: holds no run.json, so it is not a result folder of refweb") from None
     except BrokenPipeError:

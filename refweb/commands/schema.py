@@ -1,5 +1,7 @@
 """Print the JSON Schema of scene files, by which editors check and complete them."""
 
+import sys
+
 from .arguments import print_json
 
 
@@ -10,5 +12,8 @@ def add_arguments(parser):
 def run(arguments):
     """Print it."""
     from ..reference.schema import schema
+    from ..registry import load_installed
 
+    for message in load_installed():
+        print(f"refweb: {message}", file=sys.stderr)
     print_json(schema())

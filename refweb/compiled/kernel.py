@@ -167,7 +167,7 @@ class Kernel:
         """Kernels that are called by their address, by it or by what is compiled into it, a list."""
         kernels = {}
         _collect(self.py_func, kernels, set())
-        return list(kernels.values())
+        return list(kernels)
 
 
 class _ByAddress:
@@ -196,7 +196,7 @@ def _collect(function, kernels, visited):
                 if item.apart is None:
                     _collect(item.py_func, kernels, visited)
                 else:
-                    kernels[item.name] = item
+                    kernels[item] = None
 
 
 def needed(kernels, features=None):
@@ -216,11 +216,11 @@ def needed(kernels, features=None):
     wanted, left = {}, list(kernels)
     while left:
         item = left.pop()
-        if item.name in wanted:
+        if item in wanted:
             continue
-        wanted[item.name] = item
+        wanted[item] = None
         left += [k for k in item.callees if features is None or k.apart <= features]
-    return list(wanted.values())
+    return list(wanted)
 
 
 def prepare(kernels, features=None):
@@ -233,11 +233,11 @@ def prepare(kernels, features=None):
     """
     wanted = [item for item in needed(kernels, features) if item.signature is not None]
     unknown = [item for item in wanted if not item.known()]
-    new = {item.name: n for n, item in enumerate(unknown)}
+    new = {item: n for n, item in enumerate(unknown)}
     with _no_collection(), beside(unknown):
         for item in wanted:
-            for tell in watchers if item.name in new else ():
-                tell(new[item.name], len(new))
+            for tell in watchers if item in new else ():
+                tell(new[item], len(new))
             item.address()
     for item in kernels if features is None else ():
         item.prepared = True

@@ -16,6 +16,8 @@ import types as python
 
 import numpy as np
 
+LIBRARIES = {"numpy", "numba", "llvmlite", "scipy", *sys.stdlib_module_names}
+"""Packages whose functions numba compiles by its own means, or whose version is part of `platform_key`."""
 LOAD_GLOBAL, EXTENDED_ARG = opcode.opmap["LOAD_GLOBAL"], opcode.opmap["EXTENDED_ARG"]
 
 
@@ -68,13 +70,18 @@ def captured(function):
     for name in sorted(globals_in(function.__code__)):
         if name in function.__globals__:
             value = function.__globals__[name]
-            if isinstance(value, python.ModuleType) and value.__name__.partition(".")[0] == "refweb":
-                for inner in sorted(set(function.__code__.co_names) & vars(value).keys()):
-                    yield f"{name}.{inner}", getattr(value, inner)
-            else:
-                yield name, value
+            yield from _used(name, value, set(function.__code__.co_names))
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         yield name, cell.cell_contents
+
+
+def _used(name, value, attributes):
+    """Pairs of name and value of a captured value; of a module of a package that is no library, what is used of it."""
+    if isinstance(value, python.ModuleType) and value.__name__.partition(".")[0] not in LIBRARIES:
+        for inner in sorted(attributes & vars(value).keys()):
+            yield from _used(f"{name}.{inner}", getattr(value, inner), attributes - {inner})
+    else:
+        yield name, value
 
 
 def described(value, visited):

@@ -3,7 +3,8 @@
 How to write an effect
 ----------------------
 An effect is a table of the scene, a frozen value whose ``on(net)`` says which rows it couples, and the kernels that add
-its forces; `refweb.effects.base` has what else it may be. A whole file, ``refweb/effects/current.py``::
+its forces; `refweb.effects.base` has what else it may be. It may stand in a package of yours, a script or a notebook
+cell. A whole file, ``my_webs/current.py``::
 
     '''The magnetic force on lines that carry a current, I dl Ã— B.'''
 
@@ -65,9 +66,12 @@ its forces; `refweb.effects.base` has what else it may be. A whole file, ``refwe
             tangent, balance = Tangent(stiffness, bound, symmetric=False), Balance("work", power=0)
             return ForceTerm("current", net.cells[elements], data, force, balance, tangent=tangent)
 
-A line in `refweb.registry.EFFECTS` makes it known to scenes, messages and all methods::
+An entry point makes it known to scenes, messages, help and all methods; in ``pyproject.toml`` of your package::
 
-    "current": "refweb.effects.current:Current",
+    [project.entry-points."refweb.effects"]
+    current = "my_webs.current:Current"
+
+In a script or a notebook ``refweb.register("effect", "current", Current)`` does the same.
 
 A scene then has as many of it as it likes, ``several``, as tables of a list; without that line there is one,
 ``[current]``::
@@ -88,7 +92,7 @@ and checks its value: ``real(above=0.0, unit="N/m")``; the others are in `refweb
 
 A force with a potential has ``energy=energy`` and ``Balance("spring_energy")`` instead of a power: that name heads a
 column of ``history.csv`` and counts in the total energy. It is observed once it has a
-`refweb.results.observables.balances.Booked` and a line in `refweb.registry.OBSERVABLES`. Bounds keep explicit steps
+`refweb.results.observables.balances.Booked` that is registered as an observable. Bounds keep explicit steps
 stable, not accurate: something stiff may need a smaller ``safety``. ``definite`` asks for a part of the stiffness that
 is positive semidefinite, such as none.
 
@@ -98,7 +102,9 @@ it has. It sees what steps miss where ``impulse=impulse`` of `Balance` brings âˆ
 
 A load with a factor over time is made by `refweb.effects.outer_load`; what changes natural lengths, by
 `refweb.effects.natural_lengths`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which
-returns another net. ``tests/test_contract.py`` holds forces against energies and stiffness against forces for every
-effect, and asks for numbers of one that refweb ships; ``tests/test_readme.py`` asks for its row in the README, and
-``tests/reference`` for an ``Examples`` section of its docstring, which is its page in ``refweb help``.
+returns another net. The docstring of the class is its page in ``refweb help``.
+
+An effect that refweb ships is a line in `refweb.registry.EFFECTS` instead. ``tests/test_contract.py`` holds forces
+against energies and stiffness against forces for every effect and asks for numbers of it, ``tests/reference`` for an
+``Examples`` section of its docstring.
 """

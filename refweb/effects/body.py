@@ -10,7 +10,7 @@ from ..accepted import accepts, any_of, array, limits
 from ..errors import InputError
 from ..messages import quote
 from ..net.rigid_body import RigidBody, Shape, matrix_of
-from ..registry import SHAPES, load
+from ..registry import SHAPES, known, load
 from ..tables import (
     LARGEST,
     Several,
@@ -209,8 +209,8 @@ class Body(Table):
             return [key for f in fields(cls) for key in (keys if f.name == "form" else [f.name])]
 
         shape = given.get("shape", "sphere")
-        known = among(shape) if isinstance(shape, str) and shape in SHAPES else []
-        return known if given.keys() <= set(known) else among(*SHAPES)
+        keys = among(shape) if isinstance(shape, str) and known(SHAPES, shape) else []
+        return keys if given.keys() <= set(keys) else among(*SHAPES)
 
     def to_dict(self):
         """The table as plain TOML values, the keys of the shape among the others."""

@@ -2,7 +2,7 @@
 
 How to write a body shape
 -------------------------
-A shape is a file with a class, whose fields are its keys in ``[[body]]``. This one is all that lies behind a plane::
+A shape is a class whose fields are its keys in ``[[body]]``. All that lies behind a plane, ``my_webs/wall.py``::
 
     import numpy as np
 
@@ -16,6 +16,7 @@ A shape is a file with a class, whose fields are its keys in ``[[body]]``. This 
 
     @table
     class Wall(Shape):
+        '''All that lies behind a plane through its position.'''
         normal: Several = vector()  # a key that it needs
         drawn: float = real(default=2.0, above=0, unit="m")  # one with a default: edge of the square that is drawn
         def check(self):  # raises `refweb.errors.InputError` for what cannot be, here a normal that is zero
@@ -38,9 +39,11 @@ a capsule; otherwise ``farthest`` may bring the surface, whose triangles face ou
 sets ``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its
 centre. One that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as
 `refweb.net.shapes.filled` has. By its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`, it touches other
-bodies; where they are to touch, one without is refused. The line in ``SHAPES`` of ``refweb/registry.py``::
+bodies; where they are to touch, one without is refused. Scenes know it by an entry point of your package; in a script
+``refweb.register("shape", "wall", Wall)`` does the same. One that refweb ships is a line in `refweb.registry.SHAPES`::
 
-    "wall": "refweb.net.shapes.wall:Wall",
+    [project.entry-points."refweb.shapes"]
+    wall = "my_webs.wall:Wall"
 """
 
 from __future__ import annotations

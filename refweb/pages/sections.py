@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..messages import quote
-from ..registry import EFFECTS
+from ..registry import EFFECTS, possible
 from ..results.files import as_toml
 from ..results.summary_text import (
     on_cost,
@@ -59,7 +59,7 @@ def simulated(record):
     scene = record.scene
     if not scene:
         return section("simulated", "What was simulated", tag("p", "This folder holds no scene.toml that can be read."))
-    present = [name for name in EFFECTS if scene.get(name)]
+    present = [name for name in possible(EFFECTS) if scene.get(name)]
     absent = [name for name in EFFECTS if name not in present]
     rows: list = [("web", [_keys(scene.get("web", {})), _sizes(record.summary.get("web") or {})])]
     rows.append(("cable", _cable(scene.get("cable", {}))))

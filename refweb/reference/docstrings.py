@@ -9,7 +9,7 @@ import textwrap
 
 def sections(documented):
     """Lines of the sections of a docstring by title; what stands before the first one has the title ""."""
-    lines, parts = (inspect.getdoc(documented) or "").splitlines(), {"": []}
+    lines, parts = (inspect.getdoc(documented) or "").splitlines() or [""], {"": []}
     title, skipped = "", 0
     for line, below in zip(lines, [*lines[1:], ""], strict=True):
         if skipped:

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import InputError, refused_at
 from ..messages import nearest, one_line, quote, short
-from ..registry import EFFECTS
+from ..registry import EFFECTS, known
 
 LONGEST = 1000
 """Largest number of characters in a path."""
@@ -75,7 +75,7 @@ def with_value(given, path, value) -> dict:
         none.
     """
     keys = _keys(path)
-    if value is False and len(keys) == 1 and keys[0] in EFFECTS:
+    if value is False and len(keys) == 1 and known(EFFECTS, keys[0]):
         return {key: table for key, table in given.items() if key != keys[0]}
     with refused_at(f"{short(path)} = {quote(value)}:"):
         return _put(given, keys, (), value)

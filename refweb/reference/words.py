@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pathlib
 import textwrap
 
 from ..net import materials
@@ -24,6 +25,8 @@ MATERIALS_TEXT = (
     "rope of them is softer and weaker."
 )
 """Text above the table of materials."""
+GUIDES = pathlib.Path(__file__).parent / "site" / "pages"
+"""Folder of the guides: pages of the documentation site that are written by hand."""
 
 
 def overview():
@@ -33,7 +36,18 @@ def overview():
     listed = [f"{header:{width}}  {line}" for header, line in lines.items()]
     hint = "refweb help TABLE says what a table may hold, such as refweb help web"
     more = ["refweb help glossary explains terms", "refweb help materials lists materials"]
+    more.append(f"refweb help GUIDE prints a guide: {', '.join(guides())}")
     return "\n".join([*listed, "", hint, *more])
+
+
+def guides():
+    """Names of the guides."""
+    return sorted(path.stem for path in GUIDES.glob("*.md"))
+
+
+def guide(name):
+    """Text of a guide, as Markdown."""
+    return (GUIDES / f"{name}.md").read_text(encoding="utf-8")
 
 
 def as_text(name, width=100):

@@ -6,9 +6,15 @@ import contextlib
 import importlib.metadata
 import sys
 
-import numpy as np
-
 from .. import __version__
+from ..registry import PACKAGES
+
+LIBRARIES = ("numpy", "scipy", "scikit-fem", "scikit-sundae", "numba", "meshio", "qdldl")
+"""Libraries that solve, and read webs."""
+OPTIONAL = ("rslab",)
+"""Those that are taken where they are installed."""
+PLOTTING = ("pyvista", "matplotlib")
+"""Libraries of pictures."""
 
 
 def web_of(system):
@@ -18,6 +24,8 @@ def web_of(system):
     of the same area [m], ``volume`` that of the cable [m³], and ``total_mass`` that of the cable, of point masses and
     of all bodies that move [kg].
     """
+    import numpy as np  # `refweb --version` does without
+
     web, net = system.net.web, system.net
     fixed_mass = sum(net.mass[body.row] for body in net.bodies if body.fixed)
     return {
@@ -34,11 +42,10 @@ def web_of(system):
     }
 
 
-def versions():
-    """Versions of refweb, Python and the libraries that solve, by name."""
-    names = ("numpy", "scipy", "scikit-fem", "scikit-sundae", "numba", "meshio", "qdldl")
-    base = {"refweb": __version__, "python": sys.version.split()[0]}
-    versions_found = {**base, **{name: importlib.metadata.version(name) for name in names}}
-    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-        versions_found["rslab"] = importlib.metadata.version("rslab")
-    return versions_found
+def versions(libraries=LIBRARIES):
+    """Versions of refweb, Python, some libraries and the packages of plug-ins, by name; nothing is imported."""
+    versions_by_name = {"refweb": __version__, "python": sys.version.split()[0]}
+    for name in (*libraries, *OPTIONAL):
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            versions_by_name[name] = importlib.metadata.version(name)
+    return versions_by_name | PACKAGES

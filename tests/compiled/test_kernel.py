@@ -4,13 +4,14 @@ import json
 import os
 import subprocess
 import sys
+import types
 
 import numba
 import numpy as np
 import pytest
 
 from refweb.compiled import kernel as kernels
-from refweb.compiled import watched
+from refweb.compiled import keys, watched
 from refweb.kernels import Matrix, Vector, kernel
 
 FACTORY = '''
@@ -94,6 +95,22 @@ def test_the_public_parts_of_numba_alone_give_the_same(run):
     for kind in INNER:
         run.write(kind, 3.0)
         assert run(REFWEB_PLAIN="1")[0] == "6.0"
+
+
+def calls(module, text):
+    """A function that calls ``part.half`` of a module of a package, whose source is a text."""
+    module, space = types.ModuleType(module), {}
+    exec(text, vars(module))
+    exec("def outer(value):\n    return part.half(value)", {"part": module}, space)
+    return keys.of_function(space["outer"])
+
+
+@pytest.mark.parametrize("module, followed", [("own.part", True), ("refweb.part", True), ("numpy.part", False)])
+def test_a_caller_by_the_name_of_a_module_knows_what_it_calls(module, followed):
+    """Of any package but of libraries, whose functions numba compiles in its own way."""
+    one, other = ("def half(value):\n    return 0.5 * value", "def half(value):\n    return value / 4.0")
+    assert calls(module, one) == calls(module, one)
+    assert (calls(module, one) != calls(module, other)) == followed
 
 
 def test_a_damaged_file_is_compiled_again(run, tmp_path):

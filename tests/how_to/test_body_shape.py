@@ -1,13 +1,11 @@
-"""The page in `refweb.net.rigid_body`, word by word, in a scratch package; and a shape with curvature and edges."""
+"""The page in `refweb.net.rigid_body`, word by word, in a package; and a shape with curvature and edges."""
 
 import inspect
-import re
-import sys
-import textwrap
 from math import sqrt
 
 import meshio
 import numpy as np
+import packages
 import pytest
 
 import refweb
@@ -18,8 +16,8 @@ from refweb.registry import EFFECTS, SHAPES, load
 from refweb.tables import real, table
 
 PAGE = inspect.getdoc(rigid_body)
-EXAMPLE, LINE = (textwrap.dedent(block) for block in re.findall(r"::\n\n((?:    .*\n?|\n)+)", PAGE))
-NAME, PLACE = re.fullmatch(r'"(\w+)": "([\w.:]+)",', LINE.strip()).groups()
+EXAMPLE, ENTRY = packages.blocks(PAGE)
+_, NAME, *_ = packages.entry_point(ENTRY)
 NORMAL = np.array([0.6, 0.0, 0.8])
 
 
@@ -76,27 +74,17 @@ TOP = {"name": "it", "shape": "top", "lower": 0.3, "upper": 0.15, "fixed": True}
 
 @pytest.fixture(autouse=True, scope="module")
 def shapes(tmp_path_factory):
-    """The example in a file of its own, and its line in the table; the other shape likewise."""
-    scratch = tmp_path_factory.mktemp("page") / "scratch"
-    scratch.mkdir()
-    (scratch / "__init__.py").touch()
-    (scratch / f"{NAME}.py").write_text(EXAMPLE, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(scratch.parent)
-        patch.setitem(SHAPES, NAME, PLACE.replace("refweb.net.shapes", "scratch"))
-        patch.setitem(SHAPES, "top", f"{__name__}:Top")
+    """The example in a package that is installed; the other shape is registered, as a script does."""
+    with packages.of_page(tmp_path_factory.mktemp("page"), EXAMPLE, ENTRY):
+        refweb.register("shape", "top", Top)
         yield
-    for name in ("scratch", f"scratch.{NAME}"):
-        sys.modules.pop(name, None)
 
 
 def test_the_page_is_short_and_names_what_there_is():
-    assert 20 <= len(PAGE.splitlines()) <= 43
-    assert PLACE.split(":")[0] == f"refweb.net.shapes.{NAME}"
-    for name, place in SHAPES.items():
-        assert issubclass(load(place), Shape) and (
-            name in (NAME, "top") or place.startswith(f"refweb.net.shapes.{name}:")
-        )
+    assert 20 <= len(PAGE.splitlines()) <= 46
+    for name, reference in SHAPES.items():
+        assert issubclass(load(reference), Shape)
+        assert reference is Top or reference.startswith(f"refweb.net.shapes.{name}:")
 
 
 def net_scene(body, *, solve, contact=None, **tables):

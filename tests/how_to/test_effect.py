@@ -1,24 +1,20 @@
-"""The page "How to write an effect", followed word by word in a scratch package."""
+"""The page "How to write an effect", followed word by word in a package that is installed for it."""
 
 import importlib
-import re
-import sys
-import textwrap
 import tomllib
 
 import nets
 import numpy as np
+import packages
 import pytest
 from scipy.optimize import brentq
 from test_contract import agrees, check_term, state
 
 import refweb
 import refweb.effects
-from refweb import registry
 from refweb.net import discretisation
 from refweb.system.system import System
 
-BLOCK = re.compile(r"::\n\n((?:    .*\n|\n)+)")
 AXIAL, DENSITY = 7e3, 200.0
 CABLE = {"law": "tension-only", "modulus": AXIAL / 1e-4, "area": 1e-4, "density": DENSITY}
 COUNT = 16
@@ -28,23 +24,15 @@ COUNT = 16
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     """The tables of a scene that the page ends with, when all it says before has been done."""
-    source, line, scene = (textwrap.dedent(block) for block in BLOCK.findall(refweb.effects.__doc__))
-    scratch = tmp_path_factory.mktemp("page") / "scratch"
-    scratch.mkdir()
-    (scratch / "current.py").write_text(source.replace("'''", '"""'), encoding="utf-8")
-    name, place = re.fullmatch(r'"(\w+)": "([\w.:]+)",\s*', line).groups()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(scratch.parent)
-        patch.setitem(registry.EFFECTS, name, place.replace("refweb.effects", "scratch"))
+    source, entry, scene = packages.blocks(refweb.effects.__doc__)
+    with packages.of_page(tmp_path_factory.mktemp("page"), source, entry):
         yield tomllib.loads(scene)
-    for module in [module for module in sys.modules if module.split(".")[0] == "scratch"]:
-        del sys.modules[module]
 
 
 @pytest.fixture(scope="module")
 def current(page):
     """The class of the page."""
-    return importlib.import_module("scratch.current").Current
+    return importlib.import_module("my_webs.current").Current
 
 
 def scene(page, **changes):

@@ -1,16 +1,15 @@
 """The page in `refweb.dynamics.integrators`, followed word by word: its own example, and a generalised-α method.
 
-Neither is part of refweb: each is a file in a scratch package and a line in the table. What stands as exact is scipy's
+Neither is part of refweb: each is a file in a package that is installed. What stands as exact is scipy's
 DOP853 at a tolerance of 1e-12 on the forces of the same system.
 """
 
 import inspect
 import json
 import re
-import sys
-import textwrap
 
 import numpy as np
+import packages
 import pytest
 import tomli_w
 from scipy.integrate import solve_ivp
@@ -21,7 +20,7 @@ from refweb import registry
 from refweb.__main__ import main
 
 PAGE = inspect.getdoc(refweb.dynamics.integrators)
-HEUN, LINE = (textwrap.dedent(block) for block in re.findall(r"::\n\n((?:    .*\n|\n)+)", PAGE))
+HEUN, ENTRY = packages.blocks(PAGE)
 ALPHA = '''
 """Generalised-α: J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371–375, doi:10.1115/1.2900803.
 
@@ -87,10 +86,10 @@ class GeneralisedAlpha(StepObserver):
         return x + h * s * (v + s * (bend + s * twist)), v + s * (2.0 * bend + 3.0 * s * twist)
 '''
 FILES = {"heun": HEUN, "generalised-alpha": ALPHA}
-LINES = {
-    "heun": LINE,
-    "generalised-alpha": LINE.replace("heun", "generalised-alpha").replace(
-        "generalised-alpha:Heun", "alpha:GeneralisedAlpha"
+ENTRIES = {
+    "heun": ENTRY,
+    "generalised-alpha": ENTRY.replace("heun = ", "generalised-alpha = ").replace(
+        "heun:Heun", "alpha:GeneralisedAlpha"
     ),
 }
 END, CENTRE = 0.005, 10
@@ -99,20 +98,10 @@ TOLERANCES = {"heun": (1e-2, 1e-3, 1e-4, 1e-5), "generalised-alpha": (1e-3, 1e-4
 
 
 @pytest.fixture(params=FILES)
-def method(request, tmp_path, monkeypatch):
+def method(request, tmp_path):
     """Its name, when all is done that the page says."""
-    name, package = request.param, tmp_path / "scratch"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    ((_, line),) = eval(f"{{{LINES[name]}}}", vars(registry)).items()
-    module = line.integrator.split(":")[0].rpartition(".")[2]
-    (package / f"{module}.py").write_text(FILES[name].replace("'''", '"""'), encoding="utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    line = line._replace(integrator=line.integrator.replace("refweb.dynamics.integrators", "scratch"))
-    monkeypatch.setitem(registry.INTEGRATORS, name, line)
-    yield name
-    for module in [module for module in sys.modules if module.split(".")[0] == "scratch"]:
-        del sys.modules[module]
+    with packages.of_page(tmp_path, FILES[request.param], ENTRIES[request.param]):
+        yield request.param
 
 
 def test_the_page_is_short_and_names_what_there_is():

@@ -1,18 +1,14 @@
-"""The page "How to write an observable", followed word by word in a scratch package."""
+"""The page "How to write an observable", followed word by word in a package that is installed for it."""
 
-import re
-import sys
-import textwrap
 import tomllib
 
 import numpy as np
+import packages
 import pytest
 
 import refweb
 import refweb.results.observables
-from refweb import registry
 
-BLOCK = re.compile(r"::\n\n((?:    .*\n|\n)+)")
 STIFFNESS, LENGTH, DENSITY, SPEED = 1e4, 0.5, 100.0, 0.8
 AREA = 1e-4
 MASS = DENSITY * AREA * LENGTH / 2.0
@@ -20,19 +16,11 @@ MASS = DENSITY * AREA * LENGTH / 2.0
 
 
 @pytest.fixture
-def page(tmp_path, monkeypatch):
+def page(tmp_path):
     """The tables of a scene that the page ends with, when all it says before has been done."""
-    text = refweb.results.observables.__doc__
-    source, line, scene = (textwrap.dedent(block) for block in BLOCK.findall(text))
-    (tmp_path / "scratch").mkdir()
-    (tmp_path / "scratch" / "moment_of_inertia.py").write_text(source.replace("'''", '"""'), encoding="utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    name, place = re.fullmatch(r'"(\w+)": "([\w.:]+)",\s*', line).groups()
-    place = place.replace("refweb.results.observables", "scratch")
-    monkeypatch.setitem(registry.OBSERVABLES, name, place)
-    yield tomllib.loads(scene)
-    for module in [module for module in sys.modules if module.split(".")[0] == "scratch"]:
-        del sys.modules[module]
+    source, entry, scene = packages.blocks(refweb.results.observables.__doc__)
+    with packages.of_page(tmp_path, source, entry):
+        yield tomllib.loads(scene)
 
 
 def scene(page, **changes):

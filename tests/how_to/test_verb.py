@@ -1,10 +1,9 @@
-"""The page in `refweb.commands`, word by word: its verb, which refweb does not ship, in a scratch package."""
+"""The page in `refweb.commands`, word by word: its verb, in a package that is installed for it."""
 
+import importlib
 import inspect
-import re
-import sys
-import textwrap
 
+import packages
 import pytest
 
 import refweb.commands
@@ -12,21 +11,15 @@ from refweb.__main__ import main
 from refweb.registry import COMMANDS
 
 PAGE = inspect.getdoc(refweb.commands)
-EXAMPLE, LINE = (textwrap.dedent(block) for block in re.findall(r"::\n\n((?:    .*\n?|\n)+)", PAGE))
-NAME, PLACE = re.fullmatch(r'"(\w+)": "([\w.]+)",', LINE.strip()).groups()
+EXAMPLE, ENTRY = packages.blocks(PAGE)
+_, NAME, MODULE, _ = packages.entry_point(ENTRY)
 
 
 @pytest.fixture
-def verb(tmp_path, monkeypatch):
-    """The example in a file of its own, and its line in the table; the module that they make."""
-    (tmp_path / "scratch").mkdir()
-    (tmp_path / "scratch" / "__init__.py").touch()
-    (tmp_path / "scratch" / f"{NAME}.py").write_text(EXAMPLE, encoding="utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setitem(COMMANDS, NAME, PLACE.replace("refweb.commands", "scratch"))
-    yield refweb.registry.load(COMMANDS[NAME])
-    for name in ("scratch", f"scratch.{NAME}"):
-        sys.modules.pop(name, None)
+def verb(tmp_path):
+    """The module of the example, in a package that is installed."""
+    with packages.of_page(tmp_path, EXAMPLE, ENTRY):
+        yield importlib.import_module(MODULE)
 
 
 def left(*arguments):
@@ -37,8 +30,8 @@ def left(*arguments):
 
 
 def test_the_page_is_short_and_names_what_there_is():
-    assert 20 <= len(PAGE.splitlines()) <= 40
-    assert PLACE == f"refweb.commands.{NAME}" and NAME not in COMMANDS
+    assert 20 <= len(PAGE.splitlines()) <= 42
+    assert NAME not in COMMANDS
     assert all(COMMANDS[name] == f"refweb.commands.{name}" for name in COMMANDS)
 
 

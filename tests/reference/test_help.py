@@ -18,7 +18,7 @@ from refweb.reference.schema import schema
 from refweb.reference.words import as_markdown, as_text
 from refweb.registry import EFFECTS, LISTS, PARTS, SHAPES, SOLVES, STUDY, WEBS, load
 from refweb.scene import shipped
-from refweb.tables import key_of
+from refweb.tables import Table, key_of, real, table
 
 REFERENCE = pathlib.Path(__file__).parents[2] / "validation" / "REFERENCE.md"
 PAGES = {page.name: page for name in names() for page in pages_of(name)}
@@ -152,8 +152,8 @@ def test_markdown_has_all_of_it(capsys):
 
 def test_overview_has_a_line_for_each_table(capsys):
     assert main(["help"]) == 0
-    *lines, empty, hint, glossary, materials = capsys.readouterr().out.splitlines()
-    assert "help materials" in materials
+    *lines, empty, hint, glossary, materials, guide = capsys.readouterr().out.splitlines()
+    assert "help materials" in materials and "help GUIDE" in guide
     assert len(lines) == len(names()) and empty == "" and "refweb help TABLE" in hint and "help glossary" in glossary
     for line, name in zip(lines, names(), strict=True):
         header = line.split("  ")[0]
@@ -224,6 +224,18 @@ def test_limits_stand_with_the_keys_that_have_them():
         for beyond in (least - 1, most + 1):
             with pytest.raises(refweb.InputError):
                 read(key, beyond)
+
+
+def test_a_class_without_a_docstring_has_a_page(monkeypatch):
+    """As one in a notebook may be: its keys, and no signature in place of a summary."""
+
+    @table
+    class Bare(Table):
+        weight: float = real(unit="N")
+
+    monkeypatch.setitem(EFFECTS, "bare", Bare)
+    text = as_text("bare")
+    assert text.splitlines()[0] == "[bare]" and "weight\n        number [N]; required" in text and "Bare" not in text
 
 
 def test_the_glossary_explains_each_term_once(capsys):

@@ -3,8 +3,7 @@
 How to write an integrator
 --------------------------
 A method that takes steps of its own choice, as its tolerances ask for, is a `StepObserver` and brings three methods.
-Rows, books, extremes, events, ± and refusals are made around its steps. A whole file,
-``refweb/dynamics/integrators/heun.py``::
+Rows, books, extremes, events, ± and refusals are made around its steps. A whole file, ``my_webs/heun.py``::
 
     '''Heun's method: Euler's step and, by the slopes at its end, a correction, which is taken for the error.'''
 
@@ -39,9 +38,12 @@ Rows, books, extremes, events, ± and refusals are made around its steps. A whol
             )
             return cubic(x, v, y, w), cubic(v, a, w, b)
 
-A line in `refweb.registry.INTEGRATORS` makes it a ``method`` of scenes, with the keys of ``[solve]`` that it takes::
+An entry point of your package makes it a ``method`` of scenes, in a script ``refweb.register("integrator", "heun",
+Heun)``; one that refweb ships is a line in `refweb.registry.INTEGRATORS`. Its ``keys``, by default ``rtol`` and the
+absolute tolerances, are those of ``[solve]`` that it takes::
 
-    "heun": Method("refweb.dynamics.integrators.heun:Heun", _TOLERANCES),
+    [project.entry-points."refweb.integrators"]
+    heun = "my_webs.heun:Heun"
 
 ``x`` and ``v`` are displacement and velocity of all that is free, vectors; ``begin`` is also called in the middle of a
 run, where velocities jump. No step passes ``stop``, where tables have corners and bodies might pass through lines; the

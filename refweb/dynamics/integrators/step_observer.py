@@ -64,7 +64,7 @@ class StepObserver(Integrator):
     """A method of somebody's own steps on one system.
 
     A subclass has ``method``, its name, and ``order``, and brings `begin`, `step` and `interpolated`; how to write one
-    says `refweb.dynamics.integrators`.
+    says `refweb.dynamics.integrators`. Its ``keys`` are those of ``[solve]`` that it takes.
 
     Parameters
     ----------
@@ -93,6 +93,7 @@ class StepObserver(Integrator):
     """
 
     method, order = "", 2
+    keys = ("rtol", "atol_position", "atol_velocity")
     knob, retry, beside, follows_lines = "rtol", 0.1, False, True
     on_progress = staticmethod(lambda t: None)
     course_type = ObservedState

@@ -3,9 +3,7 @@
 How to write an observable
 --------------------------
 An observable has two faces that say the same: ``of(state)``, its value in a `refweb.results.state.State`, and
-``probe(system)``, a kernel that dynamics calls in every step. A whole file, ``moment_of_inertia.py`` in this folder::
-
-    '''Moment of inertia of a net's nodes about the axis ``component`` through the origin; without one, about it.'''
+``probe(system)``, a kernel that dynamics calls in every step. A whole file, ``my_webs/moment_of_inertia.py``::
 
     import numpy as np
 
@@ -15,6 +13,8 @@ An observable has two faces that say the same: ``of(state)``, its value in a `re
 
 
     class MomentOfInertia(Observable):
+        '''Moment of inertia of the nodes about the axis ``component`` through the origin; without one, about it.'''
+
         unit, keys = "kg m²", ("component",)
 
         def of(self, state):
@@ -38,9 +38,11 @@ An observable has two faces that say the same: ``of(state)``, its value in a `re
                 total += data[n, 0] * (data[n, 1 + k] + x[n, k]) ** 2
         return total
 
-A line in `refweb.registry.OBSERVABLES` makes it known to scenes, messages, statics and dynamics::
+An entry point of your package makes it known to scenes, messages, statics and dynamics; in a script or a notebook
+``refweb.register("observable", "moment_of_inertia", MomentOfInertia)`` does the same::
 
-    "moment_of_inertia": "refweb.results.observables.moment_of_inertia:MomentOfInertia",
+    [project.entry-points."refweb.observables"]
+    moment_of_inertia = "my_webs.moment_of_inertia:MomentOfInertia"
 
 A scene asks for it in ``[[observe]]``, with the keys it takes::
 
@@ -51,6 +53,7 @@ A scene asks for it in ``[[observe]]``, with the keys it takes::
 ``net.line[c]``. What stands at a node or a line gives its ``Value`` that place, as those in ``nodal.py`` and
 ``line.py`` do; in dynamics its probe writes a row or an element to ``where[0]`` where ``where[1]`` is ``PLACE``, and
 ``place(system, at)`` makes a node or a line of it. ``on(system)`` refuses a node or a line that the net does not have.
-A sum of energies has weights in place of a probe, as in ``book.py``.
-``tests/results/test_observable_contract.py`` holds the two faces of each against each other.
+A sum of energies has weights in place of a probe, as in ``balances.py``. One that refweb ships is a line in
+`refweb.registry.OBSERVABLES`; ``tests/results/test_observable_contract.py`` holds the two faces of each against each
+other.
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...accepted import accepts, any_of, array
 from ...errors import InputError
 from ...messages import nearest, quote
-from ...registry import OBSERVABLES, load
+from ...registry import OBSERVABLES, known, load, possible
 from ...tables import Several, Table, choice, component, field, nodes, real, table, text
 
 SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
@@ -14,8 +14,9 @@ SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
 
 @accepts(lambda: {"type": "string", "enum": list(OBSERVABLES)})
 def _quantity(name, value):
-    if value not in tuple(OBSERVABLES):
-        raise InputError(f"{name} = {quote(value)} must be one of the quantities, {nearest(value, OBSERVABLES)}")
+    if not isinstance(value, str) or not known(OBSERVABLES, value):
+        hint = nearest(value, possible(OBSERVABLES))
+        raise InputError(f"{name} = {quote(value)} must be one of the quantities, {hint}")
     return value
 
 

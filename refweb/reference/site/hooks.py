@@ -1,0 +1,154 @@
+"""Pages of the site that are made when it is built: parts of the README, references, docstrings, the validation report.
+
+A page of ``pages/`` is written by hand and is also what ``refweb help`` prints. All others come from `PAGES`, so that
+nothing is said in a second place.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import textwrap
+from pathlib import Path
+
+from mkdocs.structure.files import File  # pyright: ignore[reportMissingImports]
+
+from refweb import registry
+from refweb.reference import glossary, words
+
+ROOT = Path(__file__).parents[3]
+"""Folder of the clone."""
+PICTURES = re.compile(r"validation/pictures/[\w.-]+")
+KNOWN = {"validation/REFERENCE.md": "scene-files.md", "validation/REPORT.md": "validation.md", "CONTRIBUTING.md": ""}
+"""Pages of the site for what the README links to."""
+FIRST = """[Quick start](start.md) · [A net of your own](own-net.md) · [How far can I trust it?](trust.md) ·
+[Scene files](scene-files.md) · [Python](api.md) · [Theory](theory.md) · [Plug-ins](plug-ins.md)"""
+"""Pages to begin with."""
+HOW_TO = {
+    "effect": ("An effect", "refweb.effects"),
+    "shape": ("A body shape", "refweb.net.rigid_body"),
+    "observable": ("An observable", "refweb.results.observables"),
+    "integrator": ("An integrator", "refweb.dynamics.integrators"),
+    "verb": ("A verb of the command line", "refweb.commands"),
+}
+"""Titles and modules of the pages on plug-ins."""
+PLUG_INS = (
+    "refweb.tables:Table",
+    "refweb.tables:table",
+    "refweb.tables:real",
+    "refweb.tables:vector",
+    "refweb.tables:nodes",
+    "refweb.effects.base:ForceTerm",
+    "refweb.effects.base:Tangent",
+    "refweb.effects.base:Balance",
+    "refweb.compiled.kernel:kernel",
+    "refweb.net.net:Net",
+    "refweb.net.rigid_body:Shape",
+    "refweb.results.observables.observable:Observable",
+    "refweb.results.probes:Probe",
+    "refweb.dynamics.integrators.step_observer:StepObserver",
+)
+"""Parts that plug-ins are made of."""
+
+
+def readme(*titles):
+    """Sections of the README by their titles; "" is what stands before the first one."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    sections = dict(re.findall(r"(?ms)^## ([^\n]+)\n(.*?)(?=^## |\Z)", text))
+    sections[""] = text.partition("\n## ")[0]
+    return "\n\n".join((f"## {title}\n" if title else "") + linked(sections[title]) for title in titles)
+
+
+def linked(text):
+    """Text of a file at the root with links for the site; what has no page there stays as its name."""
+
+    def link(match):
+        label, target = match.groups()
+        if PICTURES.fullmatch(target):
+            return f"[{label}]({target.removeprefix('validation/')})"
+        page = {**KNOWN, "CONTRIBUTING.md": "contributing.md"}.get(target)
+        return f"[{label}]({page})" if page else f"{label} (`{target}`)" if "://" not in target else match.group()
+
+    text = re.sub(r"<!--.*?-->\n", "", text)
+    return re.sub(r"\[([^\]]*)\]\(([^)\s]+)\)", link, text)
+
+
+def report():
+    """The validation report without the figures, which stand beside it where it is run."""
+    text = (ROOT / "validation" / "REPORT.md").read_text(encoding="utf-8")
+    text = re.sub(r"!\[[^\]]*\]\([^)]*\)\n?", "", text)
+    return re.sub(r"\[([^\]]*)\]\((?!#|https?:)[^)]*\)", r"\1", text)
+
+
+def how_to(title, module):
+    """The part of the docstring of a module that says how to write one, in Markdown."""
+    text = (inspect.getdoc(registry.load(module)) or "").split("\n\n", 1)[1]
+    text = re.sub(r"^How to write [^\n]*\n-+\n", "", text)
+    parts = [f"# {title} of your own"]
+    for block in re.split(r"\n\n(?=\S)", text):
+        prose, marked, code = block.partition("::\n\n")
+        parts.append(prose.replace("``", "`") + (":" if marked else ""))
+        if marked:
+            language = "toml" if code.lstrip().startswith(("[", "observe")) else "python"
+            code = textwrap.dedent(code).strip().replace("'''", '"""')
+            parts.append(f"```{language}\n{code}\n```")
+    return "\n\n".join(parts)
+
+
+def api():
+    """Names of the package, and what plug-ins are made of, by their docstrings."""
+    exported = {name: reference.replace(":", ".") for name, reference in registry.exports().items()}
+    functions = sorted(name for name in exported if name[0].islower())
+    effects = {reference.split(":")[1] for reference in registry.EFFECTS.values()}
+    webs = {reference.split(":")[1] for reference in registry.WEBS.values()}
+    others = sorted(exported.keys() - {*functions} - effects - webs)
+    groups = {"Functions": functions, "Scenes and results": others, "Webs": sorted(webs), "Effects": sorted(effects)}
+    parts = ["# Python", "Names of the package `refweb`, which are imported when they are used."]
+    for title, members in groups.items():
+        parts += [f"## {title}", *(f"::: {exported[name]}" for name in members)]
+    return "\n\n".join([*parts, "## Parts of plug-ins", *(f"::: {name.replace(':', '.')}" for name in PLUG_INS)])
+
+
+def text_of(name):
+    """Text of a file at the root."""
+    return lambda: linked((ROOT / name).read_text(encoding="utf-8"))
+
+
+PAGES = {
+    "index.md": lambda: f"{readme('')}\n\n{FIRST}\n\n{readme('More')}",
+    "start.md": lambda: "# Quick start\n\n" + readme("Two commands", "What it prints", "An example", "Recipes"),
+    "trust.md": lambda: readme("How far can I trust it?").replace("## ", "# ", 1),
+    "command-line.md": lambda: readme("Command line", "What it does not do").replace("## ", "# ", 1),
+    "gallery.md": lambda: readme("Gallery").replace("## ", "# ", 1),
+    "scene-files.md": lambda: words.as_markdown().replace(glossary.as_markdown(), "").strip() + "\n",
+    "glossary.md": lambda: "# Glossary\n\n" + glossary.as_markdown().partition("\n\n")[2],
+    "api.md": api,
+    "validation.md": report,
+    "contributing.md": text_of("CONTRIBUTING.md"),
+    "changes.md": text_of("CHANGELOG.md"),
+    **{f"how-to/{name}.md": (lambda entry=entry: how_to(*entry)) for name, entry in HOW_TO.items()},
+}
+"""Texts of the pages that are made, by their name."""
+
+
+def on_config(config):
+    """Let blocks of equations be set as MathML, which browsers show without a script."""
+    fences = [{"name": "math", "class": "math", "format": equation}]
+    config.mdx_configs["pymdownx.superfences"] = {"custom_fences": fences}
+    return config
+
+
+def equation(source, language, css_class, options, md, **more):
+    """An equation in TeX as MathML."""
+    from latex2mathml.converter import convert  # pyright: ignore[reportMissingImports]
+
+    return f'<div class="{css_class}">{convert(source, display="block")}</div>'
+
+
+def on_files(files, config):
+    """Add the pages that are made, and the pictures of the README."""
+    for name, made in PAGES.items():
+        files.append(File.generated(config, name, content=made()))
+    for path in sorted((ROOT / "validation" / "pictures").iterdir()):
+        files.append(File.generated(config, f"pictures/{path.name}", abs_src_path=str(path)))
+    return files
