@@ -29,11 +29,10 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB
 
 
 def cores():
-    """Number of processors that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on macOS and Windows
-        return os.cpu_count() or 1
+    """Number of processors that this process may use, by affinity and the quota of a container."""
+    import loky
+
+    return loky.cpu_count()
 
 
 def _watch(parent):
