@@ -66,7 +66,10 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     web = _web(web, folder)
     _check_memory(len(web.lines), cable, effects, solve)
     _check_history(solve, output, len(observables))
-    net = discretisation.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
+    static, consistent = solve.kind == "static", solve.mass == "consistent"
+    implicit = [name for name, method in INTEGRATORS.items() if "linear_solver" in method.keys]
+    explicit = not static and solve.start != "equilibrium" and solve.method not in implicit
+    net = discretisation.build(web, cable, quasi_static=static, consistent=consistent, explicit=explicit)
     net = replace(net, end=float(max(solve.load_steps) if net.quasi_static else solve.duration))
     _check_forming(net, solve)
     supported = _supported(net, supports, support)

@@ -104,7 +104,6 @@ class Solution(SolutionData):
         InputError
             Where there is no such frame; names the nearest.
         """
-        import meshio
         import pyvista
 
         from .pictures.frames import listed, number_of
@@ -114,7 +113,7 @@ class Solution(SolutionData):
             frames = dict(self.frames)
             state = frames[number_of(frame, list(frames))]
             time, frames = state.time, meshes(state)
-            blocks = {name: pyvista.from_meshio(meshio.Mesh(*mesh)) for name, mesh in frames.items()}
+            blocks = {name: pyvista.from_meshio(mesh) for name, mesh in frames.items()}
         else:
             frames = listed(self.path)
             time, paths = frames[number_of(frame, list(frames))]

@@ -141,7 +141,8 @@ def called(given):
     factorized = "system.factorization" in modules
     if given["cable"].get("order", 1) > 1:
         modules.add("net.curved")
-        outside.append("skfem")
+    if given["cable"].get("order", 1) > 1 or rests or method in ("cvode", "ida"):
+        outside.append("skfem")  # dofs of what has a matrix
     if "mesh" not in given["web"] or "self_contact" in given or rests or factorized:  # parts, neighbours
         outside.append("scipy.sparse.csgraph")
     if factorized:

@@ -30,7 +30,7 @@ def add_arguments(parser):
     text = "number the lines, those with the largest values first, as many as do not cover each other"
     parser.add_argument("--labels", choices=["lines"], help=text)
     parser.add_argument("--out", metavar="FILE", help="picture to write (default: DIR/web.png)")
-    text = "a film of all frames, of a mode its swing: a GIF (default: DIR/web.gif), or where ffmpeg is found an MP4"
+    text = "a film of all frames, of a mode its swing: a GIF (default: DIR/web.gif) or an MP4"
     parser.add_argument("--animate", action="store_true", help=text)
 
 

@@ -3,8 +3,9 @@
 A cable is a curve x(s) ∈ R³ over its natural arc length s. scikit-fem knows such an element once the mapping's metric
 is the natural length: `NaturalLength` has DF = detDF = L and invDF = 1/L, so that ``grad(u)`` of an
 ``ElementVector(ElementLineP1(), 3)`` is du/ds, and branching, closed and prestressed nets need nothing extra. From the
-`skfem.Basis` only the dofs, the quadrature and the reference derivatives dN/dξ are kept; the compiled kernels do the
-rest. Of straight elements, order 1, they are known beforehand, see `refweb.net.elements`.
+`skfem.Basis` the dofs, the quadrature and the reference derivatives dN/dξ are kept. The compiled kernels fill the
+values of the tangent on the pattern of these dofs; `refweb.system.weak_form` has it as a form of scikit-fem. Explicit
+steps assemble no matrix, and take what they need of straight elements from `refweb.net.elements`.
 
 A line of the web is ``subdivide`` elements of ``order`` 1, 2 or 3, each with as many Gauss points as its order. That is
 the least quadrature with which no motion of an element but a rigid one is free of strain, and it keeps the orders of
@@ -120,15 +121,15 @@ class Elements(NamedTuple):
     weights: np.ndarray
 
 
-def _elements(web, element, pieces, length):
+def _elements(web, element, pieces, length, explicit):
     """The `Elements` of a web, each line in equal pieces of these natural lengths [m]."""
     line = np.repeat(np.arange(len(web.lines), dtype=np.int32), pieces)
     points, ends = _divided(web, pieces)
-    if element.maxdeg == 1:
+    if element.maxdeg == 1 and explicit:
         places, weights = gauss(1)
         cells = np.array(ends, dtype=np.int32, order="C")
         return Elements(points, cells, line, element.doflocs[:, 0], values(element, places)[1], weights)
-    line_basis = basis(points, ends, length, element)
+    line_basis = basis(points, ends, length, element if element.maxdeg > 1 else None)
     dofs, places = line_basis.element_dofs.T, element.doflocs[:, 0]
     position = np.tile(np.arange(pieces), len(web.lines))[:, None] + places
     row = _numbered(dofs, line, position, len(web.points))
@@ -166,7 +167,7 @@ def _masses(element, cells, share, rows, consistent):
     return mass, share[:, None, None] * apart
 
 
-def build(web, cable, quasi_static=False, consistent=False):
+def build(web, cable, quasi_static=False, consistent=False, explicit=False):
     """The `refweb.net.net.Net` of a web made of a cable.
 
     Parameters
@@ -179,12 +180,14 @@ def build(web, cable, quasi_static=False, consistent=False):
         Whether time is the load step of statics.
     consistent : bool
         Whether mass is consistent, ∫ρA N_a N_b ds, and not lumped to ∫ρA N_a ds.
+    explicit : bool
+        Whether no matrix is assembled, so that straight elements do without scikit-fem.
     """
     given, pieces, element = cable.properties(web), cable.subdivide, line_element(cable.order)
     laws = np.unique(given["law"])
     values = {name: np.repeat(value, pieces) for name, value in given.items()}
     length = values["natural_length"] / pieces
-    cut = _elements(web, element, pieces, length)
+    cut = _elements(web, element, pieces, length, explicit)
     share = values["density"] * values["area"] * length
     allowed = values["knot_factor"] / values["safety_factor"]
     mass, apart = _masses(element, cut.cells, share, len(cut.points), consistent)

@@ -1,4 +1,8 @@
-"""HTML from texts: what users wrote is escaped here, and nowhere else."""
+"""HTML from texts: what users wrote is escaped here, and nowhere else.
+
+jinja2 would not make it shorter: sections, tables, pairs, lists, pictures and figures are 24
+lines of a template in place of 23 here, and another 5 load it.
+"""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def of_frames(record):
     best = None
     for number, time in record.times.items():
         try:
-            values, _ = record.values(number, "tension")
+            values = record.frame(number).fields["tension"]
         except (InputError, KeyError):
             continue
         if np.isfinite(values).any() and (best is None or np.nanmax(values) > best[0]):

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..results.files import write_atomically
 from . import movie_writer, render
+from .model import COARSE
 from .over_frames import with_largest
 from .pictures import blank_page, clock_line, look_of, pixels, record_of, target, with_clear_white
 from .polygons import flat_images
@@ -24,10 +25,10 @@ SIZE = (1200, 750)
 """Of a film [pixel]."""
 PHASES, SWINGS = 24, 12.0
 """Images of a period of a mode, and of them in a second [1/s]."""
-FRAMES_KEPT = 64
-"""Frames that are held in memory, to be drawn after the camera has seen all."""
 SAMPLES = 6
 """Images that a GIF has its colours of."""
+LAST = 1.0
+"""How long the last image of what does not swing stays [s]."""
 
 
 def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.0, view=None, fps=10.0, progress=None):
@@ -38,7 +39,7 @@ def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.
     source, field, range, scale, view
         As for `refweb.picture`.
     out : path-like
-        A ``.gif``, or where ffmpeg is found an ``.mp4``.
+        A ``.gif`` or an ``.mp4``.
     frame : int, optional
         The number of a mode.
     time : float, optional
@@ -56,12 +57,10 @@ def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.
     Raises
     ------
     InputError
-        As for `refweb.picture`; for an ``.mp4`` without ffmpeg.
+        As for `refweb.picture`.
     """
     record = with_largest(record_of(source), field)
     out = target(out, movie_writer.ENDINGS)
-    if out.suffix.lower() == ".mp4":
-        movie_writer.ffmpeg()
     if not 0 < fps <= 50:
         raise InputError(f"fps = {fps} must be > 0 and ≤ 50 [1/s]")
     if record.kind != "modes" and (frame is not None or time is not None):
@@ -97,8 +96,7 @@ class _Film:
         self._record, self._poses, self._options = record, poses, options
         self._swings = record.kind == "modes"
         self._fps = SWINGS if self._swings else fps
-        self._read = functools.lru_cache(FRAMES_KEPT)(record.frame)
-        self._last = self._read(poses[-1].number)
+        self._last = record.frame(poses[-1].number)
         self._decimals = max((len(f"{t:.6g}".partition(".")[2]) for t in record.times.values()), default=0)
 
     def write(self, path, progress):
@@ -108,24 +106,22 @@ class _Film:
         self._around = self._page()
         count = len(self._poses)
         ahead = sorted({round(i) for i in np.linspace(0, count - 1, min(count, SAMPLES))})
-        gif = path.suffix.lower() == ".gif"
-        with render.Renderer(self._stage.views, self._sizes, render.COARSE) as renderer:
-            drawn = {i: self._image(renderer, self._poses[i]) for i in ahead} if gif else {}
-            film = movie_writer.writer(
-                path, SIZE, self._fps, list(drawn.values()), colour_map()(np.linspace(0, 1, 64))[:, :3]
-            )
-            try:
+        seconds = count * [1.0 / self._fps]
+        if not self._swings:
+            seconds[-1] = LAST
+        certain = np.round(255 * colour_map()(np.linspace(0, 1, 64))[:, :3]).astype(int)
+        with render.Renderer(self._stage.views, self._sizes, COARSE) as renderer:
+            drawn = {i: self._image(renderer, self._poses[i]) for i in ahead}
+
+            def images():
                 for i, pose in enumerate(self._poses):
-                    image = drawn.pop(i) if i in drawn else self._image(renderer, pose)
-                    film.add(image, movie_writer.LAST if i == count - 1 and not self._swings else 0.0)
+                    yield drawn[i] if i in drawn else self._image(renderer, pose)
                     progress("drawing frames", (i + 1) / count)
-                film.close()
-            except BaseException:
-                film.abandon()
-                raise
+
+            movie_writer.write(path, images(), seconds, list(drawn.values()), certain)
 
     def _frame(self, pose):
-        return self._read(pose.number).held_as(self._last).posed(self._options.scale, pose.phase)
+        return self._record.frame(pose.number).held_as(self._last).posed(self._options.scale, pose.phase)
 
     def _survey(self, progress):
         """The stage that shows all images; of a swing its two ends and its middle do."""

@@ -17,7 +17,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..results.vtu import SHAPE_SIZE
-from ..results.vtu_file import Reader
 
 CELLS = ("line", "line3", "line4")
 POINTS_ALONG_A_CURVE = 9
@@ -192,7 +191,7 @@ def frame_of(number, time, meshes, supported, point_mass=None):
         Its number.
     time : float
         Its time [s], or load step.
-    meshes : dict of str to refweb.results.vtu_file.Mesh
+    meshes : dict of str to meshio.Mesh
         ``web``, and bodies by name, as `refweb.results.vtu.meshes` makes them.
     supported : ndarray of bool, shape (points,)
         Which points of the web are supported.
@@ -240,8 +239,6 @@ def _amplitude(points, shape):
 
 
 def _mesh(path):
-    with contextlib.suppress(OSError, ValueError):
-        return Reader(path).mesh()
     import meshio
 
     said = io.StringIO()

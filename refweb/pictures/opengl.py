@@ -1,321 +1,145 @@
-"""OpenGL in a process of its own: one window that is kept, and meshes that are updated in place from frame to frame."""
+"""Models drawn by pyvista: in a window, or off screen as images of one view after the other."""
 
 from __future__ import annotations
 
+import functools
 import os
-import pickle
-import sys
 
 import numpy as np
 
-from .render import FINE, Balls, Surface
+from .model import FINE, Balls, Surface, Tubes
 
 SUPERSAMPLING = 2
-AMBIENT, DIFFUSE, POWER = 0.45, 0.62, 20.0
+MATTER = {"ambient": 0.45, "diffuse": 0.62, "specular_power": 20.0}
+ROUND = {"specular": 0.15, "smooth_shading": True, "culling": "back"}
+LIGHTS = (((-0.45, 0.75, 1.0), 0.62), ((0.7, -0.3, 0.8), 0.28), ((0.0, 0.0, 1.0), 0.22))
+"""Directions and intensities of the lights, which move with the camera: from above to the left, beside, the viewer."""
 MOST_CORNERS = 1_000_000
 """Corners of tubes above which lines are drawn as wires: they are then a few pixels wide, and no roundness is seen."""
 MOST_OF_BALLS = 200_000
 """Corners of all balls together; many are coarser."""
 
+_off_screen = []
 
-def serve():
-    """Read views, their sizes and models from standard input and write images to standard output, until it ends.
 
-    Whatever a library writes to standard output goes to the error stream.
+def open_off_screen(*job):
+    """Prepare this process for `images`; ``job`` are views, their sizes [pixel] and the sides of a tube.
+
+    Whatever a library writes goes nowhere.
     """
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    window = Window(*pickle.load(sys.stdin.buffer))
-    while True:
-        try:
-            model = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
-        pickle.dump(window.images(model), answers, protocol=5)
-        answers.flush()
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)
+    os.dup2(silence, 2)
+    _off_screen[:] = [plotter_of(job[1][0], off_screen=True), *job]
+    _off_screen[0].disable_anti_aliasing()
 
 
-class Window:
-    """A window off screen in which views stand one above the other, and the meshes in it.
+def images(model):
+    """A model in each view, RGB, shape (height, width, 3), uint8.
 
-    Parameters
-    ----------
-    views : list of `refweb.pictures.camera.View`
-    sizes : list of (width, height)
-        Size of each view [pixel].
-    sides : int
-        Of a tube.
+    Raises
+    ------
+    OSError
+        Where the window stays blank.
     """
+    from PIL import Image
 
-    def __init__(self, views, sizes, sides):
-        import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  # brings the classes that draw
-        from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
-
-        self._sizes, self._sides, self._meshes = sizes, sides, []
-        self._width = SUPERSAMPLING * max(width for width, _ in sizes)
-        self._height = SUPERSAMPLING * sum(height for _, height in sizes)
-        self._window = vtkRenderWindow()
-        self._window.SetOffScreenRendering(True)
-        self._window.SetMultiSamples(0)
-        self._window.SetSize(self._width, self._height)
-        self._renderers, bottom = [], 0
-        for view, (width, height) in zip(views, sizes, strict=True):
-            renderer = vtkRenderer()
-            top = bottom + SUPERSAMPLING * height
-            renderer.SetViewport(0, bottom / self._height, SUPERSAMPLING * width / self._width, top / self._height)
-            renderer.SetBackground(1.0, 1.0, 1.0)
-            _light(renderer)
-            self._window.AddRenderer(renderer)
-            self._renderers.append((renderer, view))
-            bottom = top
-
-    def images(self, model):
-        """A model in each view, RGB, shape (height, width, 3), uint8."""
-        for number, part in enumerate(model):
-            if number == len(self._meshes):
-                self._meshes.append(_mesh_of(part, self._sides, self._pixels))
-                for renderer, _ in self._renderers:
-                    renderer.AddActor(self._meshes[-1].actor)
-            self._meshes[number].show(part)
-        for renderer, view in self._renderers:
-            _aim(renderer, view)
-        self._window.Render()
-        return self._read(bool(model))
-
-    def _pixels(self, area):
-        """Pixels of the window that a metre takes at a place [m], shape (3,): the mean over views."""
-        return SUPERSAMPLING * np.mean(
-            [
-                view.project(area)[2] * height / (2 * view.half[1])
-                for (_, view), (_, height) in zip(self._renderers, self._sizes, strict=True)
-            ]
-        )
-
-    def _read(self, filled):
-        from PIL import Image
-        from vtkmodules.util.numpy_support import vtk_to_numpy
-        from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
-
-        pixels = vtkUnsignedCharArray()
-        self._window.GetPixelData(0, 0, self._width - 1, self._height - 1, 0, pixels, 0)
-        image = vtk_to_numpy(pixels).reshape(self._height, self._width, 3)
-        if filled and np.ptp(image[:: SUPERSAMPLING + 1]) == 0:
-            raise SystemExit("the window stays blank")
-        images, bottom = [], 0
-        for width, height in self._sizes:
-            top = bottom + SUPERSAMPLING * height
-            part = np.ascontiguousarray(image[bottom:top, : SUPERSAMPLING * width][::-1])
-            images.append(np.asarray(Image.fromarray(part).reduce(SUPERSAMPLING)))
-            bottom = top
-        return images
+    plotter, views, sizes, sides = _off_screen
+    show(plotter, model, sides, functools.partial(pixels_of, views, SUPERSAMPLING * np.array(sizes)))
+    drawn = []
+    for view, size in zip(views, sizes, strict=True):
+        plotter.render_window.SetSize(*(SUPERSAMPLING * length for length in size))
+        aim(plotter, view)
+        plotter.render_window.Render()
+        image = plotter.screenshot(return_img=True)
+        drawn.append(np.asarray(Image.fromarray(image).reduce(SUPERSAMPLING)))
+    if model and not any(np.ptp(image) for image in drawn):
+        raise OSError("the window stays blank")
+    return drawn
 
 
-def _light(renderer):
-    """A key light from above to the left, a fill light, and one from the viewer, all moving with the camera."""
-    from vtkmodules.vtkRenderingCore import vtkLight
-
-    for direction, strength in (((-0.45, 0.75, 1.0), 0.62), ((0.7, -0.3, 0.8), 0.28), ((0.0, 0.0, 1.0), 0.22)):
-        light = vtkLight()
-        light.SetLightTypeToCameraLight()
-        light.SetPosition(*direction)
-        light.SetFocalPoint(0.0, 0.0, 0.0)
-        light.SetIntensity(strength)
-        renderer.AddLight(light)
+def pixels_of(views, sizes, point):
+    """Pixels that a metre takes at a point [m], shape (3,): the mean over views of some sizes [pixel]."""
+    return np.mean(
+        [v.project(point)[2] * height / (2 * v.half[1]) for v, (_, height) in zip(views, sizes, strict=True)]
+    )
 
 
-def _aim(renderer, view):
-    camera = renderer.GetActiveCamera()
-    position = view.centre + (0 if view.perspective else view.axes[2] * sum(view.half))
-    camera.SetPosition(*position)
-    camera.SetFocalPoint(*(position - view.axes[2]))
-    camera.SetViewUp(*view.axes[1])
-    camera.SetParallelProjection(not view.perspective)
+def plotter_of(size, off_screen=False):
+    """A plotter of pyvista of a size [pixel], white, with the lights of pictures."""
+    import pyvista
+
+    plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), lighting="none")
+    plotter.background_color = "white"
+    for position, intensity in LIGHTS:
+        plotter.add_light(pyvista.Light(position=position, intensity=intensity, light_type="camera light"))
+    return plotter
+
+
+def aim(plotter, view, middle=None):
+    """Let a plotter show a `refweb.pictures.camera.View`, which is turned about the depth of a ``middle`` [m]."""
+    camera, position = plotter.camera, view.centre + (0 if view.perspective else view.axes[2] * sum(view.half))
+    away = 1.0 if middle is None else (position - middle) @ view.axes[2]
+    camera.position, camera.focal_point, camera.up = position, position - away * view.axes[2], view.axes[1]
+    camera.parallel_projection = not view.perspective
     if view.perspective:
-        camera.SetViewAngle(2 * np.degrees(np.arctan(view.half[1])))
+        camera.view_angle = 2 * np.degrees(np.arctan(view.half[1]))
     else:
-        camera.SetParallelScale(view.half[1])
-    renderer.ResetCameraClippingRange()
+        camera.parallel_scale = view.half[1]
+    plotter.renderer.ResetCameraClippingRange()
 
 
-def _mesh_of(part, sides, pixels):
-    if isinstance(part, Surface):
-        return _SurfaceMesh()
-    if isinstance(part, Balls):
-        return _BallMesh(sides)
-    return _WireMesh(pixels) if sides * part.paths[..., 0].size > MOST_CORNERS else _TubeMesh(sides)
+def show(plotter, model, sides, pixels):
+    """Put a model in the place of the one before; ``pixels`` says how many a metre takes at a point [m]."""
+    for number in range(len(model), len(plotter.actors)):
+        plotter.remove_actor(f"part {number}", render=False)
+    for number, part in enumerate(model):
+        mesh, style = _MESHES[type(part)](part, sides, pixels)
+        if mesh is None:
+            plotter.remove_actor(f"part {number}", render=False)
+            continue
+        plotter.add_mesh(mesh, name=f"part {number}", reset_camera=False, render=False, **MATTER | style)
 
 
-class _Mesh:
-    """A mesh of VTK and its actor; its arrays are held as long as VTK looks at them."""
+def _lines(part, sides, pixels):
+    """Tubes, or wires of the width of a tube in the middle of the web: by software a tube takes a hundredfold."""
+    import pyvista
 
-    def __init__(self, specular):
-        from vtkmodules.vtkCommonDataModel import vtkPolyData
-        from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
-
-        self.data, self.actor, self._mapper, self._buffers = vtkPolyData(), vtkActor(), vtkPolyDataMapper(), {}
-        self._mapper.SetInputData(self.data)
-        self.actor.SetMapper(self._mapper)
-        properties = self.actor.GetProperty()
-        properties.SetAmbient(AMBIENT)
-        properties.SetDiffuse(DIFFUSE)
-        properties.SetSpecular(specular)
-        properties.SetSpecularPower(POWER)
-        properties.SetInterpolationToPhong()
-
-    def _points(self, points):
-        from vtkmodules.vtkCommonCore import vtkPoints
-
-        vtk_points = vtkPoints()
-        vtk_points.SetData(self._array("points", points, np.float32))
-        self.data.SetPoints(vtk_points)
-
-    def _faces(self, faces):
-        """Triangles or quadrangles, shape (faces, corners)."""
-        self.data.SetPolys(self._cells(faces))
-
-    def _cells(self, corners):
-        """Cells with the same number of corners each, shape (cells, corners)."""
-        from vtkmodules.vtkCommonDataModel import vtkCellArray
-
-        cells = vtkCellArray()
-        ends = np.arange(0, corners.size + 1, corners.shape[1])
-        cells.SetData(self._array("ends", ends, np.int64), self._array("corners", corners.ravel(), np.int64))
-        return cells
-
-    def _array(self, name, values, kind):
-        from vtkmodules.util.numpy_support import numpy_to_vtk
-
-        self._buffers[name] = np.ascontiguousarray(values, dtype=kind)
-        return numpy_to_vtk(self._buffers[name], deep=False)
+    paths = np.asarray(part.paths, dtype=float)
+    lines, points = paths.shape[:2]
+    if not lines:
+        return None, {}
+    cells = np.insert(np.arange(lines * points).reshape(lines, points), 0, points, axis=1)
+    mesh = pyvista.PolyData(paths.reshape(-1, 3), lines=cells.ravel())
+    mesh.cell_data["colour"] = np.round(255 * np.asarray(part.colours)).astype(np.uint8)
+    style = {"scalars": "colour", "rgb": True}
+    if sides * lines * points > MOST_CORNERS:
+        width = 2 * float(np.median(part.radius)) * pixels(mesh.points.mean(axis=0))
+        half_lit = {"diffuse": 0.8 * MATTER["diffuse"]}  # half of a tube is turned away from the light
+        return mesh, style | half_lit | {"line_width": max(1.0, width)}
+    mesh.point_data["radius"] = np.repeat(np.broadcast_to(part.radius, lines), points)
+    return mesh.tube(scalars="radius", absolute=True, n_sides=sides), style | ROUND
 
 
-class _TubeMesh(_Mesh):
-    """Tubes whose faces stay as they are for as long as their number does."""
-
-    def __init__(self, sides):
-        super().__init__(specular=0.15)
-        angle = 2 * np.pi * np.arange(sides) / sides
-        self._round = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        self._shape = None
-        self.actor.GetProperty().BackfaceCullingOn()
-
-    def show(self, part):
-        paths = np.asarray(part.paths, dtype=float)
-        self.actor.SetVisibility(bool(len(paths)))
-        if not len(paths):
-            return
-        outward = np.einsum("sa,alpx->lpsx", self._round, _across(paths))
-        radius = np.broadcast_to(part.radius, len(paths))[:, None, None, None]
-        self._points((paths[:, :, None] + radius * outward).reshape(-1, 3))
-        self.data.GetPointData().SetNormals(self._array("normals", outward.reshape(-1, 3), np.float32))
-        colours = np.round(255 * np.asarray(part.colours))
-        each = paths.shape[1] * len(self._round)
-        self.data.GetPointData().SetScalars(self._array("colours", np.repeat(colours, each, axis=0), np.uint8))
-        if self._shape != paths.shape:
-            self._shape = paths.shape
-            self._faces(self._sides(*paths.shape[:2]))
-        self.data.Modified()
-
-    def _sides(self, lines, points):
-        """Quadrangles between rings that follow each other, shape (faces, 4)."""
-        sides = len(self._round)
-        ring = np.arange(sides)
-        first = np.stack([ring, np.roll(ring, -1), np.roll(ring, -1) + sides, ring + sides], axis=1)
-        start = sides * (np.arange(points - 1) + points * np.arange(lines)[:, None])
-        return (start[..., None, None] + first).reshape(-1, 4)
-
-
-class _WireMesh(_Mesh):
-    """Lines of one width in pixels, that of a tube of the same radius in the middle of the web.
-
-    A tube takes a hundred times the work of a wire, by OpenGL in software.
-    """
-
-    def __init__(self, pixels):
-        super().__init__(specular=0.0)
-        self.actor.GetProperty().SetDiffuse(0.8 * DIFFUSE)  # half of a tube is turned away from the light
-        self._pixels, self._shape = pixels, None
-
-    def show(self, part):
-        paths = np.asarray(part.paths)
-        self.actor.SetVisibility(bool(len(paths)))
-        if not len(paths):
-            return
-        points = paths.reshape(-1, 3)
-        width = 2 * np.median(part.radius) * self._pixels(points.mean(axis=0))
-        self.actor.GetProperty().SetLineWidth(max(1.0, float(width)))
-        self._points(points)
-        colours = np.round(255 * np.asarray(part.colours)).astype(np.uint8)
-        self.data.GetPointData().SetScalars(
-            self._array("colours", np.repeat(colours, paths.shape[1], axis=0), np.uint8)
-        )
-        if self._shape != paths.shape:
-            self._shape = paths.shape
-            self.data.SetLines(self._cells(np.arange(len(points)).reshape(paths.shape[:2])))
-        self.data.Modified()
-
-
-def _across(paths):
-    """Two unit vectors across the lines at each of their points, shape (2, lines, points, 3)."""
-    along = np.gradient(paths, axis=1)
-    along /= np.linalg.norm(along, axis=2, keepdims=True) + 1e-300
-    aside = np.eye(3)[np.abs(along).max(axis=1).argmin(axis=1)]
-    first = np.cross(along, aside[:, None])
-    first /= np.linalg.norm(first, axis=2, keepdims=True) + 1e-300
-    return np.stack([first, np.cross(along, first)])
-
-
-class _SurfaceMesh(_Mesh):
+def _surface(part, sides, pixels):
     """A body, smooth but at sharp edges."""
+    import pyvista
 
-    def __init__(self):
-        super().__init__(specular=0.4)
-        self._last = None
-
-    def show(self, part):
-        from vtkmodules.vtkFiltersCore import vtkCleanPolyData, vtkPolyDataNormals
-
-        self.actor.SetVisibility(bool(len(part.triangles)))
-        if not len(part.triangles) or (self._last is not None and np.array_equal(part.points, self._last)):
-            return
-        self._last = part.points
-        self._points(part.points)
-        self._faces(part.triangles)
-        clean, smooth = vtkCleanPolyData(), vtkPolyDataNormals()
-        clean.SetInputData(self.data)
-        smooth.SetInputConnection(clean.GetOutputPort())
-        smooth.SetFeatureAngle(40.0)
-        smooth.Update()
-        self._mapper.SetInputData(smooth.GetOutput())
-        self.actor.GetProperty().SetColor(*part.colour)
+    mesh = pyvista.PolyData(part.points, faces=np.insert(part.triangles, 0, 3, axis=1).ravel()).clean()
+    smooth = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": 40.0}
+    return mesh if mesh.n_cells else None, {"color": part.colour, "specular": 0.4, **smooth}
 
 
-class _BallMesh(_Mesh):
-    """Balls, made once for as long as they stay where they are."""
+def _balls(part, sides, pixels):
+    import pyvista
 
-    def __init__(self, sides):
-        super().__init__(specular=0.15)
-        self._finest, self._last = 16 if sides >= FINE else 10, None
+    if not len(part.centres):
+        return None, {}
+    finest = 16 if sides >= FINE else 10
+    resolution = int(np.clip(np.sqrt(MOST_OF_BALLS / len(part.centres)), 6, finest))
+    ball = pyvista.Sphere(radius=part.radius, theta_resolution=resolution, phi_resolution=resolution)
+    mesh = pyvista.PolyData(np.asarray(part.centres, dtype=float)).glyph(geom=ball, scale=False, orient=False)
+    return mesh, ROUND | {"color": part.colour}
 
-    def show(self, part):
-        from vtkmodules.vtkFiltersCore import vtkGlyph3D
-        from vtkmodules.vtkFiltersSources import vtkSphereSource
 
-        self.actor.SetVisibility(bool(len(part.centres)))
-        if not len(part.centres) or (self._last is not None and np.array_equal(part.centres, self._last)):
-            return
-        self._last = part.centres
-        self._points(part.centres)
-        ball, glyphs = vtkSphereSource(), vtkGlyph3D()
-        ball.SetRadius(part.radius)
-        resolution = int(np.clip(np.sqrt(MOST_OF_BALLS / len(part.centres)), 6, self._finest))
-        ball.SetThetaResolution(resolution)
-        ball.SetPhiResolution(resolution)
-        glyphs.SetInputData(self.data)
-        glyphs.SetSourceConnection(ball.GetOutputPort())
-        glyphs.ScalingOff()
-        glyphs.OrientOff()
-        glyphs.Update()
-        self._mapper.SetInputData(glyphs.GetOutput())
-        self._mapper.ScalarVisibilityOff()
-        self.actor.GetProperty().SetColor(*part.colour)
+_MESHES = {Tubes: _lines, Surface: _surface, Balls: _balls}

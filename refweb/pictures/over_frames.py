@@ -9,7 +9,6 @@ import numpy as np
 from ..errors import InputError
 from ..results.units import readable
 from .peaks import Largest, observed, when
-from .record import Values
 from .stage import LARGEST, UNITS
 
 MISSED = 1e-3
@@ -44,10 +43,7 @@ def with_largest(record, field):
             raise InputError(f'field = "{field}": the frames have webs of different lines')
         return plain._replace(fields={**plain.fields, field: largest()})
 
-    def values(number, name):
-        return Values(largest(), np.zeros(len(largest()), dtype=bool)) if name == field else record.values(number, name)
-
-    return record._replace(frame=frame, values=values)
+    return record._replace(frame=frame)
 
 
 def _values_of(record, field):
@@ -55,7 +51,7 @@ def _values_of(record, field):
     shape = None
     for number in record.times:
         try:
-            values = record.values(number, field).field
+            values = record.frame(number).fields[field]
         except (InputError, KeyError):
             continue
         if shape is not None and values.shape != shape:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .render import Balls, Surface
+from .model import Balls, Surface
 
 PIECES = 3000
 """Long lines, and large triangles, are cut for depth sorting while there are fewer."""

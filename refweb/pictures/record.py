@@ -16,7 +16,6 @@ from ..messages import short
 from ..results.folder import TABLES, read_summary
 from ..results.solution import as_history
 from ..results.units import readable
-from ..results.vtu_file import cell_arrays
 from .frames import Frame, frame_of, listed, number_of, read
 
 CLOCKS = {"modes": "mode {:g}", "static": "step {:g}", "dynamic": "t = {:.6g} s"}
@@ -29,11 +28,8 @@ OTHERS = {
 """What is said of folders that hold something else."""
 
 
-class Values(NamedTuple):
-    """A field in a frame: values of the lines [SI], and which of them are slack, both of shape (lines,)."""
-
-    field: np.ndarray
-    slack: np.ndarray
+FRAMES_KEPT = 64
+"""Frames that are held in memory: a film and a page look at each more than once."""
 
 
 class Record(NamedTuple):
@@ -55,8 +51,6 @@ class Record(NamedTuple):
         Gives the `Frame` of a number.
     table : callable
         Gives (names of columns with units, history by name), read once.
-    values : callable
-        Gives the `Values` of a field in the frame of a number.
     """
 
     name: str
@@ -66,7 +60,6 @@ class Record(NamedTuple):
     times: dict
     frame: Callable[[int], Frame]
     table: Callable[[], tuple]
-    values: Callable[[int, str], Values]
 
     @property
     def title(self):
@@ -175,12 +168,8 @@ def of_folder(folder, with_frames=True):
     name = folder.name or folder.resolve().name
     table = functools.cache(functools.partial(_table, folder))
 
-    def values(number, field):
-        arrays = cell_arrays(frames[number].paths["web"], (field, "slack"))
-        return _values(frame(number), field) if arrays is None else Values(arrays[field], arrays["slack"] > 0.5)
-
-    frame = functools.partial(read, folder, known_paths=frames)
-    return Record(name, kind, summary, scene, times, frame, table, values)
+    frame = functools.lru_cache(FRAMES_KEPT)(functools.partial(read, folder, known_paths=frames))
+    return Record(name, kind, summary, scene, times, frame, table)
 
 
 def _listed(folder, with_frames):
@@ -203,6 +192,7 @@ def of_solution(solution, with_frames=True):
         return of_folder(solution.path, with_frames)
     from ..results.vtu import meshes
 
+    @functools.lru_cache(FRAMES_KEPT)
     def frame(number):
         state, shape = states[number]
         supported = state.system.fixed[: state.system.net.nodes].any(axis=1)
@@ -215,16 +205,7 @@ def of_solution(solution, with_frames=True):
         tables = {}
     times = {number: state.time if shape is None else float(number) for number, (state, shape) in states.items()}
     kind, table = summary.get("kind", scene.solve.kind), (solution.columns, solution.history)
-
-    def values(number, field):
-        return _values(frame(number), field)
-
-    return Record(scene.title, kind, summary, tables, times, frame, lambda: table, values)
-
-
-def _values(frame, field):
-    """A field of a whole frame."""
-    return Values(frame.fields[field], frame.slack)
+    return Record(scene.title, kind, summary, tables, times, frame, lambda: table)
 
 
 def _table(folder):

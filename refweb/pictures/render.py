@@ -1,57 +1,23 @@
-"""Tubes, balls and surfaces seen through cameras, as images by OpenGL off screen.
+"""Tubes, balls and surfaces seen through cameras, as images by pyvista off screen.
 
-OpenGL libraries that are missing or broken end a process instead of raising an exception, and they write to the
-terminal. A `Renderer` therefore renders in a child process, see `refweb.pictures.opengl`, which it keeps for all
-frames of a film, tries each kind of off-screen window in turn and gives None if none works;
-`refweb.pictures.polygons` then draws the same model through the same `refweb.pictures.camera.View`.
+VTK 9.7, which pyvista draws by, needs libEGL, libOSMesa or a display. Where a server has none of them it ends the
+process by a segmentation fault, with each kind of window. A `Renderer` therefore renders in a child process, see
+`refweb.pictures.opengl`, which it keeps for all frames of a film, tries each kind of off-screen window in turn and
+gives None if none works; `refweb.pictures.polygons` then draws the same model through the same
+`refweb.pictures.camera.View`.
 """
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import os
-import pickle
-import subprocess
 import sys
-import tempfile
-import threading
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
+from .model import FINE
 
-SECONDS_TO_START, SECONDS_PER_FRAME = 60.0, 60.0
-"""Longest that a child may take [s]."""
-FINE, COARSE = 10, 6
-"""Sides of a tube in a picture, and in a film."""
-
-
-@dataclass(frozen=True)
-class Tubes:
-    """Lines: paths [m], shape (lines, points, 3); colours in 0…1, shape (lines, 3); radius [m], one or (lines,)."""
-
-    paths: np.ndarray
-    colours: np.ndarray
-    radius: float | np.ndarray
-
-
-@dataclass(frozen=True)
-class Balls:
-    """Markers: centres [m], shape (balls, 3); one colour in 0…1; radius [m]."""
-
-    centres: np.ndarray
-    colour: tuple
-    radius: float
-
-
-@dataclass(frozen=True)
-class Surface:
-    """A body: points [m], shape (points, 3); triangles, shape (triangles, 3); one colour in 0…1."""
-
-    points: np.ndarray
-    triangles: np.ndarray
-    colour: tuple
+SECONDS_PER_FRAME = 120.0
+"""Longest that a child may take for an image, the first of which starts it [s]."""
 
 
 def windows():
@@ -102,7 +68,6 @@ class Renderer:
         self._job = (views, sizes, sides)
         self._kinds = windows()
         self._child: Any = None
-        self._said: Any = None
 
     def __enter__(self):
         return self
@@ -112,55 +77,33 @@ class Renderer:
 
     def images(self, model):
         """A model in each view, RGB, shape (height, width, 3), uint8; None where OpenGL is not to be had."""
+        from concurrent.futures import BrokenExecutor
+
+        from .opengl import images
+
         while self._child is not None or self._kinds:
+            if self._child is None:
+                self._start(*self._kinds.pop(0))
             try:
-                if self._child is None:
-                    self._start(*self._kinds.pop(0))
-                    return self._answer(SECONDS_TO_START + SECONDS_PER_FRAME, self._job, model)
-                return self._answer(SECONDS_PER_FRAME, model)
-            except (OSError, EOFError, pickle.UnpicklingError) as error:
-                logging.getLogger(__name__).info(
-                    "OpenGL cannot be used: %s", self._last_words() or type(error).__name__
-                )
+                return self._child.submit(images, model).result(SECONDS_PER_FRAME)
+            except (OSError, BrokenExecutor, TimeoutError) as error:
+                words = str(error).partition("\n")[0] or type(error).__name__
+                logging.getLogger(__name__).info("OpenGL cannot be used: %s", words)
                 self._end()
         return None
 
     def _start(self, window, display):
-        """Start a child; what OpenGL writes goes to a file."""
-        environment = {k: v for k, v in os.environ.items() if display or k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        """Start a child."""
+        from loky import ProcessPoolExecutor
+
+        from .opengl import open_off_screen
+
+        environment = {} if display else {"DISPLAY": "", "WAYLAND_DISPLAY": ""}
         if window:
             environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
-        path = [os.path.abspath(p) for p in sys.path]
-        code = f"import sys; sys.path[:] = {path!r}; from {__package__}.opengl import serve; serve()"
-        self._said = tempfile.TemporaryFile(prefix="refweb-")
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": self._said}
-        self._child = subprocess.Popen(
-            [sys.executable or "python3", "-c", code], cwd=tempfile.gettempdir(), env=environment, **pipes
-        )
-
-    def _answer(self, seconds, *sent):
-        """Reply of the child process; it is killed where it takes longer."""
-        limit = threading.Timer(seconds, self._child.kill)
-        limit.start()
-        try:
-            for item in sent:
-                pickle.dump(item, self._child.stdin, protocol=5)
-            self._child.stdin.flush()
-            return pickle.load(self._child.stdout)
-        finally:
-            limit.cancel()
-
-    def _last_words(self):
-        """The last line that the child has written."""
-        self._child.wait()
-        self._said.seek(0)
-        return self._said.read().decode(errors="replace").strip().rpartition("\n")[2]
+        self._child = ProcessPoolExecutor(1, initializer=open_off_screen, initargs=self._job, env=environment)
 
     def _end(self):
         if self._child is not None:
-            self._child.kill()
-            for pipe in (self._child.stdin, self._child.stdout, self._said):
-                with contextlib.suppress(OSError):
-                    pipe.close()
-            self._child.wait()
+            self._child.shutdown(kill_workers=True)
         self._child = None

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..results.units import prefixed
 from .camera import MANY, choose, outermost
-from .render import Balls, Surface, Tubes
+from .model import Balls, Surface, Tubes
 
 DARK, PALE, BEFORE, SUPPORT, SLACK = "#333333", "#888888", "#999999", (0.25, 0.25, 0.27), (0.80, 0.80, 0.81)
 BODIES = ((0.45, 0.55, 0.68), (0.70, 0.55, 0.45), (0.55, 0.62, 0.50))
@@ -350,8 +350,9 @@ def limits_of(record, field, numbers):
     low, high = np.inf, -np.inf
     for number in numbers:
         with contextlib.suppress(InputError, KeyError):
-            values, slack = record.values(number, field)
-            values = values[np.isfinite(values) & ~(slack & (field in GREY_WHERE_SLACK))]
+            frame = record.frame(number)
+            values = frame.fields[field]
+            values = values[np.isfinite(values) & ~_grey(frame, field)]
             low, high = min(low, values.min(initial=np.inf)), max(high, values.max(initial=-np.inf))
     low, high = (float(low), float(high)) if low <= high else (0.0, 1.0)
     low = 0.0 if 0 <= low <= 0.5 * high else low

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import html
 import json
 import os
 import pathlib
@@ -22,7 +23,6 @@ from ..messages import short
 from ..net.rigid_body import row_names
 from .files import as_toml, number, write_atomically, write_text
 from .vtu import meshes, write_mesh
-from .vtu_file import quoted
 
 RESULT_FILES = re.compile(
     r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|(run|trust)\.json|web\.pvd|(web|cost|trust)\.png|web\.gif"
@@ -322,8 +322,8 @@ class Folder:
         for row, time in frames:
             names = ["web", *(body.name for body in bodies)]
             self._listed += [
-                f'    <DataSet timestep="{number(time)}" group="" part="{part}" name={quoted(name)} '
-                f"file={quoted(f'frames/{name}_{row:06d}.vtu')}/>\n"
+                f'    <DataSet timestep="{number(time)}" group="" part="{part}" name="{html.escape(name)}" '
+                f'file="{html.escape(f"frames/{name}_{row:06d}.vtu")}"/>\n'
                 for part, name in enumerate(names)
             ]
         self._list_frames()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from .files import write_atomically
-from .vtu_file import Block, Mesh, write
 
 POINT_DATA: tuple[str, ...] = ("displacement", "velocity", "reaction", "mass", "support")
 """Names of what is known of nodes; ``support`` is 1 where all components are held, else 0."""
@@ -26,7 +27,7 @@ def meshes(state, shape=None):
 
     Returns
     -------
-    dict of str to refweb.results.vtu_file.Mesh
+    dict of str to meshio.Mesh
     """
     return {"web": web_mesh(state, shape), **{body.name: body_mesh(body, state) for body in state.system.net.bodies}}
 
@@ -37,14 +38,18 @@ def web_mesh(state, shape=None):
     Elements of order 2 and 3 are quadratic and cubic cells; those of a line that is divided follow each other. A
     ``shape`` is drawn on it.
     """
+    import meshio
+
     points, point_data, cell_data = frame_data(state, shape)
     net = state.system.net
-    lines = Block({1: "line", 2: "line3", 3: "line4"}[net.order], net.cells)
-    return Mesh(points, [lines], point_data, {key: [values] for key, values in cell_data.items()})
+    lines = [({1: "line", 2: "line3", 3: "line4"}[net.order], net.cells)]
+    return meshio.Mesh(points, lines, point_data, {key: [values] for key, values in cell_data.items()})
 
 
 def body_mesh(body, state):
     """The surface of a body at its current position, as it has turned; its points have their own velocity."""
+    import meshio
+
     rotation, centre = body.rotation(state.x) if body.turn is not None else None, state.position[body.row]
     points, triangles = body.surface(centre, rotation)
     data = {"displacement": state.x, "velocity": state.v, "reaction": state.reaction}
@@ -53,12 +58,12 @@ def body_mesh(body, state):
         away = points - centre
         point_data["displacement"] += away - away @ rotation
         point_data["velocity"] += np.cross(body.turning(state.x, state.v), away)
-    return Mesh(points, [Block("triangle", triangles)], point_data, {})
+    return meshio.Mesh(points, [("triangle", triangles)], point_data)
 
 
 def write_mesh(path, mesh):
-    """Write a mesh as VTU, atomically."""
-    write_atomically(path, lambda name: write(name, mesh))
+    """Write a mesh as VTU, arrays compressed by zlib, atomically."""
+    write_atomically(path, functools.partial(mesh.write, file_format="vtu", compression="zlib"))
 
 
 def frame_data(state, shape=None):

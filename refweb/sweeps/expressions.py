@@ -8,6 +8,10 @@ A name stands for a value or for an `Interval`: that of a result with its ±. Nu
 that a comparison is true or false only where it is so of all values in the intervals, and None where ± leaves it
 undecided (Kleene's logic). An interval may come out wider than it is, where a name stands twice, and never narrower,
 but for rounding.
+
+simpleeval 1.0, with the functions of intervals, decides ``and`` by Python's truth: with y from 1 to 3 and x = 2 it
+leaves ``y > 2 and x > 3`` undecided, which is false. Its methods for ``and``, ``or`` and comparisons are private, and
+it looks at what an expression holds only where it is evaluated. asteval puts 387 names within reach of a condition.
 """
 
 from __future__ import annotations

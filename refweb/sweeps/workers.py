@@ -10,12 +10,9 @@ from __future__ import annotations
 import concurrent.futures
 import contextlib
 import multiprocessing.connection
-import multiprocessing.context
 import os
 import signal
-import sys
 import threading
-import types
 from collections import Counter, deque
 from typing import Any
 
@@ -32,78 +29,55 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB
 
 
 def cores():
-    """Number of processors that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on macOS and Windows
-        return os.cpu_count() or 1
+    """Number of processors that this process may use, by affinity and the quota of a container."""
+    import loky
+
+    return loky.cpu_count()
 
 
-def _watch():
-    """End with the process that started this one, however that ends."""
+def _watch(parent):
+    """End with the process that holds the other end of a pipe, however that ends; Ctrl-C is for that process alone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    if (parent := multiprocessing.parent_process()) is not None:
 
-        def wait():
-            multiprocessing.connection.wait([parent.sentinel])
-            os._exit(1)
+    def wait():
+        multiprocessing.connection.wait([parent])
+        os._exit(1)
 
-        threading.Thread(target=wait, daemon=True).start()
-
-
-class _Process(multiprocessing.context.SpawnProcess):
-    """A process that does not import the user's script anew: it needs nothing of it, and the script no guard."""
-
-    @staticmethod
-    def _Popen(process_obj):
-        main_module = sys.modules["__main__"]
-        sys.modules["__main__"] = types.ModuleType("__main__")
-        try:
-            return multiprocessing.context.SpawnProcess._Popen(process_obj)
-        finally:
-            sys.modules["__main__"] = main_module
-
-
-class _Context(multiprocessing.context.SpawnContext):
-    Process = _Process
-
-
-@contextlib.contextmanager
-def _apart():
-    """Processes started inside use one thread each, and Ctrl-C is not theirs."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    masked = hasattr(signal, "pthread_sigmask") and signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name, None) if value is None else os.environ.update({name: value})
-        if masked is not False:
-            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
+    threading.Thread(target=wait, daemon=True).start()
 
 
 class Processes:
-    """Processes of this machine, one thread each."""
+    """Processes of this machine, one thread each, by loky: they do not import the user's script, which needs no guard.
+
+    loky gives all jobs up when one process dies, and so tells nothing of which has killed it; `through` tries again.
+    """
 
     local = True
 
     def __init__(self, count=None):
         self.parallel = count or cores()
-        self._pool = None
+        self._pool = self._alive = None
 
     def submit(self, job):
         """Hand out a job; a `concurrent.futures.Future`."""
-        with _apart():
-            if self._pool is None:
-                self._pool = concurrent.futures.ProcessPoolExecutor(self.parallel, _Context(), _watch)
-            try:
-                return self._pool.submit(solve, job)
-            except concurrent.futures.BrokenExecutor as error:  # a worker has died since
-                future = concurrent.futures.Future()
-                future.set_exception(error)
-                return future
+        import loky
+
+        if self._pool is None:
+            parent, self._alive = multiprocessing.Pipe(duplex=False)
+            options = {"initializer": _watch, "initargs": (parent,), "env": dict.fromkeys(THREADS, "1")}
+            self._pool = loky.ProcessPoolExecutor(self.parallel, **options)
+        can_block = hasattr(signal, "pthread_sigmask")  # until `_watch` runs
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if can_block else None
+        try:
+            return self._pool.submit(solve, job)
+        except concurrent.futures.BrokenExecutor as error:  # a worker has died since
+            future = concurrent.futures.Future()
+            future.set_exception(error)
+            return future
+        finally:
+            if before is not None:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def renew(self):
         """Begin anew after a worker has died."""
@@ -112,10 +86,9 @@ class Processes:
     def stop(self):
         """End all of them at once."""
         if self._pool is not None:
-            for process in list((getattr(self._pool, "_processes", None) or {}).values()):
-                process.kill()
-            self._pool.shutdown(wait=True, cancel_futures=True)
-            self._pool = None
+            self._pool.shutdown(kill_workers=True)
+            self._alive.close()
+            self._pool = self._alive = None
 
 
 class Given:

@@ -9,10 +9,13 @@ import skfem
 from nets import LAWS, skew_cable, skew_net, skew_web, system
 from oracle import Oracle
 
+from refweb.effects.elasticity import Elasticity
 from refweb.net import discretisation, elements
 from refweb.net.cable import Cable
 from refweb.net.web import Web
 from refweb.results.state import State
+from refweb.system.system import System
+from refweb.system.weak_form import tangent_matrix
 
 # Both ways sum some dozen products of numbers with a relative rounding of 1e-16 each, and the oracle's strain λ − 1 is
 # rounded to 1e-16 of a largest strain near 0.1: 1e-15 of the largest entry, and a factor of 100 to be safe.
@@ -89,8 +92,28 @@ def test_functions_of_an_element(order):
         np.testing.assert_allclose(slopes @ nodes**power, right, rtol=0, atol=1e-13)
 
 
+@pytest.mark.parametrize("law", ["smooth", "tension-only", "linear"])
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_the_tangent_is_the_weak_form_on_the_page(order, law):
+    """What the compiled kernels fill is what scikit-fem assembles, but for the rounding of sums of some 40 products."""
+    net = discretisation.build(skew_web(), replace(skew_cable(law), order=order, subdivide=2))
+    system = System(net, [Elasticity()], np.zeros((len(net.points), 3), dtype=bool))
+    x = 0.05 * np.random.default_rng(1).normal(size=net.points.shape)
+    filled = system.pattern.matrix(system.stiffness(0.0, x)).toarray()
+    expected = tangent_matrix(net, x).toarray()
+    np.testing.assert_allclose(filled, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("pieces", [1, 3])
+def test_explicit_steps_have_the_same_elements(pieces):
+    """Without scikit-fem, to the last bit."""
+    plain, by_basis = (skew_net(pieces=pieces, explicit=explicit) for explicit in (True, False))
+    for name in ("points", "cells", "line", "gradients", "weights", "places", "mass"):
+        np.testing.assert_array_equal(getattr(plain, name), getattr(by_basis, name))
+
+
 def test_the_straight_element_is_scikit_fems():
-    """It is written down, and not asked for: functions, slopes, places of its nodes, and ends as its dofs."""
+    """It is written down for explicit steps: functions, slopes, places of its nodes, and ends as its dofs."""
     own, theirs, places = elements.line_element(1), skfem.ElementLineP1(), np.linspace(0.0, 1.0, 7)
     assert own.maxdeg == theirs.maxdeg
     np.testing.assert_array_equal(own.doflocs, theirs.doflocs)

@@ -5,8 +5,8 @@ import pytest
 
 from refweb.pictures import camera, render, stage
 from refweb.pictures.camera import View, choose, outermost
+from refweb.pictures.model import FINE, Tubes
 from refweb.pictures.opengl import MOST_CORNERS
-from refweb.pictures.render import FINE, Tubes
 
 
 def test_wires_are_as_wide_as_tubes():

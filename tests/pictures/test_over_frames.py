@@ -3,6 +3,7 @@
 import json
 import re
 
+import meshio
 import numpy as np
 import pytest
 from matplotlib.text import Text
@@ -14,11 +15,10 @@ from refweb.pictures import pictures
 from refweb.pictures import render as drawing
 from refweb.pictures.frames import Masses
 from refweb.pictures.line_numbers import _apart
+from refweb.pictures.model import Balls
 from refweb.pictures.over_frames import on_peak, with_largest
 from refweb.pictures.record import of_folder, of_solution
-from refweb.pictures.render import Balls
 from refweb.pictures.stage import MASS_RADIUS, MASSES, Look, Seen, Stage
-from refweb.results.vtu_file import Reader
 
 E, AREA, STRENGTH = 1e6, 1e-4, 1e6
 MASS = {1: 0.8, 2: 0.1}
@@ -67,7 +67,7 @@ def test_utilisation_is_in_the_files_of_lines_with_a_strength(tmp_path, solution
     """Stress over strength, in every frame; absent where no line has a strength."""
     solution.save(tmp_path / "run")
     for path in sorted((tmp_path / "run/frames").glob("web_*.vtu")):
-        data = Reader(path).mesh().cell_data
+        data = meshio.read(path).cell_data
         np.testing.assert_allclose(data["utilisation"][0], data["stress"][0] / STRENGTH, rtol=1e-14)
     plain = of_solution(refweb.run(swinging(), progress=False))
     assert "utilisation" not in plain.frame(next(iter(plain.times))).fields
@@ -83,7 +83,6 @@ def test_the_largest_of_each_line(tmp_path, solution, saved):
     extended = with_largest(record, "largest_utilisation")
     for number in record.times:
         np.testing.assert_allclose(extended.frame(number).fields["largest_utilisation"], expected, rtol=1e-14)
-    assert not extended.values(next(iter(record.times)), "largest_utilisation").slack.any()
     page = solution.picture(field="largest_utilisation")
     assert f"largest over the {len(record.times)} frames written" in written(page)
 

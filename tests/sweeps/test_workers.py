@@ -46,7 +46,7 @@ def test_processes_of_which_one_is_killed(tmp_path, whole):
         def kill(self):
             Killed.ended += 1
             if Killed.ended == 3 and self._pool is not None:
-                os.kill(next(iter(self._pool._processes)), signal.SIGKILL)
+                os.kill(next(iter(self._pool._processes.values())).pid, signal.SIGKILL)
 
     crew = Killed(2)
     found = refweb.sweep(arms(), TWELVE, tmp_path / "s", crew)

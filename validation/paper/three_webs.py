@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from refweb.pictures import render as drawing
+from refweb.pictures import model, render
 from refweb.pictures.camera import View
 from refweb.pictures.polygons import polygons
 
@@ -91,12 +91,12 @@ def perspective(shown):
     view = View.fit(axes, np.concatenate([one.points for one in shown]), aspect, np.tan(np.radians(9.0)))
     models = [
         [
-            drawing.Tubes(one.points[one.lines], _colours(scale, one), THICKNESS),
-            *(drawing.Surface(*body, BALL) for body in one.bodies),
+            model.Tubes(one.points[one.lines], _colours(scale, one), THICKNESS),
+            *(model.Surface(*body, BALL) for body in one.bodies),
         ]
         for one in shown
     ]
-    images = drawing.images(models, [view], [(WIDTH, HEIGHT)])
+    images = render.images(models, [view], [(WIDTH, HEIGHT)])
     page = Figure(figsize=(7.0, (6.4 / aspect + 0.3) * len(shown)), dpi=160, layout="constrained")
     plot = np.atleast_1d(page.subplots(len(shown)))
     for number, (one, web) in enumerate(zip(plot, shown, strict=True)):

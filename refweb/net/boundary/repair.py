@@ -9,6 +9,10 @@ plane by the cone from its middle. Then the surface has no rim, and the solid is
 Of the surface only counts what has the solid on one side alone. Triangles that others cross are parted until the parts
 are small against the cells of the grid of depth; walls and gaps between parts that are thinner than 2 % of a cell are
 taken for none.
+
+trimesh 5.2 alone gives the volume of 8 of the 14 faulty solids in ``tests/net/test_repair.py``. With the union of
+manifold3d it gives all, and leaves gaps: between two boxes 1e-6 m apart the depth is 1 mm, where that of one solid is
+99 mm.
 """
 
 from __future__ import annotations

@@ -1,0 +1,37 @@
+"""Models, lists of what is drawn of a frame: tubes, balls and surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+FINE, COARSE = 10, 6
+"""Sides of a tube in a picture, and in a film."""
+
+
+@dataclass(frozen=True)
+class Tubes:
+    """Lines: paths [m], shape (lines, points, 3); colours in 0…1, shape (lines, 3); radius [m], one or (lines,)."""
+
+    paths: np.ndarray
+    colours: np.ndarray
+    radius: float | np.ndarray
+
+
+@dataclass(frozen=True)
+class Balls:
+    """Markers: centres [m], shape (balls, 3); one colour in 0…1; radius [m]."""
+
+    centres: np.ndarray
+    colour: tuple
+    radius: float
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A body: points [m], shape (points, 3); triangles, shape (triangles, 3); one colour in 0…1."""
+
+    points: np.ndarray
+    triangles: np.ndarray
+    colour: tuple
