@@ -116,10 +116,23 @@ def test_what_is_damped_comes_to_rest_where_statics_has_it(method, rest):
 
 
 def test_a_pendulum_is_not_at_rest_where_it_turns_back():
-    """Without damping: its kinetic energy is 0 twice in a period, and the event does not happen."""
-    event = [{"name": "still", "kind": "rest", "stop": True}]
-    solution = refweb.run(hanging({"kind": "dynamic", "duration": 4.0}, event=event, accuracy={"error": "none"}))
+    """Its kinetic energy is below a share for a while twice in a period, and not for as long as is asked for."""
+    still = {"name": "still", "kind": "rest", "share": 0.05, "during": 0.3, "stop": True}  # for 2 √0.05/ω = 0.14 s
+    swing = {
+        "web": {"kind": "inline", "points": [[0, 0, 0], [0.6, 0, -0.8]], "lines": [[0, 1]], "supports": [0]},
+        "cable": {"law": "linear", "modulus": 1e8, "area": 1e-4, "density": 0.0},
+        "gravity": {"acceleration": [0.0, 0.0, -G]},
+        "point_mass": [{"node": 1, "mass": 1.0}],
+        "event": [still],
+        "solve": {"kind": "dynamic", "duration": 3.0},
+        "accuracy": {"error": "none"},
+    }
+    solution = refweb.run(refweb.Scene.from_dict(swing))
+    kinetic = solution.history["kinetic_energy"]
+    assert (np.diff(kinetic < 0.05 * kinetic.max()) != 0).sum() >= 3
     assert solution.events[0]["time"] is None
+    shorter = refweb.Scene.from_dict({**swing, "event": [{**still, "during": 0.05}]})
+    assert refweb.run(shorter).events[0]["time"] < 2.0
 
 
 REFUSED = [
