@@ -23,6 +23,7 @@ CODES = {
     "law-floor": "The smooth law lets slack lines push.",
     "left-out": "Effects that natural frequencies leave out.",
     "lines-in-doubt": "Lines may have passed through lines.",
+    "loose-bodies": "Bodies that the equilibrium leaves free to move or turn.",
     "loose-nodes": "Positions that the equilibrium leaves open.",
     "lowest-in-doubt": "Other equilibria may be lower.",
     "material": "Values of the cable that its material gives, which are typical ones.",

@@ -142,8 +142,9 @@ class Dynamic(Table):
     factorization : {"auto", "qdldl", "superlu", "rslab"}
         Of CVODE, IDA and a start at an equilibrium: library that factorizes the tangent, as of `Static`.
     start : {"web", "equilibrium"} or path
-        State at t = 0: the web as it is, its equilibrium under what acts at t = 0 (free bodies do not), or the last
-        state in a result folder.
+        State at t = 0: the web as it is, its equilibrium under what acts at t = 0, or the last state in a result
+        folder. A free body takes part in the equilibrium where it has no velocity, and carries nodes or touches a line
+        where its table has it; others are held there meanwhile and feel nothing.
 
     Raises
     ------
@@ -202,9 +203,10 @@ class Event(Table):
     ----------
     name : str
         Its name.
-    kind : {"contact", "taut", "threshold"}
+    kind : {"contact", "taut", "threshold", "rest"}
         A body first touches the web, or another body; a line that is slack snaps taut, of several slack ones the
-        first; an observable passes a value, either way: one that comes back within the same step may not be seen.
+        first; an observable passes a value, either way: one that comes back within the same step may not be seen; the
+        scene has come to rest.
     body : str, optional
         Body of a contact, by default any.
     with : str, optional
@@ -216,6 +218,11 @@ class Event(Table):
         Name of the observable of a threshold.
     value : float, optional
         Its threshold, in the observable's unit.
+    share : float, optional
+        Share of the largest kinetic energy so far below which the scene is at rest, 1e-6 by default.
+    during : float, optional
+        How long the energy is to stay there [s], by default a hundredth of the duration: a pendulum is not at rest
+        where it turns back. The time of the event is the end of that.
     stop : bool
         Whether the run ends there.
 
@@ -237,19 +244,21 @@ class Event(Table):
     """
 
     name: str = text(limit=80)
-    kind: str = choice("contact", "taut", "threshold")
+    kind: str = choice("contact", "taut", "threshold", "rest")
     body: str | None = text(default=None)
     with_: str | None = text(default=None)
     line: Several = nodes(default=None, what="line")
     observe: str | None = text(default=None)
     value: float | None = real(default=None)
+    share: float | None = real(default=None, above=0, below=1)
+    during: float | None = real(default=None, above=0, unit="s")
     stop: bool = boolean(default=False)
 
     def check(self):
         """Refuse keys of another kind, and what a kind lacks."""
-        needs = {"contact": (), "taut": ("line",), "threshold": ("observe", "value")}[self.kind]
-        may = ("body", "with") if self.kind == "contact" else needs
-        for key in ("body", "with", "line", "observe", "value"):
+        needs = {"taut": ("line",), "threshold": ("observe", "value")}.get(self.kind, ())
+        may = {"contact": ("body", "with"), "rest": ("share", "during")}.get(self.kind, needs)
+        for key in ("body", "with", "line", "observe", "value", "share", "during"):
             value = self.with_ if key == "with" else getattr(self, key)
             if value is None and key in needs:
                 raise InputError(f'{key} is missing: kind = "{self.kind}" needs {key} = ...')

@@ -70,7 +70,7 @@ EXAMPLES = {
         dict(node=4, line=5, force=-3.0),
         dict(node=0, line=0, force=2.0, factor=[(0.0, 0.0), (1.0, 2.0), (3.0, -1.0)]),
     ],
-    "Damping": [dict(time=0.02), dict(rate=3.0)],
+    "Damping": [dict(time=0.02), dict(rate=3.0), dict(rate=1.0, bodies=2.0)],
     "Bending": [dict(stiffness=2.0), dict(stiffness=2.0, clamp=[1, 4])],
     "Attach": [dict(body="wall", node=[1, 3]), dict(body="wall", node=2, point=(0.1, 0.2, -0.3))],
     "Link": [dict(nodes=[0, 4]), dict(nodes=[5, 4, 2, 3])],
@@ -119,7 +119,8 @@ def make(name, i, law, tensionless=False):
     web = replace(web, natural_length=None) if tensionless else web
     pieces = 3 if name == "Bending" else 1  # no line of it continues another
     net = discretisation.build(web, replace(nets.skew_cable(law), subdivide=pieces))
-    bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if name in ("Contact", "Attach") else []
+    touched = name in ("Contact", "Attach", "Damping")
+    bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if touched else []
     system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
     return system.net, system
 

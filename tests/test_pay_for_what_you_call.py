@@ -79,8 +79,11 @@ def roots(given, method):
         yield "net.csv_files"
     if "fold" in given or "positions" in given["web"]:
         yield "effects.fold"
+    free = [body for body in bodies if not body.get("fixed")]
     if "attach" in given:
         yield "system.attached_nodes"
+    if static and any("attach" in given or body.get("shape", "sphere") != "sphere" for body in free):
+        yield "system.resting_bodies"
     if "throw" in given:
         yield "results.throw"
     if any(shape in ("cylinder", "box") and not body.get("fixed") for shape, body in zip(shapes, bodies, strict=True)):
@@ -104,11 +107,11 @@ def roots(given, method):
         yield "statics.load_steps"
     if spun:
         yield "statics.critical_speed"
-    elif law == "tension-only":
+    elif law == "tension-only" and not (static and free):
         yield "statics.duality_bound"
     if law == "linear":  # bars, which may snap through
         yield "statics.snap_through"
-    if law != "tension-only" or follower or spun or contact is not None:
+    if law != "tension-only" or follower or spun or contact is not None or static and free:
         yield "statics.stability"  # the energy is not convex
     if follower:
         yield "statics.residual_search"
@@ -175,6 +178,15 @@ SCENES["by cvode"] = brief("square-impact", method="cvode")
 SCENES["by ida"] = brief("square-impact", method="ida")
 SCENES["by relaxation"] = brief("catenary", method="relaxation")
 SCENES["by relaxation"]["cable"] |= {"law": "linear"}
+SCENES["a platform"] = {
+    "web": {"kind": "inline", "points": [[-1, 0, 2], [1, 0, 2], [-1, 0, 0], [1, 0, 0]], "lines": [[0, 2], [1, 3]]},
+    "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-4, "density": 1000.0},
+    "gravity": {"acceleration": [0.0, 0.0, -9.81]},
+    "body": [{"name": "beam", "shape": "box", "size": [2.0, 0.2, 0.2], "mass": 100.0, "position": [0.0, 0.0, 0.0]}],
+    "attach": [{"body": "beam", "node": [2, 3]}],
+    "supports": {"nodes": [0, 1]},
+    "solve": {"kind": "static"},
+}
 
 
 ALIKE = (

@@ -91,7 +91,11 @@ def _tells_strain(system, scale):
     return bool(np.allclose(numbers, numbers[0], rtol=1e-12, atol=0.0))
 
 
-def _event_of(event, system):
+AT_REST, REST_SHARE = 1e-6, 0.01
+"""Share of the largest kinetic energy at which a scene is at rest, and how long it is to stay so, over the duration."""
+
+
+def _event_of(event, system, duration):
     """(probe, event) of an event of a scene, the probe None where it is an observable's; its slot is not known yet."""
     if event.kind == "contact":
         from ..results.observables.overlap import probe_of_touch
@@ -102,6 +106,9 @@ def _event_of(event, system):
     if event.kind == "taut":
         probe = Observe(name="_", quantity="strain", line=event.line).probe(system)
         return probe, Event(-1, float(system.net.slackness[probe.rows[1]]), True, event.stop)
+    if event.kind == "rest":
+        during = REST_SHARE * duration if event.during is None else event.during
+        return None, Event(-1, AT_REST if event.share is None else event.share, stop=event.stop, during=during)
     return None, Event(-1, event.value, False, event.stop)
 
 
@@ -137,7 +144,7 @@ class Watch:
         self._warned = _probes_of_warnings(system, self.probes, scene.solve.step_size)
         self.probes += self._warned.values()
         self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
-        self.events = self._add_events(scene.event)
+        self.events = self._add_events(scene.event, scene.solve.duration)
         used = self._of_warning("utilisation")
         if system.weakness is not None and used is not None:
             self.events.append(Event(used, 1.0, True, stop=True))
@@ -151,15 +158,18 @@ class Watch:
         self._booked = [i for i, column in enumerate(self.columns) if column in balance]
         self._signs = np.array([balance[self.columns[i]] for i in self._booked])
 
-    def _add_events(self, events):
+    def _add_events(self, events, duration):
         """The scene's events as `Event`; probes of those that no observable tells come behind the others."""
         slots = {o.name: i for i, o in enumerate(self._probed)}
-        made = [_event_of(event, self.system) for event in events]
+        made = [_event_of(event, self.system, duration) for event in events]
         for event, (probe, _) in zip(events, made, strict=True):
             if probe is not None:
                 slots[event] = len(self.probes)
                 self.probes.append(probe)
         slots |= {o.name: len(self.probes) + i for i, o in enumerate(self._followed)}
+        if any(event.kind == "rest" for event in events):
+            slots[None] = len(self.probes) + len(self.sums)
+            self.sums.append(Sum(weights(self.system, "kinetic_energy")))
         return [
             event_row._replace(slot=slots[event.observe if probe is None else event])
             for event, (probe, event_row) in zip(events, made, strict=True)

@@ -175,6 +175,7 @@ class Simulation:
     def _settle(self, tell):
         """Begin at the equilibrium."""
         from ..statics.remarks import on_stability, remark_on_open
+        from ..system.static_system import waiting
 
         equilibrium_ = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
         self.begin, state = Start(equilibrium_.x), State(self.system, 0.0, equilibrium_.x)
@@ -183,7 +184,7 @@ class Simulation:
             self.solution.findings.append(finding._replace(text=text))
         self.solution.findings += on_stability(state, equilibrium_, "the equilibrium it starts from")
         self.solution.findings += remarks_on(self.begin, self.system)
-        if self.overlaps is not None and any(body.fixed for body in self.system.net.bodies):
+        if self.overlaps is not None and len(waiting(self.system)) < len(self.system.net.bodies):
             from ..statics.body_penetration import Passage
 
             passage = Passage(self.scene, self.system)

@@ -91,6 +91,10 @@ class Body(Table):
     is a rigid circle that touches the web as the disc inside it would, at any distance from its plane: how deep a point
     is in it is measured at right angles to its normal. It is meant for webs that move in its plane.
 
+    In statics a free body rests where forces and moments on it balance, if it touches the web, or carries nodes by
+    ``[[attach]]``. Newton's method goes downhill from where its table has it, so that a ball begins in the net, or next
+    to it. What turns it at no cost, as a beam on two ropes about its own line, is told. Balls and rings do not turn.
+
     Parameters
     ----------
     name : str
@@ -156,7 +160,7 @@ class Body(Table):
         above half the smallest size, an inertia that no body has (not symmetric, not positive definite, or one
         principal moment above the sum of the others), and a name that is no file name; for a free body without mass, a
         fixed one that moves, and a ring that turns about another axis than its normal; from ``extend``, for a name that
-        is listed twice, and a free body in statics.
+        is listed twice, and a velocity in statics.
 
     Examples
     --------
@@ -267,8 +271,9 @@ class Body(Table):
         """The net with one more row."""
         if any(body.name == self.name for body in net.bodies):
             raise InputError(f'name = "{self.name}" is listed twice: names of bodies are unique')
-        if not self.fixed and net.quasi_static:
-            raise InputError("fixed = false: a free body cannot be used in statics; fixed = true holds it")
+        for key in ("velocity", "angular_velocity"):
+            if net.quasi_static and any(getattr(self, key)):
+                raise InputError(f"{key} = {list(getattr(self, key))} has no meaning in statics: leave it out")
         self.form.settle()
         mass = self.mass or (self.density * self.form.volume() if self.density else 0.0)
         body = RigidBody(

@@ -1,4 +1,4 @@
-"""Damping of the lines: Kelvin–Voigt on the tangent of their law, and a drag in proportion to mass.
+"""Damping of the lines: Kelvin–Voigt on the tangent of their law, and a drag in proportion to mass; and that of bodies.
 
 A line that is strained at the rate ε̇ = t·v'/L, v' = dv/dξ, has the stress
 
@@ -173,7 +173,7 @@ def drag_bound(reach, speed, x, mass, rates, cells, data):
 
 @table
 class Damping(Table):
-    """Damping of the web; bodies are not damped, and statics does not feel it.
+    """Damping of the web and of free bodies; statics does not feel it.
 
     Parameters
     ----------
@@ -183,12 +183,15 @@ class Damping(Table):
         −(l/L²) dL/dt, which a material that stays in the line has as a rate of strain as well, is left out.
     rate : float
         Rate at which velocities fade [1/s], ≥ 0: a force −rate m v on every node, m its lumped mass, with consistent
-        mass as well.
+        mass as well. Bodies are not damped by it.
+    bodies : float
+        Rate at which the momentum of every free body and its angular momentum about its centre fade [1/s], ≥ 0: a force
+        −bodies m v and a moment −bodies L. Nodes that a body carries fade with it.
 
     Raises
     ------
     InputError
-        For a time or a rate that is not finite or < 0, and where both are 0.
+        For a time or a rate that is not finite or < 0, where all are 0, and for ``bodies`` where none is free.
 
     References
     ----------
@@ -201,23 +204,29 @@ class Damping(Table):
         [damping]
         time = 1e-5
         rate = 0.1
+        bodies = 0.5
     """
 
     time: float = real(default=0.0, at_least=0, unit="s")
     rate: float = real(default=0.0, at_least=0, unit="1/s")
+    bodies: float = real(default=0.0, at_least=0, unit="1/s")
 
     def check(self):
         """Refuse a damping that damps nothing."""
-        if not (self.time or self.rate):
-            raise InputError("time = 0 [s] and rate = 0 [1/s]: one of them must be > 0, or leave the table out")
+        if not (self.time or self.rate or self.bodies):
+            raise InputError(
+                "time = 0 [s], rate = 0 [1/s] and bodies = 0 [1/s]: one of them must be > 0, or leave the table out"
+            )
 
     def extend(self, net):
         """The net with τ in one more column of the numbers of its lines."""
         return net.with_column("damping_time", self.time) if self.time else net
 
     def on(self, net):
-        """The terms of all lines, whose tension is that with damping, and of all nodes with mass."""
-        terms = []
+        """The terms of all lines, whose tension is that with damping, of all nodes with mass, and of free bodies."""
+        terms, free = [], [body.row for body in net.bodies if not body.fixed]
+        if self.bodies and not free:
+            raise InputError(f"bodies = {self.bodies:g} [1/s]: the scene has no free [[body]], leave it out")
         if self.time:
             element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
             force, stiffness, damping, bound = kernels(net.law_number, net.line_data.column("damping_time"), *element)
@@ -233,17 +242,23 @@ class Damping(Table):
                     timing=Timing(at_rest=False),
                 )
             )
-        if self.rate:
-            nodes = net.heavy[net.heavy < net.nodes]
+        if self.rate or self.bodies:
+            nodes = net.heavy[net.heavy < net.nodes] if self.rate else np.zeros(0, dtype=int)
+            rows = np.concatenate([nodes, free if self.bodies else []]).astype(int)
+            rates = np.repeat([self.rate, self.bodies], [len(nodes), len(rows) - len(nodes)])
             terms.append(
                 ForceTerm(
                     name="damping",
-                    cells=column(nodes),
-                    data=self.rate * net.mass[nodes, None],
+                    cells=column(rows),
+                    data=(rates * net.mass[rows])[:, None],
                     force=drag,
                     velocity=VelocityForce(drag_damping, drag_bound),
                     balance=Balance("dissipated_energy", 0, impulse=drag_impulse),
                     timing=Timing(at_rest=False),
                 )
             )
+        if self.bodies and net.spins:
+            from .body_damping import rotation_terms
+
+            terms += rotation_terms(net, self.bodies, drag, drag_damping, drag_bound)
         return terms

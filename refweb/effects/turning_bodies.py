@@ -177,12 +177,13 @@ def force_terms(net, speed, pull, arguments):
     head = np.tile([*np.ravel(pull), *speed], (len(cells), 1))
     parts = head, *(np.reshape(part, (len(cells), 9)) for part in (spreads, turns.mobility)), np.array(largest)
     data = np.ascontiguousarray(np.column_stack(parts))
-    shared: dict = dict(cells=cells, data=data, timing=Timing(at_rest=False), **arguments)
+    shared: dict = dict(cells=cells, data=data, **arguments)
     still = ForceTerm(force=force, energy=energy, tangent=Tangent(stiffness, bound, symmetric=False), **shared)
     moving = ForceTerm(
         force=coriolis,
         tangent=Tangent(coriolis_stiffness, symmetric=False),
         velocity=VelocityForce(damping, damping_bound),
+        timing=Timing(at_rest=False),
         **shared,
     )
     return [still, moving]

@@ -342,6 +342,29 @@ def turns_within(
 
 
 @kernel(leaf=True)
+def turn_by(x, y, v, turns):
+    """Turn bodies from where x has them by the rotation vectors y − x of their rows of rotation [rad], written to y.
+
+    What they carry goes with them: its places are written to y, its velocities by ``v`` of the bodies.
+    """
+    for n in range(turns.moment.size):
+        s, t = turns.rows[n, 1], turns.rows[n, 2]
+        a, b, c = y[s, 0] - x[s, 0], y[s, 1] - x[s, 1], y[s, 2] - x[s, 2]
+        half = 0.5 * math.sqrt(a * a + b * b + c * c)
+        share = 0.5 * math.sin(half) / half if half > 0.0 else 0.5
+        e, f, g, h = math.cos(half), share * a, share * b, share * c
+        w, p, q, r = 1.0 + x[t, 0], x[s, 0], x[s, 1], x[s, 2]
+        first = e * w - f * p - g * q - h * r
+        second = e * p + f * w + g * r - h * q
+        third = e * q + g * w + h * p - f * r
+        last = e * r + h * w + f * q - g * p
+        size = 1.0 / math.sqrt(first * first + second * second + third * third + last * last)
+        y[t, 0] = first * size - 1.0
+        y[s, 0], y[s, 1], y[s, 2] = second * size, third * size, last * size
+    update_attached_nodes(y, v, turns)
+
+
+@kernel(leaf=True)
 def update_attached_nodes(x, v, turns):
     """Write places and velocities of the nodes that bodies carry, where they carry any."""
     if turns.carried.shape[0]:

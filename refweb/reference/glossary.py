@@ -127,7 +127,7 @@ GLOSSARY = {
         "monitor": "Object that inspects each step: extremes, events, averages, balances.",
         "probe": "Compiled function of a state whose extremes are followed.",
         "extreme": "Largest or smallest value over all steps and between them.",
-        "event": "Time of a first contact, of a line becoming taut, or of a threshold.",
+        "event": "Time of a first contact, of a line becoming taut, of a threshold, or of rest.",
         "energy balance": "Energies plus losses minus work; a run that does not close it is not returned.",
         "energy drift": "Error of the energy balance over the largest energy.",
         "momentum balance": "Momentum minus impulses of loads and supports.",

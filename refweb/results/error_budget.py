@@ -90,9 +90,10 @@ def reasons_of(scene, system, solution):
 
 def rubs(effect):
     """Tell if an effect is contact with friction, whose force is smooth in the velocity of slip."""
-    friction = getattr(effect, "friction", None)
-    others = (getattr(body, "friction", None) for body in getattr(effect, "bodies", {}).values())
-    return hasattr(effect, "slip_velocity") and any((friction or 0.0, *(value or 0.0 for value in others)))
+    if not hasattr(effect, "slip_velocity"):
+        return False
+    others = (body.friction for body in getattr(effect, "bodies", {}).values())
+    return any((effect.friction, *(value or 0.0 for value in others)))
 
 
 def with_parts(result, static, reasons, further):

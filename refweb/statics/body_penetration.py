@@ -13,6 +13,7 @@ import numpy as np
 from ..effects.contact.overlap import CORE, Overlaps
 from ..errors import SolverError
 from ..results.state import State
+from ..system.static_system import waiting
 
 PARTS = 8
 """Number of looks at a way as long as a body is thick."""
@@ -40,6 +41,7 @@ class Passage:
 
     def __init__(self, scene, system, x=None):
         self._system, self.overlaps = system, Overlaps(scene.settled(), system, moving=False)
+        self._waiting = [body.row for body in waiting(system)]
         self._x = np.zeros((system.rows, 3)) if x is None else x
 
     def record(self, state):
@@ -52,7 +54,7 @@ class Passage:
         """
         net = self._system.net
         for i, body in enumerate(net.bodies):
-            if body.fixed:
+            if body.row not in self._waiting:
                 deep = state.overlap(body)
                 at = int(deep.argmax())
                 self.overlaps.record(i, float(deep[at]), state.time, int(net.line[at]))
@@ -62,7 +64,8 @@ class Passage:
     def _looks(self, body, path):
         """Shares of a way (rows, 3) at which lines may be deepest: about where its nodes are nearest to a body."""
         net = self._system.net
-        begin, shift = net.points[: net.nodes] + self._x[: net.nodes] - net.points[body.row], path[: net.nodes]
+        position, shift = net.points + self._x, path[: net.nodes] - path[body.row]
+        begin = position[: net.nodes] - position[body.row]
         length = np.linalg.norm(shift, axis=1)
         moved = np.flatnonzero(PARTS * length > body.thickness)
         begin, shift, length = begin[moved], shift[moved], length[moved]

@@ -25,6 +25,9 @@ from ..system.factorization import Factor
 ANCHOR = 1e-10
 """Stiffness that holds each node of an unsupported part against its translation, over the largest EA/L."""
 
+HELD = 1e9
+"""Factor on the stiffness of the rotation of bodies, which are held."""
+
 
 def drifting(system):
     """Number of translations of unsupported parts that centrifugal forces drive away from the axis."""
@@ -47,7 +50,9 @@ def check_speed(system, t):
     net, factor = system.at(t).net, Factor(system.pattern)
     taken, allowed = _centrifugal(system), drifting(system)
     axial = net.line_data.ea / net.natural_length
-    tension_stiffness = system.assemble_lines(net.unit_tension * axial[:, None, None])
+    tension_stiffness = system.at(t).across_lines(net.line_data.ea)
+    spins = system.pattern.diagonal[system.free // 3 >= system.rows - net.spins]  # no rotation stretches without limit
+    tension_stiffness[spins] *= HELD
     for part in system.unsupported_parts:
         tension_stiffness[system.pattern.diagonal[part.unknowns]] += ANCHOR * axial.max()
 

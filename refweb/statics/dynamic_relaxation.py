@@ -2,13 +2,21 @@
 
 Central differences with fictitious masses, chosen so that a step of 1 is at `SAFETY` of the bound of stability in every
 row, and kinetic damping: whenever the kinetic energy passes a peak, all velocities are set to zero.
+
+A free body that turns has a fictitious moment of inertia, the same about every axis, and turns by its velocity in a
+step, a rotation vector. A node that it carries at the arm a moves by δ + θ × a, of which the square is at most
+2 |δ|² + 2 |a|² |θ|²: so the bounds of rows there are twice those of the node, and twice those times |a|² with the
+moment of the force on it, |f| |a|.
 """
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from ..kernels import FORCE, INDICES, MATRIX, Arrays, Functions, kernel
+from ..net.rotation import RigidRotations, add_forces_to_bodies, turn_by
 from ..system.static_system import at_rest
 from .equilibrium import (
     LIMIT,
@@ -32,27 +40,41 @@ LOOK = 2000
 """Steps between two looks at the residual."""
 
 
-@kernel()
-def relax(count, t, x, v, f, inverse, kernels, cells, data, per_cell):
-    """``count`` steps of x, v and f."""
-    flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    before = 0.0
-    for _ in range(count):
-        kinetic = 0.0
-        for q in range(flat_x.size):
-            if flat_inverse[q] > 0.0:
-                flat_v[q] += flat_inverse[q] * flat_f[q]
-                kinetic += flat_v[q] * flat_v[q] / flat_inverse[q]
-        if kinetic < before:
-            for q in range(flat_x.size):  # a new start from rest: half a kick
-                flat_v[q] = 0.5 * flat_inverse[q] * flat_f[q]
+@functools.cache
+def relaxing(turning):
+    """Kernel of a number of steps of x, v and f; where bodies are ``turning``, of their rotations and nodes as well.
+
+    ``turns`` are their `refweb.net.rotation.RigidRotations`, ``start`` and ``speed`` room of the shape of x.
+    """
+
+    @kernel()
+    def relax(count, t, x, v, f, inverse, kernels, cells, data, per_cell, turns, start, speed):
+        flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
+        before = 0.0
+        for _ in range(count):
             kinetic = 0.0
-        before = kinetic
-        for q in range(flat_x.size):
-            flat_x[q] += flat_v[q]
-            flat_f[q] = 0.0
-        for i in range(len(kernels)):
-            kernels[i](t, x, v, f, cells[i], data[i], per_cell[i])
+            for q in range(flat_x.size):
+                if flat_inverse[q] > 0.0:
+                    flat_v[q] += flat_inverse[q] * flat_f[q]
+                    kinetic += flat_v[q] * flat_v[q] / flat_inverse[q]
+            if kinetic < before:
+                for q in range(flat_x.size):  # a new start from rest: half a kick
+                    flat_v[q] = 0.5 * flat_inverse[q] * flat_f[q]
+                kinetic = 0.0
+            before = kinetic
+            if turning:
+                start[:] = x
+            for q in range(flat_x.size):
+                flat_x[q] += flat_v[q]
+                flat_f[q] = 0.0
+            if turning:
+                turn_by(start, x, speed, turns)
+            for i in range(len(kernels)):
+                kernels[i](t, x, v, f, cells[i], data[i], per_cell[i])
+            if turning:
+                add_forces_to_bodies(x, f, turns)
+
+    return relax
 
 
 def solve(system, load_steps, progress=None, limit=10_000_000, tolerance=TOLERANCE):
@@ -106,6 +128,7 @@ class Relaxation:
         self._kernels = Functions(FORCE, [f.force for f in system.terms])
         self._cells = Arrays(INDICES, [f.cells for f in system.terms])
         self._per_cell = Arrays(MATRIX, system.per_cell())
+        self._relax, self._turns = relaxing(system.angles), RigidRotations.of(system.net)
 
     def solve(self, t, x):
         """Equilibrium at load step t from the displacement x, see `refweb.statics.newton.Newton.solve`."""
@@ -115,6 +138,7 @@ class Relaxation:
         system.drive(t, x)
         inverse, data = self._inverse_mass(t), Arrays(MATRIX, [system.data_of(f, t) for f in system.terms])
         v, done, error, best, since = np.zeros_like(x), 0, np.inf, np.inf, 0
+        turning = self._turns, np.zeros_like(x), np.zeros_like(x)
         while True:
             f, per_cell = system.forces(t, x)
             scale = max(self.scale, force_scale(system, t, x, per_cell.tension))
@@ -130,7 +154,9 @@ class Relaxation:
                     {"nsteps": done},
                 )
                 raise where_nothing_touches(system, t, failed)
-            relax(LOOK, t, x, v, f, inverse, self._kernels, self._cells, data, self._per_cell)
+            if system.carried.any():
+                self._weigh_bodies(f, inverse)
+            self._relax(LOOK, t, x, v, f, inverse, self._kernels, self._cells, data, self._per_cell, *turning)
             done += LOOK
             self.progress(f"step {t:g}, residual {error:.0e}")
         self.scale = scale
@@ -153,5 +179,19 @@ class Relaxation:
         for term in system.terms:
             if term.tangent.bound is not None:
                 term.tangent.bound(np.inf, 0.0, x, np.ones(system.rows), rates, term.cells, system.data_of(term, t))
-        moving = ~system.supported & (rates > 0.0)[:, None]
+        self._rates = rates
+        return self._inverse(rates)
+
+    def _inverse(self, rates):
+        """Factor of the forces by bounds of the rows [N/m], shape (rows, 3)."""
+        moving = ~self.system.supported & (rates > 0.0)[:, None]
         return np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)
+
+    def _weigh_bodies(self, f, inverse):
+        """Write the factors of bodies that carry nodes, by forces f on these."""
+        rates, turns = self._rates.copy(), self._turns
+        for (node, n), arm in zip(turns.carried, np.linalg.norm(turns.arms, axis=1), strict=True):
+            row, spin, _ = turns.rows[n]
+            rates[row] += 2.0 * rates[node]
+            rates[spin] += 2.0 * rates[node] * arm**2 + 2.0 * float(np.linalg.norm(f[node])) * arm
+        inverse[:] = self._inverse(rates)

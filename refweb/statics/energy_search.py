@@ -47,12 +47,11 @@ class EnergySearch:
         shift : float
             The next τ [N]: less after a step that went as its model said, more after one that had to be cut.
         """
-        system, slope, energy, a = self._system, r @ p, self._energy, 1.0
-        y = x.copy()
-        flat, drowned = y.ravel(), 0.5 * slope < 1e-9 * abs(energy)
-        start = x.ravel()[system.free]
+        system, slope, energy = self._system, r @ p, self._energy
+        step, drowned = system.rows_of(p), 0.5 * slope < 1e-9 * abs(energy)
+        longest = a = system.largest_share(p)
         for _ in range(40):
-            flat[system.free] = start + a * p
+            y = system.moved(x, a * step)
             self._energy = system.energy(self._t, y)
             stats["nfev"] += 1
             if drowned:
@@ -65,7 +64,7 @@ class EnergySearch:
             if self._energy <= energy - 1e-4 * a * slope:
                 break
             a *= min(max(0.5 * a * slope / rise, 0.1), 0.5) if np.isfinite(rise) else 0.1
-        if a < 1.0:
+        if a < longest:
             return y, 2.0 * shift
-        good = drowned or energy - self._energy > 0.25 * 0.5 * slope
+        good = longest == 1.0 and (drowned or energy - self._energy > 0.25 * 0.5 * slope)
         return y, 0.1 * shift if good else shift

@@ -121,6 +121,12 @@ def carried_off(system, t, parts):
     for rows, axis, _ in parts:
         resultant = np.sum(outer[rows, axis])
         if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
+            if len(rows) == 1 and rows[0] >= system.net.nodes:
+                name = system.row_name(rows[0])
+                return (
+                    f"{name} is carried off along {'xyz'[axis]} by {resultant:.4g} N at step {t:g}, and nothing holds "
+                    "it: tie it to the web by [[attach]], let it touch the web, or fixed = true"
+                )
             first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
             return (
                 f"a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by {resultant:.4g} N "
@@ -148,11 +154,11 @@ def force_scale(system, t, x, tension):
     stiffness = system.net.axial / system.natural_length(t)
     rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()
     outer = [f for f in system.terms if not f.over_lines]
-    loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in outer]
+    loads = [system.sizes(system.force_of(f, t, x)).max() for f in outer]
     return max([*loads, np.abs(tension).max(initial=0.0), rounding / LIMIT])
 
 
 def residual(system, force, scale):
-    """Largest force on a free node over the scale [1]."""
+    """Largest force on a free node or body over the scale [1]."""
     free = np.where(system.supported, 0.0, force)
-    return np.linalg.norm(free, axis=1).max(initial=0.0) / scale if scale else 0.0
+    return system.sizes(free).max(initial=0.0) / scale if scale else 0.0

@@ -181,18 +181,22 @@ class NullSpace:
             p = self._factor.solve(force)
         return p
 
-    def floating(self, system):
-        """Parts that may move at no cost, a `Floating`; None where there are none."""
-        moves = np.zeros((SAMPLES, system.rows, 3))
+    def floating(self, system, x):
+        """Parts that may move at no cost about a displacement x, a `Floating`; None where there are none."""
+        moves, levers = np.zeros((SAMPLES, system.rows, 3)), system.levers[:, None]
         for move, p in zip(
             moves, np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, len(system.free))), strict=True
         ):
             change = self.part(p)
-            if change is not None and np.abs(change).max(initial=0.0) > OPEN:
-                move.ravel()[system.free] = change / np.abs(change).max()
+            if change is not None and (largest := np.abs(levers * system.rows_of(change)).max(initial=0.0)) > OPEN:
+                move.ravel()[system.free] = change / largest
         for part_held in system.unsupported_parts:  # which the tangent's anchors hold
             moves[:, part_held.rows, part_held.axis] += np.random.default_rng(1).uniform(0.5, 1.0, (SAMPLES, 1))
-        free = np.any(np.abs(moves) > OPEN, axis=0)
+        free = np.any(np.abs(levers * moves) > OPEN, axis=0)
         # What may move at no cost turns as well, where it goes on: its other components change to second order.
         free |= free.any(axis=1)[:, None] & ~system.supported
+        if system.carriers:
+            with_nodes = moves.copy()
+            system.carriers.add_moves(x, with_nodes)
+            free |= (np.abs(with_nodes) > OPEN).any(axis=0) & system.carried[:, None]
         return Floating(free, moves) if free.any() else None

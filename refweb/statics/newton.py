@@ -88,6 +88,8 @@ class Newton:
         Whether there are forces without a potential, or struts of form finding, whose potential has no minimum.
     turns : bool
         Whether centrifugal forces act; ``drifting`` is the number of negative pivots that they bring to an equilibrium.
+    grows : bool
+        Whether τ grows until the tangent is definite: where centrifugal forces act, and where bodies are free.
     anchors : ndarray of int
         Places of the pattern's diagonal that hold parts without support, whose loads balance.
     scale : float
@@ -97,12 +99,14 @@ class Newton:
     def __init__(self, system, progress=None, first=None):
         self.system, self._per_cell, self._blocks = system, system.per_cell(), system.blocks()
         self.progress = progress or (lambda text: None)
-        net = system.net if first is None else system.at(first).net
-        self.geometric = system.assemble_lines(net.unit_tension / net.natural_length[:, None, None])
+        first_system = system if first is None else system.at(first)
+        net = first_system.net
+        self.geometric = first_system.across_lines(np.ones(len(net.cells)))
         self.stiffest = (net.axial / net.natural_length).max()
         self.axial = net.axial.max()
         struts = (net.forming & (net.line_data.ea < 0.0)).any()
         self.follows, self.turns, self.drifting = bool(struts) or not system.conservative, bool(system.rotating), 0
+        self.grows = self.turns or bool(system.resting)
         self.factor = (Lu if self.follows else Factor)(system.pattern)
         if self.turns:
             from .critical_speed import drifting
@@ -219,15 +223,14 @@ class Newton:
 
         ``before`` is the `Ahead` that the step was made with, None where it was with those at x.
         """
-        bars, all_rows = Bars(net, x), np.zeros((self.system.rows, 3))
-        all_rows.ravel()[self.system.free] = p
+        bars, all_rows = Bars(net, x), self.system.rows_of(p)
         before = bars.tension if before is None else before.tension
         share = (y - x).ravel()[self.system.free] @ p / (p @ p)
         return Ahead(before + share * (bars.ahead(all_rows) - before), 0.0)
 
     def _step(self, t, iterate, r, shift, stats, ahead):
         """Newton step of the shifted tangent, and the shift that it took."""
-        compressed = bool((iterate.tension < 0.0).any()) and not (self.follows or self.turns)
+        compressed = bool((iterate.tension < 0.0).any()) and not (self.follows or self.grows)
         definite = False
         for _ in range(60):
             self._factorize(self._matrix(t, iterate.x, shift, definite, ahead), None if definite else shift)
@@ -253,7 +256,7 @@ class Newton:
 
     def _can_use_again(self, tension):
         """Tell if a tangent is at hand, and that of lines in tension, without follower or centrifugal forces."""
-        return self.factor.shift is not None and not (self.follows or self.turns or (tension < 0.0).any())
+        return self.factor.shift is not None and not (self.follows or self.grows or (tension < 0.0).any())
 
     def _by_factor_at_hand(self, values, b, tolerance):
         """Solutions y of the matrix of ``values``, shape (n,) or (n, k), as conjugate gradients find them."""
@@ -261,10 +264,10 @@ class Newton:
         return conjugate_gradients.solve(times, self.factor.precondition, b, tolerance, self.factor.solutions)
 
     def _descends(self, r, p):
-        """Tell if p is a step to take: one that exists, leads down, and, in a frame that turns, from no saddle."""
+        """Tell if p is a step to take: one that exists, leads down, and, with `grows`, by a definite tangent."""
         if p is None or self.follows:
             return p is not None
-        return r @ p > 0.0 and not (self.turns and self.factor.negative_pivots() > self.drifting)
+        return r @ p > 0.0 and not (self.grows and self.factor.negative_pivots() > self.drifting)
 
     def _polished(self, t, iterate, shift, error, scale, stats):
         """Take one more step with the factorization at hand, kept where it lowers the residual."""
@@ -277,15 +280,14 @@ class Newton:
             p = self.factor.solve(r)
         if p is None:
             return iterate
-        y = iterate.x.copy()
-        y.ravel()[self.system.free] += p
-        next_iterate = self._evaluated(t, y, stats)
+        next_iterate = self._evaluated(t, self.system.moved(iterate.x, self.system.rows_of(p)), stats)
         return next_iterate if residual(self.system, next_iterate.force, scale) < error else iterate
 
     def _not_found(self, t, iterate, error, limit, stats):
-        node = np.linalg.norm(np.where(self.system.supported, 0, iterate.force), axis=1).argmax()
+        row = self.system.sizes(np.where(self.system.supported, 0, iterate.force)).argmax()
+        at = self.system.row_name(row)
         return NotFound(
-            f"no equilibrium found at step {t:g} in {limit} factorizations: residual {error:.2e} at node {node}, limit "
+            f"no equilibrium found at step {t:g} in {limit} factorizations: residual {error:.2e} at {at}, limit "
             f"{LIMIT:g}; raise the load in smaller load_steps, use a larger smoothing, or "
             'method = "relaxation"',
             stats,
@@ -325,16 +327,12 @@ class Newton:
         if (state.stability is None or state.stability.loose) and len(system.free):
             null = NullSpace(self.factor, self._tiny * system.pattern.matrix(self.geometric))
             if state.duality_bound is None:
-                state.floating = null.floating(system)
+                state.floating = null.floating(system, state.x)
             if state.floating is not None:
                 solve = null.solve
         forces = self._disturbing(state)
-        deviations = np.zeros((len(forces), system.rows, 3))
-        for deviation, force in zip(deviations, forces, strict=True):
-            if (p := solve(force)) is None:
-                return None
-            deviation.ravel()[system.free] = p
-        return deviations
+        deviations = [solve(force) for force in forces]
+        return None if any(p is None for p in deviations) else np.array([system.rows_of(p) for p in deviations])
 
     def _deviations_by_factor_at_hand(self, state):
         """The same where nothing floats, as its duality bound proves; None where that does not say or takes long."""
@@ -355,5 +353,11 @@ class Newton:
         moved = np.linalg.norm(state.x, axis=1)[net.cells].max(axis=1)
         size = np.zeros(system.rows)
         np.add.at(size, net.cells, np.finfo(float).eps * (np.abs(state.tension) + stiffness * moved)[:, None])
-        signs = np.random.default_rng(0).choice((-1.0, 1.0), (3, len(system.free)))
-        return [state.force.ravel()[system.free], *(signs * np.repeat(size, 3)[system.free])]
+        forces = np.zeros((3, system.rows, 3))
+        forces.reshape(3, -1)[:, system.free] = np.random.default_rng(0).choice((-1.0, 1.0), (3, len(system.free)))
+        forces *= size[:, None]
+        for force in forces if system.carriers else ():
+            signs = np.random.default_rng(1).choice((-1.0, 1.0), (np.count_nonzero(system.carried), 3))
+            force[system.carried] = signs * size[system.carried, None]
+            system.carriers.add_forces_to_bodies(state.x, force)
+        return [force.ravel()[system.free] for force in (state.force, *forces)]

@@ -43,8 +43,15 @@ def open_rows(state, equilibrium):
 
 
 def remark_on_open(state, equilibrium):
-    """Find positions that an equilibrium leaves open: one finding or none."""
-    open_ = open_rows(state, equilibrium)
+    """Find positions that an equilibrium leaves open, of bodies and of nodes."""
+    net, open_ = state.system.net, open_rows(state, equilibrium)
+    loose = []
+    for body in net.bodies:
+        if moves := [move for row, move in ((body.row, "move"), (body.spin, "turn")) if row in open_]:
+            loose.append(f'body "{body.name}" can {" and ".join(moves)} at no cost')
+    if loose:
+        yield Finding("loose-bodies", f"{'; '.join(loose)}: place and orientation are not unique there", "body")
+    open_ = open_[open_ < net.nodes]
     if not len(open_):
         return
     some = ", ".join(map(str, open_[:4])) + (", ..." if len(open_) > 4 else "")
@@ -123,9 +130,13 @@ def remarks_on(state, stats, utilisation, equilibrium):
 
 
 def _not_proven(state):
-    """A finding where one line keeps the errors of dead loads from being proven."""
+    """A finding where one line, or a free body, keeps the errors of dead loads from being proven."""
     net = state.system.net
     proven = (net.laws == TENSION_ONLY) | ((net.laws == FORCE_DENSITY) & (net.line_data.ea > 0.0))
+    if state.system.resting and proven.all():
+        name = state.system.resting[0].name
+        text = f'body "{name}" is free: ± are estimates, as the proven bound asks for a web without free bodies'
+        yield Finding("not-proven", text, "body")
     if not state.system.dead or proven.all() or not (proven.any() or net.forming.any()):
         return
     first = proven.argmin()

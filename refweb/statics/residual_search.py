@@ -32,10 +32,10 @@ class ResidualSearch:
 
     def along(self, p, x, r, shift, stats):
         """Search as `EnergySearch.along`, for the first a = 1, 1/2, ... that makes the next step shorter."""
-        system, a, size = self._system, 1.0, np.linalg.norm(p)
-        start, y = x.ravel()[system.free], x.copy()
+        system, size, step = self._system, np.linalg.norm(p), self._system.rows_of(p)
+        a = system.largest_share(p)
         for _ in range(40):
-            y.ravel()[system.free] = start + a * p
+            y = system.moved(x, a * step)
             ahead = self._factor.solve(system.force(self._t, y).ravel()[system.free])
             stats["nfev"] += 1
             length, along = np.linalg.norm(ahead), ahead @ p

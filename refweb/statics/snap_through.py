@@ -30,9 +30,9 @@ def may_turn_over(rest, equilibrium):
     """
     net = rest.at(equilibrium.step).net
     bars = net.laws == LINEAR
-    if (bars & (equilibrium.tension < 0.0)).any() or rest.unsupported_parts:
+    if (bars & (equilibrium.tension < 0.0)).any() or rest.unsupported_parts or rest.resting:
         return True
-    values = rest.assemble_lines(net.unit_tension / net.natural_length[:, None, None])
+    values = rest.at(equilibrium.step).across_lines(np.ones(len(net.cells)))
     factor = Factor(rest.pattern)
     factor.update(values)
     x = equilibrium.x.copy()

@@ -159,7 +159,7 @@ class Question:
         """Values of what stiffness counts as none."""
         rest, net = self.rest, self.rest.at(self.t).net
         axial = net.axial / net.natural_length
-        ridge = TINY * rest.assemble_lines(net.unit_tension * axial[:, None, None])
+        ridge = TINY * rest.at(self.t).across_lines(net.axial)
         for part in rest.unsupported_parts:  # which no pivot is to be 0 for
             ridge[rest.pattern.diagonal[part.unknowns]] += HELD * axial.max()
         return ridge
@@ -177,7 +177,7 @@ class Question:
 
     def _massive(self):
         """Mask of the unknowns with mass, shape (n,)."""
-        return self.rest.mass.values[self.rest.pattern.diagonal] > 0.0
+        return self.rest.mass_at(self.x)[self.rest.pattern.diagonal] > 0.0
 
     def _velocity(self):
         """C of the unknowns, a sparse matrix; None where no force depends on velocity."""
@@ -185,7 +185,8 @@ class Question:
         if values is None or not values.any():
             return None
         of = np.searchsorted(self.system.free, self.rest.free)
-        return self.system.pattern.matrix(values)[of][:, of].tocsc()
+        C = self.system.pattern.matrix(values)[of][:, of].tocsc()
+        return C @ self.rest.carriers.momenta(self.rest, self.x) if self.rest.angles else C
 
     def _reduced(self):
         """K and C of the unknowns with mass, over the roots of that, dense; and whether those without are held."""
@@ -202,7 +203,7 @@ class Question:
                 stands = not _negative(*_eigenvalues(inner)).any()
             except np.linalg.LinAlgError:
                 stands = False
-        M = self.rest.pattern.matrix(self.rest.mass.values)[heavy][:, heavy].toarray()
+        M = self.rest.pattern.matrix(self.rest.mass_at(self.x))[heavy][:, heavy].toarray()
         root = scipy.linalg.cholesky(M, lower=True)
 
         def scaled(matrix):
@@ -242,7 +243,7 @@ class Question:
 
     def _of_many(self, solver):
         """The same of more unknowns than have all their s found."""
-        M, C = self.rest.pattern.matrix(self.rest.mass.values), self._velocity()
+        M, C = self.rest.pattern.matrix(self.rest.mass_at(self.x)), self._velocity()
         if not self._massive().any() and self.definite >= 0:
             return by_pivot(self.definite)
         if C is not None and self.definite == 1 and self._damps(C, M):
@@ -282,7 +283,7 @@ class Question:
             return None
         with contextlib.suppress(ArpackError):
             if self._massive().any():
-                return slowest(solver, self.rest.pattern.matrix(self.rest.mass.values), C)
+                return slowest(solver, self.rest.pattern.matrix(self.rest.mass_at(self.x)), C)
             return slowest(solver, eye_array(len(self.rest.free), format="csr"))
         return None
 

@@ -8,6 +8,7 @@ from ..findings import Finding
 from ..net.tension_laws import LINEAR
 from ..results.state import floor_remark
 from ..statics.remarks import remark_on_open
+from ..system.static_system import waiting
 from .pencil import STRAIN
 
 
@@ -33,7 +34,9 @@ def remarks_on(computed, state, equilibrium):
 
 def left_out(system):
     """Effects that the modes of a system leave out."""
-    if any(term.velocity.damping is not None and term not in system.rotating for term in system.terms):
+    frames = [term.name for term in system.rotating]
+    if any(term.velocity.damping is not None and term.name not in frames for term in system.terms):
         yield Finding("left-out", "forces that depend on velocity, such as damping, are left out")
-    if free := [body.name for body in system.net.bodies if not body.fixed]:
-        yield Finding("left-out", f"free bodies wait, and the web does not feel them: {', '.join(free)}", "body")
+    if names := [body.name for body in waiting(system)]:
+        which = "bodies that move at the start or touch nothing are held, and the web does not feel them"
+        yield Finding("left-out", f"{which}: {', '.join(names)}", "body")

@@ -97,7 +97,7 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
     """The lowest natural frequencies and mode shapes about an equilibrium, without damping.
 
     Of a static scene the equilibrium is that of each load step; of a dynamic one that at t = 0 under gravity, loads,
-    motion and fixed bodies, while free bodies wait.
+    motion and bodies, see `refweb.system.static_system.waiting`.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def _at_rest(system):
     if rest.constraints:
         raise InputError("[[link]]: modes cannot hold lengths exactly: make it a stiff line")
     for term in rest.terms:
-        if term.tangent.stiffness is not None and not term.tangent.symmetric:
+        if term.tangent.stiffness is not None and not rest.is_symmetric(term):
             raise InputError(f"{term.name} has no potential, so there are no natural modes: leave it out")
     if not len(rest.free):
         raise InputError("no node is free, so there are no modes: support fewer of them")

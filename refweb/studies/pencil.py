@@ -55,7 +55,7 @@ class Pencil:
     def __init__(self, system, t, x, seed):
         self.system, self.t, self.x, self.seed = system, t, x, seed
         pattern, net = system.pattern, system.net
-        self._stiffness, self._mass = system.stiffness(t, x), system.mass.values
+        self._stiffness, self._mass = system.stiffness(t, x), system.mass_at(x)
         self.K, self.M = pattern.matrix(self._stiffness), pattern.matrix(self._mass)
         self._factor = Factor(pattern)
         self._inner: Any = None  # LU of the stiffness of what has no mass, where there is any
@@ -64,7 +64,7 @@ class Pencil:
         if not len(self.massive):
             raise SolverError("no mode: no free node has mass; give the cable a density, or nodes a [[point_mass]]")
         axial = net.line_data.ea / system.natural_length(t)
-        strained = system.assemble_lines(net.unit_tension * axial[:, None, None])
+        strained = system.at(t).across_lines(net.line_data.ea)
         self.strained = pattern.matrix(strained)
         taut = strained[pattern.diagonal]
         taut = np.where(taut > 0.0, taut, axial.max())

@@ -37,17 +37,19 @@ class Spectrum:
     residual : ndarray, shape (modes,)
         ‖Kφ − ω²Mφ‖ over |ω²| ‖φ‖, in the norms of M⁻¹ and M [1].
     shapes : ndarray, shape (modes, rows, 3)
-        Displacements; the largest of a row is 1, and its largest component positive.
+        Displacements; the largest of a node is 1, and its largest component positive. Those of rotations of bodies are
+        angles over it [rad/m].
     later : ndarray, shape (modes, rows, 3), optional
         In a frame that turns, displacements a quarter of a period after those.
     modal_mass : ndarray, shape (modes,)
         φᵀMφ of the shapes [kg]: a shape over its root is mass-normalised.
     shares : ndarray, shape (modes, 3)
-        Parts of the kinetic energy along x, y and z [1].
+        Parts of the kinetic energy along x, y and z [1]; what is left is that of bodies that turn.
     moving : ndarray, shape (modes,)
         Share of the mass that moves, (Σ m|φ|²)²/(Σ m Σ m|φ|⁴) [1]: 1 where all moves alike, near 0 for a local mode.
+        Rotations of bodies count with a length of theirs.
     nodes : ndarray of int, shape (modes,)
-        Row of the largest displacement.
+        Row of the largest displacement: of a body where no node moves.
     unstable, zero : int
         Number of modes of negative ω², and of directions without stiffness.
     """
@@ -103,7 +105,7 @@ def spectrum(system, t, x, number, seed=0):
         Where nothing that has mass has stiffness, or a node has neither.
     """
     pencil = Pencil(system, t, x, seed)
-    if (turned := coriolis(system)) is not None:
+    if (turned := coriolis(system, x)) is not None:
         pairs = turning_pairs(pencil, turned, number, lambda v: _rounding(pencil, v) + _left(pencil, v))
         return _described(pencil, *pairs)
     unstable, low = pencil.below(0.0, 1.0), pencil.below(0.0, -1.0)
@@ -139,9 +141,15 @@ def _described(pencil, squared, bound, residual, vectors, unstable, zero):
     kinetic = np.zeros_like(shapes)
     shapes.reshape(len(modes), -1)[:, system.free] = vectors.T
     kinetic.reshape(len(modes), -1)[:, system.free] = (vectors.conj() * (pencil.M @ vectors)).T
-    mass = np.where(system.supported.all(axis=1), 0.0, system.net.mass)
-    swept = np.linalg.norm(shapes, axis=2)
-    nodes = np.argmax(swept > (1.0 - 1e-6) * swept.max(axis=1, keepdims=True), axis=1)  # the first of equal ones
+    places = np.arange(system.rows) < system.rows - system.net.spins
+    mass = np.where(system.supported.all(axis=1), 0.0, system.net.mass / system.levers**2)
+    if system.carriers:
+        system.carriers.add_moves(pencil.x, shapes)
+    swept = system.levers * np.linalg.norm(shapes, axis=2)
+    of_nodes = swept[:, : system.net.nodes]
+    candidates = of_nodes if of_nodes.any(axis=1).all() else swept
+    largest = candidates.max(axis=1, keepdims=True)
+    nodes = np.argmax(candidates > (1.0 - 1e-6) * largest, axis=1)  # the first of equal ones
     largest = shapes[modes, nodes]
     largest = largest[modes, abs(largest).argmax(axis=1)]
     shapes *= (largest.conj() / abs(largest))[:, None, None]  # at the instant when that is at its largest
@@ -154,7 +162,7 @@ def _described(pencil, squared, bound, residual, vectors, unstable, zero):
         residual=residual / np.maximum(abs(squared), np.finfo(float).tiny),
         shapes=np.ascontiguousarray(shapes.real),
         modal_mass=1.0 / size**2,
-        shares=kinetic.sum(axis=1).real,
+        shares=kinetic[:, places].sum(axis=1).real,
         moving=(swept**2 @ mass) ** 2 / (mass.sum() * (swept**4 @ mass)),
         nodes=nodes,
         unstable=unstable,
@@ -172,7 +180,7 @@ def _rounding(pencil, vectors):
 
 def _left(pencil, vectors):
     """Effect of the error of the equilibrium on ω²: K changes by another Newton step."""
-    system, neighbour = pencil.system, pencil.x.copy()
-    neighbour.ravel()[system.free] += pencil.moved(system.force(pencil.t, pencil.x).ravel()[system.free])
-    change = pencil.change(neighbour)
+    system = pencil.system
+    step = pencil.moved(system.force(pencil.t, pencil.x).ravel()[system.free])
+    change = pencil.change(system.moved(pencil.x, system.rows_of(step)))
     return np.linalg.norm(vectors.conj().T @ (change @ vectors), axis=0)  # whole rows: what parts equal frequencies too

@@ -62,19 +62,22 @@ class Pairs(NamedTuple):
     zero: int
 
 
-def coriolis(system):
-    """G = −∂f/∂v of the unknowns [kg/s], a sparse matrix; None where no frame turns."""
+def coriolis(system, x):
+    """G = −∂f/∂v of the unknowns at a displacement [kg/s], a sparse matrix; None where no frame turns."""
     speed = np.array(system.rotating[0].frame.angular_velocity if system.rotating else (0.0, 0.0, 0.0))
     if not speed.any():
         return None
     net = system.net
-    mass = coo_array(diags_array(net.mass))
+    mass = coo_array(diags_array(np.where(np.arange(system.rows) < system.rows - net.spins, net.mass, 0.0)))
     if net.consistent_minus_lumped is not None:
         count = net.cells.shape[1]
         rows, columns = np.repeat(net.cells, count, axis=1).ravel(), np.tile(net.cells, count).ravel()
         mass = mass + coo_array((net.consistent_minus_lumped.ravel(), (rows, columns)), shape=mass.shape)
     across = 2.0 * np.cross(np.eye(3), speed)  # (Ω × e)_i = across[i, j] e_j
-    return csc_array(csc_array(kron(mass, across))[system.free][:, system.free])
+    of_places = csc_array(csc_array(kron(mass, across))[system.free][:, system.free])
+    if not system.angles:
+        return of_places
+    return of_places + system.pattern.matrix(system.carriers.coriolis(system, x, speed))
 
 
 class Gyroscopic:

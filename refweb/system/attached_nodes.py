@@ -66,18 +66,13 @@ class Carried:
     """
 
     def __init__(self, net, terms):
-        self.turns, self._terms, self._entries = RigidRotations.of(net), terms, []
+        self.turns, self._terms, self._entries, self._spun = RigidRotations.of(net), terms, [], None
         turns, nodes = self.turns, self.turns.carried[:, 0]
         self._cells = [
             _Cell(i, int(at), term.cells[at], turns)
             for i, term in enumerate(terms)
             for at in np.flatnonzero(np.isin(term.cells, nodes).any(axis=1))
         ]
-
-    @staticmethod
-    def waiting(net):
-        """Those of bodies that are held and feel nothing."""
-        return Waiting(net, [])
 
     @property
     def cells(self):
@@ -99,7 +94,7 @@ class Carried:
 
     def _arrange(self, pattern, free):
         """Find where entries stand in the pattern of a system, which has `cells`."""
-        if self._entries:
+        if self._spun is not None:
             return
         number = np.full(3 * max(3 + self.turns.rows.max(), 1 + free.max() // 3), -1)
         number[free] = np.arange(len(free))
@@ -115,7 +110,7 @@ class Carried:
             R = np.array(matrix_at(x, spin, turn))
             q = np.array([1.0 + x[turn, 0], *x[spin]])
             angle = np.zeros((3, 6))  # of q's vector part, which stands first, and of q₀
-            angle[:, :3], angle[:, 3] = q[0] * np.eye(3) + _cross(q[1:]), -q[1:]
+            angle[:, :3], angle[:, 3] = q[0] * np.eye(3) + cross_matrix(q[1:]), -q[1:]
             angle *= 2.0 / (q @ q)
             W = R @ self.turns.mobility[n] @ R.T
             states.append((R @ self.turns.arms[c], np.array(angular_velocity(n, x, v, self.turns)), W, v[spin], angle))
@@ -128,15 +123,22 @@ class Carried:
         for i, c, (b, s, q) in cell.parts:
             arm, omega, W, u, angle = state[c]
             at, body, spin, quaternion = (slice(3 * row, 3 * row + 3) for row in (i, b, s, q))
-            A = _cross(arm)
+            A = cross_matrix(arm)
             T[at, body] = fast[at, body] = L[body, at] = np.eye(3)
             L[spin, at], fast[at, spin] = A, -A @ W
             T[at, spin], T[at, quaternion] = -A @ angle[:, :3], -A @ angle[:, 3:]
-            rate = A @ (_cross(omega) - W @ _cross(u)) - _cross(omega) @ A
+            rate = A @ (cross_matrix(omega) - W @ cross_matrix(u)) - cross_matrix(omega) @ A
             turned[at, spin], turned[at, quaternion] = rate @ angle[:, :3], rate @ angle[:, 3:]
         return T, fast, turned, L
 
-    def add_stiffness(self, values, system, t, x, v, blocks):
+    def matrix(self, n, x):
+        """Rows of the rotation matrix of a body, by its number among those that turn."""
+        return matrix_at(x, *self.turns.rows[n, 1:])
+
+    def convert(self, x, blocks):
+        """Leave the columns of quaternions as they are, of which unknowns are."""
+
+    def add_stiffness(self, values, system, t, x, v, blocks, definite=False, only=None):
         """Add to the values of K of a system what these nodes have of it, of the blocks of −∂f/∂x of its terms."""
         self._arrange(system.pattern, system.free)
         state, damped = self._state(x, v), {}
@@ -146,16 +148,17 @@ class Carried:
                 term.velocity.damping(t, x, v, damped[i], term.cells, system.data_of(term, t), False)
         for cell, entries in zip(self._cells, self._entries, strict=True):
             T, _, turned, L = self._matrices(cell, state)
-            expanded = _beside(L @ blocks[cell.term][cell.at] @ T, blocks, cell)
+            block = blocks[cell.term][cell.at]
+            expanded = beside(L @ block @ T, block, cell)
             if cell.term in damped:
                 expanded += L @ damped[cell.term][cell.at] @ turned
-            _add(values, entries, expanded)
+            add_to(values, entries, expanded)
         force = system.force(t, x, v)
         for c, (node, n) in enumerate(self.turns.carried):
             (arm, *_, angle), f = state[c], force[node]
             expanded = np.zeros((6, 6))
             expanded[:3] = ((f @ arm) * np.eye(3) - np.outer(arm, f)) @ angle
-            _add(values, self._spun[n], expanded)
+            add_to(values, self._spun[n], expanded)
 
     def add_damping(self, values, system, x, v, blocks):
         """Add to the values of C what these nodes have of it, of the blocks of −∂f/∂v."""
@@ -163,20 +166,8 @@ class Carried:
         state = self._state(x, v)
         for cell, entries in zip(self._cells, self._entries, strict=True):
             _, fast, _, L = self._matrices(cell, state)
-            _add(values, entries, _beside(L @ blocks[cell.term][cell.at] @ fast, blocks, cell))
-
-
-class Waiting(Carried):
-    """Nodes of bodies that are held and feel nothing."""
-
-    def add_forces_to_bodies(self, x, f):
-        """Nothing is felt."""
-
-    def add_stiffness(self, values, system, t, x, v, blocks):
-        """Nothing is to be added."""
-
-    def add_damping(self, values, system, x, v, blocks):
-        """Nothing is to be added."""
+            block = blocks[cell.term][cell.at]
+            add_to(values, entries, beside(L @ block @ fast, block, cell))
 
 
 def _entries(rows, size, number, keys):
@@ -190,17 +181,18 @@ def _entries(rows, size, number, keys):
     return row[present], column[present], at[present]
 
 
-def _beside(expanded, blocks, cell):
+def beside(expanded, block, cell):
     """A new block of a cell without what of it is in the pattern already."""
     T, L = cell.unmoved()
-    return expanded - L @ blocks[cell.term][cell.at] @ T
+    return expanded - L @ block @ T
 
 
-def _add(values, entries, expanded):
+def add_to(values, entries, expanded):
+    """Add a block to values in the pattern, by its `_entries`."""
     row, column, at = entries
     values[at] += expanded[row, column]
 
 
-def _cross(a):
+def cross_matrix(a):
     """Matrix of a × b."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])

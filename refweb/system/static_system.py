@@ -9,9 +9,12 @@ import numpy as np
 
 from ..errors import InputError
 
+NEAR = 1e-6
+"""Distance up to which a body counts as touching a line, over its thickness."""
+
 
 def at_rest(system):
-    """A copy in which free bodies are held and feel nothing, and what needs velocity is left out; or the system.
+    """A copy in which what needs velocity is left out and `waiting` bodies are held and feel nothing; or the system.
 
     Raises
     ------
@@ -19,29 +22,59 @@ def at_rest(system):
         For a line that is broken.
     """
     refuse_broken(system.net)
-    waiting = [body.row for body in system.net.bodies if not body.fixed]
-    if not waiting and all(term.timing.at_rest for term in system.terms):
+    if system.net.quasi_static and all(term.timing.at_rest for term in system.terms):
         return system
+    free = [body for body in system.net.bodies if not body.fixed]
+    if not free and all(term.timing.at_rest for term in system.terms):
+        return system
+    absent = waiting(system)
     _ = system.library  # both say what factorizes for either
     rest = copy.copy(system)
     for kept in ("pattern", "unsupported_parts", "mass", "links", "carriers"):
         rest.__dict__.pop(kept, None)
     rest.supported = system.supported.copy()
-    rest.supported[waiting] = True
     rest.supported[system.rows - system.net.spins :] = True
-    if system.carriers:
-        rest.carriers, rest.carried = system.carriers.waiting(system.net), np.zeros_like(system.carried)
-    rest.terms = []
+    rest.supported[[body.row for body in absent]] = True
+    resting = [body for body in free if body.turn is not None and body.row not in [b.row for b in absent]]
+    rest.supported[[body.spin for body in resting]] = False
+    rest.angles, rest.terms = system.turning, []
+    without = [row for body in absent for row in (body.row, body.spin, body.turn) if row is not None]
     for term in system.terms:
         if not term.timing.at_rest:
             continue
-        felt = ~np.isin(term.cells, waiting).any(axis=1)
+        felt = ~np.isin(term.cells, without).any(axis=1)
         if felt.all():
             rest.terms.append(term)
         elif felt.any():
             rest.terms.append(replace(term, cells=term.cells[felt], data=term.data[felt]))
     rest.arrange()
     return rest
+
+
+def waiting(system):
+    """Free bodies that take no part in an equilibrium that dynamics starts from, a list.
+
+    Those that move at the start, and those at rest that carry no nodes and touch nothing; in statics none.
+    """
+    if system.net.quasi_static:
+        return []
+    free = [body for body in system.net.bodies if not body.fixed]
+    return [b for b in free if any(b.velocity) or any(b.angular_velocity) or not (b.carried or _touches(system, b))]
+
+
+def _touches(system, body):
+    """Tell if a body touches a line where it starts."""
+    start = np.zeros((system.rows, 3))
+    system.drive(0.0, start)
+    for term in system.terms:
+        if term.contact.with_lines and term.energy is not None:
+            of_it = term.cells[:, term.contact.felt[0]] == body.row
+            for step in NEAR * body.thickness * np.vstack([np.eye(3), -np.eye(3)]):
+                x = start.copy()
+                x[body.row] += step
+                if system.energy_of(term, 0.0, x)[of_it].any():
+                    return True
+    return False
 
 
 def refuse_broken(net):

@@ -22,9 +22,13 @@ from ..effects.base import DAMPED_TENSION, TENSION, BreakLimits, Constraint, For
 from ..effects.elasticity import length_force
 from ..findings import Finding
 from ..net.rigid_body import row_names, with_rotations
+from ..net.rotation import turn_by
 from ..net.tension_laws import FORCE_DENSITY, TENSION_ONLY
 from .forces import Forces, PerCell
 from .start import initial_velocity, laid
+
+MOST_TURN = 0.5
+"""Largest angle by which a step of statics turns a body [rad]."""
 
 
 class System:
@@ -55,6 +59,9 @@ class System:
         Nodes that free bodies carry: those move with these.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
+    angles : bool
+        Whether unknowns of bodies that turn are rotation vectors, see `refweb.system.resting_bodies`, and not
+        quaternions: so it is in statics.
     """
 
     def __init__(self, net, effects, supported, factorization="auto"):
@@ -80,6 +87,9 @@ class System:
             self.supported[body.row] = body.fixed
         for drive in self.drives:
             self.supported[drive.cells[:, 0]] = True
+        self.angles = net.quasi_static and self.turning
+        if self.angles:
+            self.supported[[body.turn for body in net.bodies if body.turn is not None]] = True
         self.carried = np.zeros(self.rows, dtype=bool)
         self.carried[net.carried] = True
         self.supported[self.carried] = True
@@ -146,7 +156,14 @@ class System:
 
     @cached_property
     def carriers(self):
-        """The `refweb.system.attached_nodes.Carried` of bodies that carry nodes; None where none does."""
+        """The `refweb.system.attached_nodes.Carried` of bodies that carry nodes; None where none does.
+
+        At rest the `refweb.system.resting_bodies.RestingBodies` of those that turn.
+        """
+        if self.angles:
+            from .resting_bodies import RestingBodies
+
+            return RestingBodies(self.net, self._in_tangent)
         if not self.carried.any():
             return None
         from .attached_nodes import Carried
@@ -154,11 +171,62 @@ class System:
         return Carried(self.net, self._in_tangent)
 
     @cached_property
+    def levers(self):
+        """Length of each row [m], shape (rows,), by which moments and rotations compare with forces and places.
+
+        1 of what is no rotation.
+        """
+        levers = np.ones(self.rows)
+        for body in self.net.bodies:
+            if body.spin is not None:
+                levers[body.spin] = max([body.extent, *np.linalg.norm(body.points, axis=1)])
+        return levers
+
+    def sizes(self, force):
+        """Size of the force on each row [N], of a moment that over its lever, shape (rows,)."""
+        sizes = np.linalg.norm(force, axis=1)
+        return sizes / self.levers if self.net.spins else sizes
+
+    @property
+    def resting(self):
+        """Free bodies whose places are unknowns, a list."""
+        return [body for body in self.net.bodies if not self.supported[body.row].all()]
+
+    def moved(self, x, step):
+        """Displacement [m] behind a step of all rows, both of shape (rows, 3); bodies turn by rotation vectors."""
+        y = x + step
+        if self.angles:
+            turn_by(x, y, np.zeros_like(y), self.carriers.turns)
+        return y
+
+    def rows_of(self, p):
+        """A step of the unknowns as one of all rows, shape (rows, 3)."""
+        step = np.zeros((self.rows, 3))
+        step.ravel()[self.free] = p
+        return step
+
+    def largest_share(self, p):
+        """Largest share, up to 1, of a step of the unknowns that keeps a tangent meaningful.
+
+        It turns no body by more than `MOST_TURN`, and takes none that touches the web farther than half its thickness.
+        """
+        share, step = 1.0, self.rows_of(p) if self.resting else None
+        for body in self.resting:
+            turn = 0.0 if body.turn is None else float(np.linalg.norm(step[body.spin])) / MOST_TURN
+            shift = float(np.linalg.norm(step[body.row])) / (0.5 * body.thickness) if self.contact else 0.0
+            share = min(share, 1.0 / max(turn, shift, 1.0))
+        return share
+
+    @cached_property
     def mass(self):
         """The `refweb.system.mass.Mass`."""
         from .mass import Mass
 
         return Mass(self.net, self.free, self.pattern, self._lines_in_tangent)
+
+    def mass_at(self, x):
+        """Values of M of the unknowns [kg] at displacement x; of rotations of bodies their inertia there [kg m²]."""
+        return self.carriers.tensors(self.mass.values, self, x) if self.angles else self.mass.values
 
     @property
     def _lines_in_tangent(self):
@@ -335,15 +403,21 @@ class System:
                 block[:] = 0.0
             else:
                 term.tangent.stiffness(t, x, v, block, term.cells, self.data_of(term, t), definite)
+        if self.carriers:
+            self.carriers.convert(x, blocks)
         values = self.pattern.assemble(blocks)
         if self.carriers:
-            self.carriers.add_stiffness(values, self, t, x, v, blocks)
+            self.carriers.add_stiffness(values, self, t, x, v, blocks, definite, only)
         return values
 
     @property
     def symmetric(self):
         """True if K and C are symmetric."""
-        return all(f.tangent.symmetric for f in self.terms) and not self.carried.any()
+        return all(map(self.is_symmetric, self.terms)) and (self.angles or not self.carried.any())
+
+    def is_symmetric(self, term):
+        """Tell if what a term has of K is symmetric: by rotation vectors all that a potential has is."""
+        return term.tangent.symmetric or (self.angles and term.energy is not None)
 
     @cached_property
     def turning(self):
@@ -357,7 +431,12 @@ class System:
 
     @property
     def dead(self):
-        """True if the only internal forces are the tensions of the lines, and all others are dead loads."""
+        """True if the only internal forces are the tensions of the lines, and all others are dead loads.
+
+        Free bodies are none of this: what they carry is stiff, and turns.
+        """
+        if any(not body.fixed for body in self.net.bodies) and self.resting:
+            return False
         outer = [f for f in self.terms if not f.balance.internal]
         inner = [f for f in self.terms if f.balance.internal]
         return all(f.tangent.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
@@ -405,6 +484,23 @@ class System:
         values = self.pattern.assemble(blocks)
         if self.carriers:
             self.carriers.add_damping(values, self, x, v, blocks)
+        return values
+
+    def across_lines(self, tension):
+        """Values of the stiffness of lines as built across themselves, by a tension in each [N], shape (elements,).
+
+        Free bodies have that of the mean line beside what lines hold of them, so that it is definite.
+        """
+        force = tension / self.net.natural_length
+        blocks = self.net.unit_tension * force[:, None, None]
+        values = self.assemble_lines(blocks)
+        if self.resting:
+            rows = [row for body in self.resting for row in (body.row, body.spin) if row is not None]
+            unknowns = np.flatnonzero(np.isin(self.free // 3, rows))
+            spring = force.mean() * np.repeat(self.levers**2, 3)[self.free[unknowns]]
+            values[self.pattern.diagonal[unknowns]] += spring
+        if self.carriers:
+            self.carriers.add_across(values, self, self._lines_in_tangent, blocks)
         return values
 
     def assemble_lines(self, blocks):

@@ -8,7 +8,10 @@ import numpy as np
 
 
 class Part(NamedTuple):
-    """A connected part and an axis, 0 … 2, along which no row of it is supported; its unknowns along that axis."""
+    """A connected part and an axis, 0 … 2, along which no row of it is supported; its unknowns along that axis.
+
+    Rotations of bodies are none of its rows, and nodes that bodies carry none of its unknowns.
+    """
 
     rows: np.ndarray
     axis: int
@@ -23,9 +26,16 @@ def find_parts(system, touching=True):
     terms = [f for f in system.terms if touching or f.name not in ("contact", "self_contact")]
     cells = [f.cells for f in terms if f.cells.shape[1] > 1]
     pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
+    joined = [(body.row, node) for body in system.net.bodies if not body.fixed for node in body.carried]
+    pairs = np.vstack([pairs, *([joined] if joined else [])])
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(system.rows, system.rows))
     count, part = connected_components(graph, directed=False)
     fixed = np.zeros((count, 3), dtype=bool)
-    np.logical_or.at(fixed, part, system.supported)
-    free_along = [(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~fixed), strict=True)]
-    return [Part(rows, axis, np.searchsorted(system.free, 3 * rows + axis)) for rows, axis in free_along]
+    np.logical_or.at(fixed, part, system.fixed)
+    places = np.arange(system.rows) < system.rows - system.net.spins
+    free_along = [(np.flatnonzero((part == p) & places), axis) for p, axis in zip(*np.nonzero(~fixed), strict=True)]
+    return [
+        Part(rows, axis, np.searchsorted(system.free, 3 * rows[~system.carried[rows]] + axis))
+        for rows, axis in free_along
+        if len(rows)
+    ]

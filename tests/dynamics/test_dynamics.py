@@ -845,9 +845,9 @@ def test_massless_node(tmp_path):
     refused(f"node {bare} has no mass", tmp_path, cable=cable(density=0.0), effects=heavy)
 
 
-def test_free_body_in_statics(tmp_path):
+def test_velocities_in_statics(tmp_path):
     static = dict(solve=refweb.Static(), output=refweb.Output(), accuracy=None)
-    refused("a free body cannot be used in statics; fixed = true holds it", tmp_path, **static)
+    refused(r"\[\[body\]\] 1 velocity = .* has no meaning in statics: leave it out", tmp_path, **static)
     still = [refweb.Velocity(node="all", value=(0, 0, 1))]
     refused(r"\[\[velocity\]\] 1 a velocity cannot be used in statics", tmp_path, effects=still, **static)
 

@@ -469,7 +469,7 @@ REFUSED = [
                     "position": [0, 0, 0]}]),
         r'\[\[attach\]\] 1 body = "satellite" is a ring, which keeps its plane: give it another shape',
     ),
-    (dict(solve={"kind": "static"}, output={}), "a free body cannot be used in statics; fixed = true holds it"),
+    (dict(solve={"kind": "static"}, output={}), r"velocity = \[0.5, 0.2, 0.0\] has no meaning in statics"),
 ]  # fmt: skip
 
 

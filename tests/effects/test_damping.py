@@ -376,7 +376,7 @@ def test_statics_does_not_feel_it():
 
 
 def test_refusals():
-    with pytest.raises(InputError, match=r"time = 0 \[s\] and rate = 0 \[1/s\]: one of them must be > 0"):
+    with pytest.raises(InputError, match=r"time = 0 \[s\], rate = 0 \[1/s\] and bodies = 0 \[1/s\]: one of them must"):
         refweb.Damping()
     with pytest.raises(InputError, match=r"time = -1.0 must be ≥ 0 \[s\]"):
         refweb.Damping(time=-1)

@@ -41,6 +41,7 @@ AROUND = {
     },
     "contact": {"body": [BALL]},
     "contact.bodies": {"body": [BALL]},
+    "damping": {"body": [BALL]},
     "drag.bodies": {"body": [BALL | {"name": "hub"}], "drag": {"density": 1.2}},
     "event": {"body": [BALL], "contact": {}},
     "temperature.groups": {"temperature": {"expansion": 1e-6, "change": 0.0}},

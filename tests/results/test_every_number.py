@@ -296,8 +296,8 @@ def numbers(frame, spin, effect, static):
         held = np.zeros(3)
     bent = effect == "bending"  # its springs push on supports as well
     found["reaction 4"] = np.linalg.norm(frame.reaction[0] if bent else held)
+    found["orientation 0"] = frame.angle
     if not static:
-        found["orientation 0"] = frame.angle
         found["angular_velocity 3"] = np.linalg.norm(frame.turning)
         found["angular_momentum 0"] = MOMENT * np.linalg.norm(frame.turning)
         found["kinetic_energy 0"] = frame.moving(spin)

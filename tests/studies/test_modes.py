@@ -369,7 +369,7 @@ def test_error_of_the_equilibrium_is_in_the_error(size):
 
 
 def test_every_load_step_and_the_start_of_dynamics():
-    """A dynamic scene vibrates about the equilibrium at t = 0, where free bodies wait."""
+    """A dynamic scene vibrates about the equilibrium at t = 0, where a ball that flies is held."""
     found = refweb.modes(small(solve=refweb.Static(load_steps=[0.5, 1])), 3)
     assert [here.step for here in found.spectra] == [0.5, 1.0]
     assert found.history["step"].tolist() == [0.5] * 3 + [1.0] * 3
@@ -382,7 +382,7 @@ def test_every_load_step_and_the_start_of_dynamics():
         dynamic = refweb.modes(scene, 3)
         assert (abs(dynamic.frequency - found.frequency) <= dynamic.error + found.error).all()
         assert dynamic.spectra[0].step == 0.0
-    assert any("free bodies wait, and the web does not feel them: ball" in text for text in dynamic.warnings)
+    assert any("are held, and the web does not feel them: ball" in text for text in dynamic.warnings)
 
 
 def test_wrong_input(monkeypatch):

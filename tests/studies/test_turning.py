@@ -113,7 +113,7 @@ def test_gyroscopic_matrix_is_that_of_the_force(mass):
     """G v is minus the Coriolis force of any velocities, and antisymmetric."""
     scene = framed(string(5, order=2).replace(solve=refweb.Static(mass=mass)), 1.0, -2.0, 0.5)
     system = scene.build()
-    G, v = coriolis(system), np.zeros((system.rows, 3))
+    G, v = coriolis(system, np.zeros((system.rows, 3))), np.zeros((system.rows, 3))
     v.ravel()[system.free] = np.random.default_rng(0).standard_normal(len(system.free))
     still = system.force(1.0, np.zeros_like(v), np.zeros_like(v))
     felt = (system.force(1.0, np.zeros_like(v), v) - still).ravel()[system.free]

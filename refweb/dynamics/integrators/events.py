@@ -1,7 +1,7 @@
 """Events: moments at which the value of a probe, or of a sum, passes a level.
 
 A compiled step is looked at once, at its end: a moment is known to its size. What is known anywhere within a step is
-searched by bisection, to rounding.
+searched by bisection, to rounding. An event of rest is that a value has stayed below a share of its largest for a time.
 """
 
 from __future__ import annotations
@@ -25,14 +25,18 @@ EVENT = np.dtype(
         ("rising", np.int64),
         ("at_once", np.int64),
         ("stop", np.int64),
+        ("during", float),
         ("side", float),
+        ("largest", float),
+        ("since", float),
         ("time", float),
         ("width", float),
     ]
 )
-"""An event in the loop: slot, level and flags as in `Event`; the side of the level that its value is on, 1 above, −1
-not and 0 before any is known; the time at which it has happened [s], infinite before; and how much earlier that may
-have been [s]."""
+"""An event in the loop: slot, level, flags and time to last as in `Event`; the side of the level that its value is on,
+1 above, −1 not and 0 before any is known; of one with a time to last the largest value so far, and the time since which
+it is below the share of that [s], infinite where it is not; the time at which it has happened [s], infinite before; and
+how much earlier that may have been [s]."""
 
 EventArray = Annotated[np.ndarray, types.Array(from_dtype(EVENT), 1, "C")]
 
@@ -52,6 +56,8 @@ class Event(NamedTuple):
         Whether the run ends there.
     at_once : bool
         Whether being above at t = 0 counts, as a contact does.
+    during : float
+        0, or for how long the value is to stay at or below ``level`` times its largest so far [s]: it happens then.
     """
 
     slot: int
@@ -59,6 +65,7 @@ class Event(NamedTuple):
     rising: bool = False
     stop: bool = False
     at_once: bool = False
+    during: float = 0.0
 
 
 def event_rows(events):
@@ -67,7 +74,7 @@ def event_rows(events):
     for row, event in zip(rows, events, strict=True):
         for name, value in event._asdict().items():
             row[name] = value
-    rows["time"] = np.inf
+    rows["time"] = rows["since"] = np.inf
     return rows
 
 
@@ -77,6 +84,17 @@ def crosses(event, value):
     side = 1.0 if value > event.level else -1.0
     before, event.side = event.side, side
     return side != before and (side > 0.0 or event.rising == 0)
+
+
+@kernel()
+def rests(event, t, value):
+    """Tell if an event happens at t as its value has stayed below a share of its largest, and record that."""
+    event.largest = max(event.largest, value)
+    if value > event.level * event.largest:
+        event.since = math.inf
+    elif event.since == math.inf:
+        event.since = t
+    return t - event.since >= event.during
 
 
 @kernel()
@@ -109,7 +127,7 @@ def note_events(
                 value = look_at(i, t, x, v, f, lines, observed, where)
             else:
                 value = inner(observed.sums[i - len(observed.probes)], total)
-            if crosses(event, value):
+            if rests(event, t, value) if event.during > 0.0 else crosses(event, value):
                 event.time, event.width = t, h
                 ended = ended or event.stop > 0
     return ended
@@ -147,7 +165,13 @@ def search(events, piece, value):
     for sample in (piece.middle, piece.end):
         for event in events:
             side, low, high = event["side"], before, sample.time
-            if event["time"] < np.inf or not crosses(event, value(piece, event["slot"], sample)):
+            if event["time"] < np.inf:
+                continue
+            if event["during"] > 0.0:
+                if not rests(event, sample.time, value(piece, event["slot"], sample)):
+                    continue
+                low = high
+            elif not crosses(event, value(piece, event["slot"], sample)):
                 continue
             while low < (middle := 0.5 * (low + high)) < high:
                 above = value(piece, event["slot"], piece.at(middle)) > event["level"]

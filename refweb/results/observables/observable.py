@@ -141,7 +141,7 @@ class Observable:
         if size == 0.0:
             return 0.0
         share = SHARE * state.system.natural_length(state.time).min() / size
-        moved = type(state)(state.system, state.time, state.x + share * move)
+        moved = type(state)(state.system, state.time, state.system.moved(state.x, share * move))
         return abs(self.of(moved).value - self.of(state).value) / share
 
     def of_held_lines(self, state):

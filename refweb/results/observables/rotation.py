@@ -49,6 +49,8 @@ class Orientation(Turning):
     to π.
     """
 
+    dynamic = False
+
     def __init__(self, observe):
         super().__init__(observe)
         self.unit = "rad" if observe.component is None else "1"

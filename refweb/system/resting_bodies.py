@@ -1,0 +1,134 @@
+"""Bodies that turn, at rest: their unknowns are a place and a rotation vector each, and the tangent by these.
+
+An orientation has no coordinates in which a step is a sum: a step p turns a body by the rotation vector p from where it
+is, q becomes exp(p/2) q. The force that belongs to p is the moment m about the centre, along the axes of space. Where
+all has a potential Π, the second derivative of Π along such steps is the symmetric part of −∂m/∂p; the rest, half the
+matrix of m ×, vanishes with the moment in an equilibrium. So Newton's method with the symmetric part goes down Π, is
+exact to second order, and its pivots say whether an equilibrium is stable. Without a potential K is −∂m/∂p as it is.
+
+A node at the arm a of a body moves by δ + p × a, so that a block K of lines becomes Lᵀ K L with L = (1, −a ×), and as
+the arm turns f·a 1 − a⊗f of the force f on the node is added, as in `refweb.system.attached_nodes`. Kernels of contact
+have columns for the quaternion q = (w, u); those of p follow by δw = −½ u·p and δu = ½ (w p + p × u).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .attached_nodes import Carried, add_to, beside, cross_matrix
+
+NO_TURN = np.hstack([np.eye(3), np.zeros((3, 3))])
+"""δθ of the two rows of rotation of a body: the first has it as its displacement."""
+
+
+class RestingBodies(Carried):
+    """Free bodies whose orientation counts in statics, and the nodes that they carry."""
+
+    def __init__(self, net, terms):
+        super().__init__(net, terms)
+        self._columns = []
+        for i, term in enumerate(terms):
+            for n, (_, spin, turn) in enumerate(self.turns.rows):
+                for at in range(term.cells.shape[1] - 1):
+                    cells = np.flatnonzero((term.cells[:, at] == spin) & (term.cells[:, at + 1] == turn))
+                    if len(cells):
+                        self._columns.append((i, cells, 3 * at, n))
+
+    def convert(self, x, blocks):
+        """Make columns of rotation vectors of those of quaternions, in blocks of −∂f/∂x of all terms."""
+        for i, cells, at, n in self._columns:
+            _, spin, turn = self.turns.rows[n]
+            u, block = x[spin], blocks[i]
+            by_vector = 0.5 * ((1.0 + x[turn, 0]) * np.eye(3) - cross_matrix(u))
+            columns = block[cells, :, at : at + 3] @ by_vector
+            block[cells, :, at : at + 3] = columns - 0.5 * block[cells, :, at + 3, None] * u
+            block[cells, :, at + 3 : at + 6] = 0.0
+
+    def _state(self, x, v):
+        """Arm of each node, and ω, W, u and δθ by the rows of rotation of its body, at rest."""
+        zero, states = np.zeros(3), []
+        for (_, n), arm in zip(self.turns.carried, self.turns.arms, strict=True):
+            R = np.array(self.matrix(n, x))
+            states.append((R @ arm, zero, R @ self.turns.mobility[n] @ R.T, zero, NO_TURN))
+        return states
+
+    def add_stiffness(self, values, system, t, x, v, blocks, definite=False, only=None):
+        """Add to the values of K of a system what these nodes have of it, of the blocks of −∂f/∂x of its terms.
+
+        ``definite`` and ``only`` are those of `refweb.system.system.System.stiffness`.
+        """
+        self._arrange(system.pattern, system.free)
+        state = self._state(x, v)
+        for cell, entries in zip(self._cells, self._entries, strict=True):
+            T, _, _, L = self._matrices(cell, state)
+            block = blocks[cell.term][cell.at]
+            add_to(values, entries, beside(L @ block @ T, block, cell))
+        if len(self.turns.carried):
+            terms = system.terms if only is None else only
+            force = sum((system.force_of(term, t, x, v) for term in terms), np.zeros((system.rows, 3)))
+            for c, (node, n) in enumerate(self.turns.carried):
+                arm, f = state[c][0], force[node]
+                turned = (f @ arm) * np.eye(3) - np.outer(arm, f)
+                if definite:
+                    size, axes = np.linalg.eigh(0.5 * (turned + turned.T))
+                    turned = axes * np.maximum(size, 0.0) @ axes.T
+                expanded = np.zeros((6, 6))
+                expanded[:3, :3] = turned
+                add_to(values, self._spun[n], expanded)
+        if system.conservative:
+            self._make_symmetric(values)
+
+    def _make_symmetric(self, values):
+        """Leave the symmetric part of what a rotation of each body has of its own moment."""
+        for row, column, at in self._spun:
+            matrix = np.zeros((6, 6))
+            matrix[row, column] = values[at]
+            values[at] = 0.5 * (matrix + matrix.T)[row, column]
+
+    def add_across(self, values, system, lines, blocks):
+        """Add what these nodes have of blocks (3 nodes, 3 nodes) of the lines, the term of that number, as built."""
+        self._arrange(system.pattern, system.free)
+        still = np.zeros((system.rows, 3))
+        state = self._state(still, still)
+        for cell, entries in zip(self._cells, self._entries, strict=True):
+            if cell.term == lines:
+                T, _, _, L = self._matrices(cell, state)
+                add_to(values, entries, beside(L @ blocks[cell.at] @ T, blocks[cell.at], cell))
+
+    def add_moves(self, x, moves):
+        """Write the moves of nodes to moves of all rows about x, to first order, shape (k, rows, 3)."""
+        for (node, n), (arm, *_) in zip(self.turns.carried, self._state(x, x), strict=True):
+            row, spin, _ = self.turns.rows[n]
+            moves[:, node] = moves[:, row] + np.cross(moves[:, spin], arm)
+
+    def tensors(self, values, system, x):
+        """Values with those of rotations times J/I, of the tensor of inertia J of each body as it stands at x.
+
+        So those of M have the tensor in place of the one moment I, and those of the identity make rates of L/I those of
+        the angular velocity.
+        """
+        self._arrange(system.pattern, system.free)
+        values = values.copy()
+        for n, (row, column, at) in enumerate(self._spun):
+            R, block, tensor = np.array(self.matrix(n, x)), np.zeros((6, 6)), np.eye(6)
+            block[row, column] = values[at]
+            tensor[:3, :3] = R @ np.linalg.inv(self.turns.mobility[n]) @ R.T
+            values[at] = (block @ tensor)[row, column]
+        return values
+
+    def momenta(self, system, x):
+        """Matrix of the unknowns that makes forces by L/I of bodies those by their angular velocity, sparse."""
+        values = np.zeros(len(system.pattern.indices))
+        values[system.pattern.diagonal] = 1.0
+        return system.pattern.matrix(self.tensors(values, system, x))
+
+    def coriolis(self, system, x, speed):
+        """−∂f/∂ω of the moments 2 ω × S Ω in axes that turn by Ω, see `refweb.effects.turning_bodies`, values."""
+        self._arrange(system.pattern, system.free)
+        values = np.zeros(len(system.pattern.indices))
+        for n, (row, column, at) in enumerate(self._spun):
+            R, block = np.array(self.matrix(n, x)), np.zeros((6, 6))
+            J = self.turns.moment[n] * R @ np.linalg.inv(self.turns.mobility[n]) @ R.T
+            block[:3, :3] = 2.0 * cross_matrix((0.5 * np.trace(J) * np.eye(3) - J) @ speed)
+            values[at] = block[row, column]
+        return values

@@ -1,0 +1,130 @@
+"""Modes of free bodies on ropes beside closed forms: sway, bifilar torsion, bounce, pendulum, librations."""
+
+import numpy as np
+
+import refweb
+from refweb.studies.turning import coriolis
+from refweb.system.static_system import at_rest
+
+G, LENGTH, ALONG, ACROSS, MASS, STIFFNESS = 9.81, 2.0, 0.5, 0.3, 50.0, 1e7
+INERTIA = [2.0, 5.0, 6.0]
+PLATE = {"name": "plate", "shape": "box", "size": [1.0, 0.6, 0.2], "mass": MASS, "inertia": INERTIA}
+
+
+def platform(position, **tables):
+    """A plate on four vertical ropes without mass, of a weight off their middle by its ``position``."""
+    corners = [[x * ALONG, y * ACROSS] for x in (-1, 1) for y in (-1, 1)]
+    points = [[*corner, z] for z in (LENGTH, 0.0) for corner in corners]
+    web = {"kind": "inline", "points": points, "lines": [[i, 4 + i] for i in range(4)], "supports": [0, 1, 2, 3]}
+    return refweb.Scene.from_dict(
+        {
+            "web": {**web, "natural_length": 4 * [LENGTH]},
+            "cable": {"law": "tension-only", "modulus": 1e11, "area": STIFFNESS / 1e11, "density": 0.0},
+            "gravity": {"acceleration": [0.0, 0.0, -G]},
+            "body": [{**PLATE, "position": position}],
+            "attach": [{"body": "plate", "node": [4, 5, 6, 7]}],
+            "solve": {"kind": "static"},
+            **tables,
+        }
+    )
+
+
+def test_a_plate_on_four_ropes():
+    """All six: sway √(g/l) twice, torsion of the bifilar kind √(m g r²/J l), bounce, and two rockings."""
+    found = refweb.modes(platform([0.0, 0.0, 0.0]), 10)
+    along = STIFFNESS / LENGTH  # k of a rope
+    length = LENGTH + MASS * G / 4 / along
+    torsion = MASS * G * (ALONG**2 + ACROSS**2) / (INERTIA[2] * length)
+    rocking = [4 * along * reach**2 / J for reach, J in zip((ACROSS, ALONG), INERTIA[:2], strict=True)]
+    squared = np.sort([G / length, G / length, torsion, 4 * along / MASS, *rocking])
+    np.testing.assert_allclose(found.frequency, np.sqrt(squared) / (2 * np.pi), rtol=1e-8)
+    assert len(found.frequency) == 6 and (found.error < 1e-8 * found.frequency).all()
+    assert not any("held" in text or "stiffness" in text for text in found.warnings)
+    shapes = found.shapes  # nodes that the plate carries go with it
+    np.testing.assert_allclose(np.linalg.norm(shapes[2, 4:], axis=1), 1.0, rtol=1e-9)
+    assert found.spectra[0].shares[2].sum() < 1e-9  # all of its energy is rotation
+
+
+def test_a_weight_off_the_middle_beside_the_tangent_by_differences():
+    """ω² of M, assembled by hand, and a stiffness that is all differences of energy, about the tilted equilibrium."""
+    rubber = {"law": "tension-only", "modulus": 1e8, "area": 1e-4, "density": 0.0}
+    scene = platform([0.2, 0.1, -0.3], cable=rubber)
+    found = refweb.modes(scene, 6)
+    system = at_rest(scene.build())
+    x, body = found.state.x, system.net.bodies[0]
+    size, h = len(system.free), 2e-4
+    K = np.zeros((size, size))
+    steps = [system.rows_of(e) for e in h * np.eye(size)]
+    for i in range(size):
+        for j in range(size):
+            ends = [
+                system.energy(1.0, system.moved(x, a * steps[i] + b * steps[j])) * a * b
+                for a in (-1, 1)
+                for b in (-1, 1)
+            ]
+            K[i, j] = sum(ends) / (4 * h * h)
+    axes = body.axes @ body.rotation(x).T
+    M = np.zeros((size, size))
+    M[:3, :3], M[3:, 3:] = MASS * np.eye(3), axes.T @ body.inertia @ axes
+    squared = np.sort(np.linalg.eigvals(np.linalg.solve(M, K)).real)
+    np.testing.assert_allclose((2 * np.pi * found.frequency) ** 2, squared, rtol=1e-5)  # h²
+
+
+def test_a_physical_pendulum():
+    """A box on one short rope: a double pendulum in either plane, and it spins at no cost."""
+    inertia, arm, length, mass = [0.5, 0.9, 0.7], 0.3, 0.4, 3.0
+    web = {"kind": "inline", "points": [[0, 0, length], [0, 0, 0]], "lines": [[0, 1]], "supports": [0]}
+    tables = {"web": {**web, "natural_length": [length]}, "attach": [{"body": "plate", "node": 1}]}
+    body = {**PLATE, "mass": mass, "inertia": inertia, "position": [0.0, 0.0, -arm]}
+    found = refweb.modes(platform([0, 0, 0], body=[body], **tables), 10)
+    long = length * (1 + mass * G / STIFFNESS)
+    expected = [np.sqrt(STIFFNESS / length / mass)]
+    for J in inertia[:2]:  # of the rope's angle and the box's
+        M = mass * np.array([[long**2, long * arm], [long * arm, arm**2 + J / mass]])
+        K = mass * G * np.diag([long, arm])
+        expected += np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K))).tolist()
+    np.testing.assert_allclose(found.frequency, np.sort(expected) / (2 * np.pi), rtol=1e-7)
+    assert any("1 directions have no stiffness" in text for text in found.warnings)
+    assert any('body "plate" can turn at no cost' in text for text in found.warnings)
+
+
+def test_librations_in_an_orbit():
+    """A body that ropes hold at its centre librates: pitch √3 n √((B−A)/C), roll and yaw of the linear equations."""
+    n, (A, B, C) = 0.8, (2.0, 6.0, 5.0)  # about x, away from the Earth, y, along the track, z, across
+    outer = [[2, 0, 0], [-1, 2, 0], [-1, -1, 2], [-1, -1, -2.0]]
+    web = {"kind": "inline", "points": [*outer, [0, 0, 0]], "lines": [[i, 4] for i in range(4)]}
+    lengths = [0.9 * float(np.linalg.norm(point)) for point in outer]
+    body = {**PLATE, "inertia": [A, B, C], "position": [0.0, 0.0, 0.0]}
+    scene = platform([0, 0, 0]).to_dict()
+    del scene["gravity"]
+    scene |= {"web": {**web, "natural_length": lengths, "supports": [0, 1, 2, 3]}, "orbit": {"mean_motion": n}}
+    scene |= {"body": [body], "attach": [{"body": "plate", "node": 4, "point": [0.0, 0.0, 0.0]}]}
+    found = refweb.modes(refweb.Scene.from_dict(scene), 3)
+    pitch = 3 * n * n * (B - A) / C
+    # With roll a about the track and yaw b about the vertical: Hughes, Spacecraft Attitude Dynamics, 1986, section 9.2.
+    K = n * n * np.diag([C - B, 4 * (C - A)])
+    gyro = n * (A + B - C) * np.array([[0.0, -1.0], [1.0, 0.0]])
+    inverse = np.diag([1 / A, 1 / B])
+    states = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ gyro]])
+    rates = np.linalg.eigvals(states)
+    assert (C - B) * (C - A) < 0  # one of them leaves
+    still = np.sort(abs(rates.imag[rates.imag > 1e-9]))
+    expected = np.sort([*still, np.sqrt(pitch)]) / (2 * np.pi)
+    positive = found.frequency[found.frequency > 0]
+    np.testing.assert_allclose(positive[: len(expected)], expected, rtol=1e-6)
+
+
+def test_gyroscopic_matrix_is_that_of_the_moments():
+    """−∂f/∂ω by the program of the frame, at a body that is turned; antisymmetric."""
+    scene = platform([0.2, 0.1, -0.3]).to_dict()
+    del scene["gravity"]
+    system = refweb.Scene.from_dict({**scene, "frame": {"angular_velocity": [0.3, -0.2, 0.5]}}).build()
+    rest, (body,) = at_rest(system), system.net.bodies
+    x = rest.moved(np.zeros((system.rows, 3)), rest.rows_of([0.1, 0.0, 0.2, 0.7, -0.4, 0.9]))
+    G_matrix, omega = coriolis(rest, x).toarray(), np.array([0.5, 0.6, -0.7])
+    np.testing.assert_allclose(G_matrix, -G_matrix.T, atol=1e-12)
+    axes = body.axes @ body.rotation(x).T
+    v = np.zeros_like(x)
+    v[body.row], v[body.spin] = [1.0, 2.0, 3.0], axes.T @ (body.inertia @ (axes @ omega)) / body.moment
+    felt = (system.force(1.0, x, v) - system.force(1.0, x)).ravel()[rest.free]
+    np.testing.assert_allclose(G_matrix @ [1.0, 2.0, 3.0, *omega], -felt, atol=1e-12)
