@@ -22,21 +22,19 @@ def at_rest(system):
         For a line that is broken.
     """
     refuse_broken(system.net)
-    if system.net.quasi_static and all(term.timing.at_rest for term in system.terms):
-        return system
     free = [body for body in system.net.bodies if not body.fixed]
-    if not free and all(term.timing.at_rest for term in system.terms):
+    if (system.net.quasi_static or not free) and all(term.timing.at_rest for term in system.terms):
         return system
     absent = waiting(system)
+    rows_held = [body.row for body in absent]
     _ = system.library  # both say what factorizes for either
     rest = copy.copy(system)
     for kept in ("pattern", "unsupported_parts", "mass", "links", "carriers"):
         rest.__dict__.pop(kept, None)
     rest.supported = system.supported.copy()
     rest.supported[system.rows - system.net.spins :] = True
-    rest.supported[[body.row for body in absent]] = True
-    resting = [body for body in free if body.turn is not None and body.row not in [b.row for b in absent]]
-    rest.supported[[body.spin for body in resting]] = False
+    rest.supported[rows_held] = True
+    rest.supported[[body.spin for body in free if body.turn is not None and body.row not in rows_held]] = False
     rest.angles, rest.terms = system.turning, []
     without = [row for body in absent for row in (body.row, body.spin, body.turn) if row is not None]
     for term in system.terms:

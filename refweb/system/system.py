@@ -433,9 +433,9 @@ class System:
     def dead(self):
         """True if the only internal forces are the tensions of the lines, and all others are dead loads.
 
-        Free bodies are none of this: what they carry is stiff, and turns.
+        Where bodies are free it is not so: what they carry turns with them.
         """
-        if any(not body.fixed for body in self.net.bodies) and self.resting:
+        if self.resting:
             return False
         outer = [f for f in self.terms if not f.balance.internal]
         inner = [f for f in self.terms if f.balance.internal]

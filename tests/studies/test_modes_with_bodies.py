@@ -128,3 +128,33 @@ def test_gyroscopic_matrix_is_that_of_the_moments():
     v[body.row], v[body.spin] = [1.0, 2.0, 3.0], axes.T @ (body.inertia @ (axes @ omega)) / body.moment
     felt = (system.force(1.0, x, v) - system.force(1.0, x)).ravel()[rest.free]
     np.testing.assert_allclose(G_matrix @ [1.0, 2.0, 3.0, *omega], -felt, atol=1e-12)
+
+
+def spinning(moments):
+    """A hub with four masses around on taut lines, that turns with its frame and that nothing supports."""
+    ends = [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
+    lines = [[0, 4], [1, 5], [2, 6], [3, 7], [4, 6], [6, 5], [5, 7], [7, 4]]
+    scene = platform([0, 0, 0]).to_dict()
+    del scene["gravity"]
+    hub = {**PLATE, "size": [0.2, 0.2, 0.1], "mass": 5.0, "inertia": moments, "position": [0.0, 0.0, 0.0]}
+    return refweb.Scene.from_dict(
+        {
+            **scene,
+            "web": {"kind": "inline", "points": [*(0.1 * np.array(ends)).tolist(), *ends], "lines": lines},
+            "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-6, "density": 1000.0},
+            "supports": {"nodes": []},
+            "frame": {"angular_velocity": [0.0, 0.0, 2.0]},
+            "point_mass": [{"node": [4, 5, 6, 7], "mass": 0.2}],
+            "body": [hub],
+            "attach": [{"body": "plate", "node": [0, 1, 2, 3]}],
+        }
+    )
+
+
+def test_a_hub_that_spins_with_its_web():
+    """A flat one is stable; a long one is held by Coriolis forces alone. Seen from outside it moves on straight."""
+    flat, long = (refweb.run(spinning(moments)) for moments in ([1.0, 1.0, 1.5], [1.5, 1.5, 0.5]))
+    assert flat.solver["smallest_pivot"] == 1 and long.solver["smallest_pivot"] == -1
+    assert any("Coriolis forces hold it" in text for text in long.warnings)
+    found = refweb.modes(spinning([1.0, 1.0, 1.5]), 6).frequency
+    np.testing.assert_allclose(found[np.argsort(abs(found - 1 / np.pi))[:3]], 1 / np.pi, rtol=1e-6)  # Ω/2π, thrice

@@ -60,6 +60,7 @@ CASES = {
         "isolated_cable",
         "lattice_green",
         "conic_programming",
+        "hanging_platform",
     ),
     "dynamics": (
         "transverse_impact",
