@@ -84,7 +84,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
                 refuse_broken(system.net)
     _check_bare(system)
     _check_carried(system, supported, solve)
-    _check_motions(system)
+    _check_motions(system, effects)
     if system.constraints:
         _check_links(solve)
     _check_start(solve, accuracy)
@@ -204,12 +204,16 @@ def _acting(effects):
     return acting
 
 
-def _check_motions(system):
-    """Refuse two motions of one node."""
+def _check_motions(system, effects):
+    """Refuse two motions of one node or body, and a body without mass that nothing moves."""
     driven = np.concatenate([d.cells[:, 0] for d in system.drives]) if system.drives else np.zeros(0, dtype=int)
     rows, times = np.unique(driven, return_counts=True)
     if (times > 1).any():
-        raise InputError(f"[[motion]] node = {rows[times > 1][0]} is moved by two tables: merge them")
+        raise InputError(f"[[motion]] {system.row_name(rows[times > 1][0])} is moved by two tables: merge them")
+    bodies = [effect for effect in effects if name_of(EFFECTS, effect) == "body"]
+    for number, (body, made) in enumerate(zip(bodies, system.net.bodies, strict=True), 1):
+        if made.moved and made.base not in rows:
+            raise InputError(f"[[body]] {number} {body.without_mass}")
 
 
 def _check_carried(system, supported, solve):

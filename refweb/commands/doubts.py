@@ -143,7 +143,7 @@ def _nearest(scene, system, body, x):
     if count < 2 or not moves > 0.0 or system.drives:
         return None
     acceleration = np.zeros(3)
-    if not body.fixed and system.fixed[:nodes].any():
+    if not body.prescribed and system.fixed[:nodes].any():
         acceleration = system.force(0.0, x, v)[body.row] / net.mass[body.row]
     start = net.points + x
     ends = net.web.lines

@@ -66,9 +66,9 @@ def remarks_on(start, system):
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)
         by = "[[motion]]" if system.drives and not system.carried[moved[0]] else "[[attach]]"
-        text = f"{by} has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
+        text = f"{by} has moved {system.row_name(moved[0])} at t = 0 already: the web starts with {stored:.4g} J"
         yield Finding("moved-at-start", text, by.strip("[]"))
-    off = np.linalg.norm(np.where(system.fixed, driven, 0.0)[: system.net.nodes], axis=1)
+    off = np.linalg.norm(np.where(system.fixed, driven, 0.0), axis=1)
     off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0
     if off.max() > OFF * np.ptp(system.net.points, axis=0).max():
         worst = int(off.argmax())

@@ -7,7 +7,7 @@ body's: the centre of mass of both moves by s, and the tensor of inertia about i
     J + M (|s|² 1 − s⊗s) + Σ m (|a|² 1 − a⊗a),
 
 M being the mass of the body alone; the row of the body is that of this centre. Nothing else changes in the equations,
-which have no multipliers. On a fixed body a node is a support.
+which have no multipliers. On a fixed body a node is a support. One that tables move has no mass, and its nodes none.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ class Attach(Table):
     """Nodes of the web tied to a body, which pull at it and go with it, and are free to turn there.
 
     Their mass is the body's, whose row is the centre of mass of all: position and velocity that are observed are those
-    of this. A sphere turns in space where it has nodes. Nodes on a fixed body are supports. The point may lie inside of
-    the body or outside; contact with the body is that of any line, and where there is any a line may not begin in the
-    core of the body. Drag of the body acts at the centre of mass.
+    of this; a body that ``[[motion]]`` moves has none, and its nodes neither. A sphere turns in space where it has
+    nodes. Nodes on a fixed body are supports. The point may lie inside of the body or outside; contact with the body is
+    that of any line, and where there is any a line may not begin in the core of the body. Drag of the body acts at the
+    centre of mass.
 
     Parameters
     ----------
@@ -96,7 +97,9 @@ class Attach(Table):
         carried, points = (*body.carried, *nodes_found.tolist()), np.vstack([body.points, points])
         bodies, mass, places = list(net.bodies), net.mass.copy(), net.points.copy()
         bodies[number] = replace(body, carried=carried, points=points)
-        if not body.fixed:
+        if body.moved:
+            bodies[number], mass[nodes_found] = replace(bodies[number], turns=True), 0.0
+        elif not body.fixed:
             shift, bodies[number] = _joined(bodies[number], mass[body.row], mass[nodes_found])
             mass[body.row] += mass[nodes_found].sum()
             mass[nodes_found] = 0.0

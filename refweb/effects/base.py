@@ -324,6 +324,8 @@ def without(columns):
 class PrescribedMotion:
     """Rows whose motion is prescribed; ``kernel`` (signature `FORCE`) writes their x and v at time t.
 
+    Between its times v is constant: steps of orders 4 and 6 rely on it. Of rows of rotation it is the angular velocity.
+
     Attributes
     ----------
     cells : ndarray of int32, shape (rows, 1)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from ..accepted import accepts, any_of, array, limits
 from ..errors import InputError
 from ..messages import quote
-from ..net.rigid_body import RigidBody, Shape, matrix_of
+from ..net.rigid_body import RigidBody, Shape, matrix_of, unit
 from ..registry import SHAPES, known, load
 from ..tables import (
     LARGEST,
@@ -83,9 +84,22 @@ def _quaternion(name, value):
     return quaternion
 
 
+def _axle_table():
+    from .axle import BodyAxle
+
+    return BodyAxle
+
+
+@accepts(_axle_table)
+def _axle(name, value):
+    """Read the table of an axle."""
+    kind = _axle_table()
+    return value if isinstance(value, kind) else kind.read(name, value)
+
+
 @dataclass(frozen=True, kw_only=True, init=False)
 class Body(Table):
-    """A rigid body, free or fixed; its shape has keys of its own.
+    """A rigid body, free, fixed, on an axle or moved by ``[[motion]]``; its shape has keys of its own.
 
     A free body moves and turns in space, but for a ring, which keeps its plane and turns about its normal only. A ring
     is a rigid circle that touches the web as the disc inside it would, at any distance from its plane: how deep a point
@@ -136,7 +150,7 @@ class Body(Table):
         In place of ``axes`` or ``axis``: the quaternion (w, x, y, z), of any length but 0, of the rotation that takes
         x, y and z to the body's axes.
     mass : float, optional
-        Mass [kg], > 0; it or the density is needed unless the body is fixed.
+        Mass [kg], > 0; it or the density is needed unless the body is fixed, or moved by ``[[motion]]``.
     density : float, optional
         Density [kg/m³] of a body that is solid, > 0, in place of the mass.
     position : sequence of 3 float
@@ -151,6 +165,9 @@ class Body(Table):
         them; of a ring that about its normal. By default that of a uniform solid, and of a thin ring m r².
     fixed : bool
         Whether it does not move.
+    axle : BodyAxle, optional
+        Axle that it turns about, ``{ point = ..., direction = ..., torque = ... }``, freely or by ``[[motion]]``. Its
+        place and its rotation follow from the angle alone.
 
     Raises
     ------
@@ -159,8 +176,9 @@ class Body(Table):
         axes that are zero or not at right angles, or that are given twice, an orientation that is zero, a rounding
         above half the smallest size, an inertia that no body has (not symmetric, not positive definite, or one
         principal moment above the sum of the others), and a name that is no file name; for a free body without mass, a
-        fixed one that moves, and a ring that turns about another axis than its normal; from ``extend``, for a name that
-        is listed twice, and a velocity in statics.
+        fixed one that moves, and a ring that turns about another axis than its normal; for an axle of a fixed body or a
+        ring, and a velocity that it does not allow; from ``extend``, for a name that is listed twice, and in
+        statics a velocity and an axle that nothing turns.
 
     Examples
     --------
@@ -185,6 +203,7 @@ class Body(Table):
     angular_velocity: Several = vector(default=(0.0, 0.0, 0.0), unit="rad/s")
     inertia: Several = field(_inertia, default=None, unit="kg m²")
     fixed: bool = boolean(default=False)
+    axle: Any = field(_axle, default=None)
 
     def __init__(self, **given):
         form = given.pop("form", None)  # of the body that this one is a copy of
@@ -224,7 +243,7 @@ class Body(Table):
     def check(self):
         """Refuse half a shape, a free body without mass, a fixed one that moves, a name that is no file name."""
         object.__setattr__(self, "form", self._form())
-        if not self.fixed and not self.form.free:
+        if not self.fixed and not self.form.free and not self.moved:
             free = [shape for shape, reference in SHAPES.items() if load(reference).free]
             raise InputError(
                 f'fixed = false: shape = "{self.shape}" must have fixed = true; '
@@ -234,10 +253,8 @@ class Body(Table):
             raise InputError(f"mass = {self.mass:g} and density = {self.density:g} exclude each other")
         if self.density is not None:
             self.form.volume()  # which a ring has not
-        if not self.fixed and self.mass is None and self.density is None:
-            raise InputError(
-                "mass is missing: a free body needs mass = ... [kg] or density = ... [kg/m³]; fixed = true holds it"
-            )
+        if self.moved and (any(self.velocity) or any(self.angular_velocity)):
+            raise InputError(self.without_mass)
         self._refuse_tensor()
         for key in ("velocity", "angular_velocity"):
             if self.fixed and any(getattr(self, key)):
@@ -245,6 +262,38 @@ class Body(Table):
         if not self.name.replace("-", "").replace("_", "").isalnum() or self.name.lower() == "web":
             raise InputError(f'name = "{self.name}" must be letters, digits, - and _, and not "web": it names files')
         self.form.refuse_turning(self.angular_velocity)
+        if self.axle:
+            self._refuse_axle()
+
+    @property
+    def moved(self):
+        """True if it is not fixed and has no mass: then ``[[motion]]`` has to move it."""
+        return not self.fixed and self.mass is None and self.density is None
+
+    @property
+    def without_mass(self):
+        """Reason for which it is refused without mass where nothing moves it."""
+        return (
+            "mass is missing: a free body needs mass = ... [kg] or density = ... [kg/m³]; fixed = true holds it, and "
+            f"[[motion]] body = {quote(self.name)} moves it"
+        )
+
+    def _refuse_axle(self):
+        """Refuse an axle of what cannot turn, and velocities that it does not allow."""
+        if self.fixed or self.form.planar:
+            reason = "where fixed = true" if self.fixed else f'for shape = "{self.shape}", which keeps its plane'
+            raise InputError(f"axle = {quote(self.axle.to_dict())} has no meaning {reason}: leave it out")
+        if any(self.velocity):
+            raise InputError(
+                f"velocity = {list(self.velocity)} must be zero with axle: a body on an axle only turns; give "
+                "angular_velocity along its direction"
+            )
+        direction, omega = unit("direction", self.axle.direction), np.array(self.angular_velocity)
+        if np.linalg.norm(np.cross(direction, omega)) > EVEN * np.linalg.norm(omega):
+            raise InputError(
+                f"angular_velocity = {list(self.angular_velocity)} must be along axle.direction = "
+                f"{list(self.axle.direction)}: give a multiple of it"
+            )
 
     def _refuse_tensor(self):
         """Refuse axes that are given twice or not at all, and more than one moment of inertia of a ring."""
@@ -274,6 +323,11 @@ class Body(Table):
         for key in ("velocity", "angular_velocity"):
             if net.quasi_static and any(getattr(self, key)):
                 raise InputError(f"{key} = {list(getattr(self, key))} has no meaning in statics: leave it out")
+        if self.axle and not self.moved and net.quasi_static:
+            raise InputError(
+                f"axle = {quote(self.axle.to_dict())} of a body that turns freely cannot be used in statics: leave out "
+                "its mass and give [[motion]] rotation = ..., or fixed = true in place of axle"
+            )
         self.form.settle()
         mass = self.mass or (self.density * self.form.volume() if self.density else 0.0)
         body = RigidBody(
@@ -285,17 +339,20 @@ class Body(Table):
             axes=self.form.frame() if self.orientation is None else matrix_of(self.orientation).T,
             inertia=self._tensor(mass),
             angular_velocity=self.angular_velocity,
+            moved=self.moved,
+            axle=self.axle and self.axle.at(self.position),
         )
+        turns = not body.moved and body.tumbles
         return replace(
             net,
             points=np.vstack([net.points, self.position]),
             mass=np.append(net.mass, mass),
-            bodies=(*net.bodies, replace(body, turns=body.tumbles or any(self.angular_velocity))),
+            bodies=(*net.bodies, replace(body, turns=turns or any(self.angular_velocity))),
         )
 
     def _tensor(self, mass):
-        """Tensor of inertia of a free body; zero of a fixed one."""
-        if self.fixed:
+        """Tensor of inertia of a free body; zero of one that is fixed or moved."""
+        if self.fixed or self.moved:
             return np.zeros((3, 3))
         if self.inertia is None:
             return self.form.inertia(mass)

@@ -39,7 +39,7 @@ def no_impulse(t, x, cells, data, total):
 def rotation_terms(net, rate, drag, damping, bound):
     """Terms of the rotation of free bodies at a rate [1/s]; ``drag`` and the others are the kernels of places."""
     spinning = [body for body in net.bodies if body.spin is not None and body.turn is None]
-    turning = [body for body in net.bodies if body.turn is not None]
+    turning = [body for body in net.bodies if body.turn is not None and not body.moved]
     shared: dict = dict(
         name="damping",
         velocity=VelocityForce(damping, bound),
@@ -52,6 +52,9 @@ def rotation_terms(net, rate, drag, damping, bound):
         terms.append(ForceTerm(cells=column(rows), data=rate * net.mass[rows, None], force=drag, **shared))
     if turning:
         cells = np.array([(body.spin, body.turn) for body in turning], dtype=np.int32)
-        data = [[rate * b.moment, *(b.axes.T @ b.mobility @ b.axes).ravel()] for b in turning]
+        data = [
+            [rate * (b.moment - b.mass * float(b.arm @ b.arm)), *(b.axes.T @ b.mobility @ b.axes).ravel()]
+            for b in turning
+        ]
         terms.append(ForceTerm(cells=cells, data=np.array(data), force=fade, **shared))
     return terms

@@ -224,7 +224,7 @@ class Damping(Table):
 
     def on(self, net):
         """The terms of all lines, whose tension is that with damping, of all nodes with mass, and of free bodies."""
-        terms, free = [], [body.row for body in net.bodies if not body.fixed]
+        terms, free = [], [body.row for body in net.bodies if not body.prescribed]
         if self.bodies and not free:
             raise InputError(f"bodies = {self.bodies:g} [1/s]: the scene has no free [[body]], leave it out")
         if self.time:

@@ -167,7 +167,7 @@ def damping_bound(reach, speed, x, mass, rates, cells, data):
 def force_terms(net, speed, pull, arguments):
     """The terms of all bodies that turn in space, see `refweb.effects.turning_axes.force_terms`."""
     turns = RigidRotations.of(net)
-    tensors = [turns.moment[n] * np.linalg.inv(mobility) for n, mobility in enumerate(turns.mobility)]
+    tensors = [body.axes.T @ body.inertia @ body.axes for body in net.bodies if body.turn is not None]
     spreads = [0.5 * np.trace(tensor) * np.eye(3) - tensor for tensor in tensors]
     largest = [
         np.linalg.eigvalsh(spread)[-1] * np.linalg.eigvalsh(mobility)[-1]

@@ -132,8 +132,9 @@ class Net:
 
     @property
     def carried(self):
-        """Nodes that free bodies carry, a list."""
-        return [node for body in self.bodies if not body.fixed for node in body.carried]
+        """Rows that bodies carry which are not fixed, a list: their nodes, and their own where it is off an axle."""
+        off_axle = [body.row for body in self.bodies if body.pivot is not None]
+        return off_axle + [node for body in self.bodies if not body.fixed for node in body.carried]
 
     @property
     def order(self):

@@ -178,6 +178,33 @@ class Shape(Table):
         return self.grown().radius * normals + self.farthest(normals), triangles
 
 
+ON_AXLE = 1e-12
+"""Share of coordinates below which the distance of a body from its axle is rounding."""
+
+
+class Axle(NamedTuple):
+    """Line that a body turns about.
+
+    Attributes
+    ----------
+    point : ndarray, shape (3,)
+        A point on it [m].
+    direction : ndarray, shape (3,)
+        Unit vector along it.
+    torque : tuple of (t, torque)
+        Torque about it over time [N m], linear in between, end values held; empty for none.
+    """
+
+    point: np.ndarray
+    direction: np.ndarray
+    torque: tuple = ()
+
+    def arm(self, position):
+        """Vector from the nearest point of the axle to a position [m], shape (3,)."""
+        away = position - self.point
+        return away - (away @ self.direction) * self.direction
+
+
 @dataclass(frozen=True)
 class RigidBody:
     """A body of a net.
@@ -194,6 +221,10 @@ class RigidBody:
         Initial velocity [m/s].
     fixed : bool
         Whether it does not move.
+    moved : bool
+        Whether it moves as tables say.
+    axle : Axle, optional
+        The axle that it turns about.
     axes : ndarray, shape (3, 3)
         Unit vectors of its axes at the start.
     inertia : ndarray, shape (3, 3)
@@ -212,6 +243,12 @@ class RigidBody:
         Where it does, along its axes from its row [m].
     offset : ndarray, shape (3,)
         Centre of its shape, along its axes from its row [m]: that is the centre of mass of all.
+    pivot : int, optional
+        Row of the point of the axle that its row turns about, where that does not lie on the axle itself.
+    arm : ndarray, shape (3,)
+        Vector from there to its row at the start [m]; 0 without one.
+    mass : float
+        Its mass [kg], where it turns about an axle.
     """
 
     name: str
@@ -228,6 +265,21 @@ class RigidBody:
     carried: tuple = ()
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)), compare=False)
     offset: np.ndarray = field(default_factory=lambda: np.zeros(3), compare=False)
+    moved: bool = False
+    axle: Axle | None = field(default=None, compare=False)
+    pivot: int | None = None
+    arm: np.ndarray = field(default_factory=lambda: np.zeros(3), compare=False)
+    mass: float = 0.0
+
+    @property
+    def prescribed(self):
+        """True if nothing that acts on it moves it: it is fixed, or moves as tables say."""
+        return self.fixed or self.moved
+
+    @property
+    def base(self):
+        """Row that its rotation is about: its own, or that of a point of its axle."""
+        return self.row if self.pivot is None else self.pivot
 
     @property
     def radius(self):
@@ -253,28 +305,51 @@ class RigidBody:
     def tumbles(self):
         """True if its orientation counts: a free body that is no ring, nor a sphere with one moment of inertia.
 
-        Of a body that carries nodes it does.
+        Of a body that carries nodes it does, and of one that tables move or that turns about an axle.
         """
+        if self.moved or self.axle:
+            return True
         spherical = (self.inertia == self.inertia[0, 0] * np.eye(3)).all()
         return not (self.fixed or self.shape.planar or self.shape.once and spherical and not self.carried)
 
     @property
     def moment(self):
-        """Moment of inertia that stands in place of mass [kg m²]: the largest, or that of a ring about its normal."""
+        """Moment of inertia that stands in place of mass [kg m²]: the largest, or that of a ring about its normal.
+
+        About an axle it is that, and without a meaning where tables move the body.
+        """
+        if self.moved:
+            return 1.0
+        if self.axle:
+            return self.moment_about_centre + self.mass * float(self.arm @ self.arm)
         if self.tumbles:
             return float(np.linalg.eigvalsh(self.inertia)[-1])
         return float(self.inertia[2, 2])
 
     @property
+    def moment_about_centre(self):
+        """Moment of inertia about the direction of the axle through the row [kg m²]."""
+        direction = self.axes @ self.axle.direction
+        return float(direction @ self.inertia @ direction)
+
+    @property
     def mobility(self):
-        """Moment of inertia times the inverse of the inertia tensor, along its axes, shape (3, 3)."""
+        """Moment of inertia times the inverse of the inertia tensor, along its axes, shape (3, 3).
+
+        About an axle it turns whatever moment acts: the part along the axle counts.
+        """
+        if self.moved:
+            return np.eye(3)
+        if self.axle:
+            direction = self.axes @ self.axle.direction
+            return np.outer(direction, direction)
         tensor = self.moment * np.linalg.inv(self.inertia)
         return 0.5 * (tensor + tensor.T)
 
     @property
     def start_spin(self):
         """Velocity of its row of rotation at the start [rad/s], see `refweb.net.rotation`; a tuple or an ndarray."""
-        if not self.tumbles:
+        if not self.tumbles or self.axle:
             return self.angular_velocity
         return self.axes.T @ (self.inertia @ (self.axes @ self.angular_velocity)) / self.moment
 
@@ -302,20 +377,22 @@ class RigidBody:
 
 
 def row_names(bodies):
-    """Names of the rows behind those of the nodes: of bodies, and of their rotations, with a dot."""
+    """Names of the rows behind those of the nodes: of bodies, of points of axles, and of rotations, with a dot."""
     rows = ([f"{b.name}.spin", f"{b.name}.turn"][: 1 + (b.turn is not None)] for b in bodies if b.spin is not None)
-    return [body.name for body in bodies] + [name for names in rows for name in names]
+    pivots = [f"{body.name}.axle" for body in bodies if body.pivot is not None]
+    return [body.name for body in bodies] + pivots + [name for names in rows for name in names]
 
 
 def with_rotations(net):
     """The net with the rows of rotation of its bodies behind all others."""
     if net.spins or not any(body.turns for body in net.bodies):
         return net
+    net = _with_pivots(net)
     bodies, mass = [], []
     for body in net.bodies:
         if body.turns:
             at, count = len(net.points) + len(mass), 1 + body.tumbles
-            mass += count * [body.moment]
+            mass += count * [0.0 if body.moved else body.moment]
             body = replace(body, spin=at, turn=at + 1 if body.tumbles else None)
         bodies.append(body)
     return replace(
@@ -325,6 +402,23 @@ def with_rotations(net):
         bodies=tuple(bodies),
         spins=len(mass),
     )
+
+
+def _with_pivots(net):
+    """The net with a row for the point of each axle that the row of its body turns about."""
+    bodies, pivots = [], []
+    for body in net.bodies:
+        if body.axle:
+            arm = body.axle.arm(net.points[body.row])
+            body = replace(body, mass=float(net.mass[body.row]))
+            if np.abs(arm).max() > ON_AXLE * np.abs([net.points[body.row], body.axle.point]).max():
+                body = replace(body, pivot=len(net.points) + len(pivots), arm=arm)
+                pivots.append(net.points[body.row] - arm)
+        bodies.append(body)
+    if not pivots:
+        return replace(net, bodies=tuple(bodies))
+    points, mass = np.vstack([net.points, pivots]), np.append(net.mass, np.zeros(len(pivots)))
+    return replace(net, points=points, mass=mass, bodies=tuple(bodies))
 
 
 def of_size_one(vector):

@@ -14,7 +14,9 @@ that steps of `TURN` converge as 0.16ⁿ. That is the flow of the kinetic energy
 closed form of van Zon and Schofield [1]_ is, in splittings of any order, and takes no Jacobi functions nor cases.
 
 A body may carry nodes of the web, see `refweb.effects.attach`: they are where it takes them, and what acts on them acts
-on it.
+on it. One that turns about an axle has W = n⊗n of its direction n, and I about it: so moments across it turn nothing.
+Where its centre of mass is off the axle, its row is carried as nodes are, by a row of the axle that stays, and kinetic
+energy has what it adds to I once. The second row of rotation has the angle about the axle as its second component.
 
 References
 ----------
@@ -104,7 +106,7 @@ class RigidRotations(Record):
     rows : ndarray of int, shape (bodies, 3)
         Row of the place of each, and its two rows of rotation.
     moment : ndarray, shape (bodies,)
-        I [kg m²].
+        I [kg m²]; 0 of those that tables move.
     mobility : ndarray, shape (bodies, 3, 3)
         W, along the axes of space at the start.
     principal : ndarray, shape (bodies, 3, 3)
@@ -125,6 +127,10 @@ class RigidRotations(Record):
         Their displacements at the start [m], 0 where the body takes them where the web has them.
     scales : ndarray, shape (carried, 3)
         What makes rates of the nodes those of the body, see `carry_rates`.
+    axles : ndarray, shape (bodies, 3)
+        Unit vectors along axles, 0 of bodies that have none.
+    doubled : ndarray, shape (bodies,)
+        Part of the moments of inertia that rows off axles have by their mass [kg m²].
     """
 
     rows: IntegerMatrix
@@ -139,6 +145,8 @@ class RigidRotations(Record):
     arms: Matrix
     ahead: Matrix
     scales: Matrix
+    axles: Matrix
+    doubled: Vector
 
     @classmethod
     def of(cls, net):
@@ -148,12 +156,12 @@ class RigidRotations(Record):
         mobility = np.array([b.axes.T @ b.mobility @ b.axes for b in bodies]).reshape(count, 3, 3)
         faster, principal = np.linalg.eigh(mobility)
         principal = np.ascontiguousarray(principal.swapaxes(1, 2))
-        carried = [(node, n) for n, body in enumerate(bodies) for node in body.carried]
-        arms = np.array([arm for b in bodies for arm in b.points @ b.axes]).reshape(-1, 3)
-        ahead = [net.points[bodies[n].row] - net.points[node] for node, n in carried]
+        carried = [(row, n) for n, body in enumerate(bodies) for row in _carried_rows(body)]
+        arms = np.array([arm for body in bodies for arm in _arms(body)]).reshape(-1, 3)
+        ahead = [net.points[bodies[n].base] - net.points[row] for row, n in carried]
         return cls(
-            rows=np.array([(b.row, b.spin, b.turn) for b in bodies], dtype=np.int64).reshape(count, 3),
-            moment=np.array([b.moment for b in bodies], dtype=float),
+            rows=np.array([(b.base, b.spin, b.turn) for b in bodies], dtype=np.int64).reshape(count, 3),
+            moment=np.array([0.0 if b.moved else b.moment for b in bodies], dtype=float),
             mobility=mobility,
             principal=principal,
             faster=faster,
@@ -164,14 +172,28 @@ class RigidRotations(Record):
             arms=arms,
             ahead=_exact(np.array(ahead).reshape(-1, 3), arms),
             scales=np.array([row for body in bodies for row in _scales(body, net)]).reshape(-1, 3),
+            axles=np.array([b.axle.direction if b.axle else np.zeros(3) for b in bodies]).reshape(count, 3),
+            doubled=np.array([b.mass * (b.arm @ b.arm) for b in bodies], dtype=float),
         )
 
 
+def _carried_rows(body):
+    """Rows that a body carries: its own, where it is off the axle, and those of nodes."""
+    return ([] if body.pivot is None else [body.row]) + list(body.carried)
+
+
+def _arms(body):
+    """Vectors at the start from where it turns about to what a body carries [m], shape (carried, 3)."""
+    nodes = body.arm + body.points @ body.axes
+    return nodes if body.pivot is None else np.vstack([body.arm, nodes])
+
+
 def _reach(body, axes):
-    """Largest distance of a point of a body from each of some axes through its row, at most [m]: of the box around."""
+    """Largest distance of a point of a body from each of some axes that it turns about, at most [m]: of the box."""
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-    corners = (signs * (np.array(body.core) + body.radius) + body.offset) @ body.axes
-    return np.minimum(np.linalg.norm(np.cross(corners[:, None], axes), axis=2).max(axis=0), body.extent)
+    corners = body.arm + (signs * (np.array(body.core) + body.radius) + body.offset) @ body.axes
+    largest = body.extent + np.linalg.norm(body.arm)
+    return np.minimum(np.linalg.norm(np.cross(corners[:, None], axes), axis=2).max(axis=0), largest)
 
 
 def _exact(a, b):
@@ -182,16 +204,17 @@ def _exact(a, b):
 
 def _scales(body, net):
     """Scales that turn rates of attached nodes into rates of the body, see `carry_rates`; shape (carried, 3)."""
-    if not body.carried:
+    points = _arms(body) @ body.axes.T
+    if not len(points):
         return np.zeros((0, 3))
     size, axes = np.linalg.eigh(body.mobility)
-    root = axes * np.sqrt(size) @ axes.T
-    across = [np.cross(np.eye(3), point) @ root for point in body.points]
-    pulls = [[root @ (p[k] * np.eye(3) - np.outer(p, np.eye(3)[k])) @ root for k in range(3)] for p in body.points]
+    root = axes * np.sqrt(np.maximum(size, 0.0)) @ axes.T
+    across = [np.cross(np.eye(3), point) @ root for point in points]
+    pulls = [[root @ (p[k] * np.eye(3) - np.outer(p, np.eye(3)[k])) @ root for k in range(3)] for p in points]
     lever = np.linalg.norm(across, 2, axis=(1, 2))
     light, own_mass = net.mass[net.heavy].min(), net.mass[body.row]
     angle = min(0.5 / max(float(lever.max()), 1e-300), math.sqrt(light / body.moment))
-    factor = min(0.5, math.sqrt(light / own_mass))
+    factor = min(0.5, math.sqrt(light / own_mass)) if own_mass > 0.0 else 0.5
     pull = np.linalg.norm(np.linalg.norm(pulls, 2, axis=(2, 3)), axis=1)
     return np.column_stack([np.full(len(lever), 1.0 / factor), lever / angle, pull])
 
@@ -218,7 +241,7 @@ def more_kinetic(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
     for n in range(turns.moment.size):
         s, omega = turns.rows[n, 1], angular_velocity(n, x, v, turns)
         for k in range(3):
-            total += 0.5 * turns.moment[n] * v[s, k] * (omega[k] - v[s, k])
+            total += 0.5 * turns.moment[n] * v[s, k] * (omega[k] - v[s, k]) - 0.5 * turns.doubled[n] * omega[k] ** 2
     return total
 
 
@@ -313,9 +336,22 @@ def advance_rotation(h: float, v: Matrix, x: Matrix, turns: RigidRotations) -> N
         for _ in range(parts):
             series(h / parts, n, v, turns, q)
         x[turns.rows[n, 2], 0] = q[0] - 1.0
+        rate = take_along_axle(n, v, turns)
+        x[turns.rows[n, 2], 1] += h * rate
         for k in range(3):
             x[s, k] = q[1 + k]
     update_attached_nodes(x, v, turns)
+
+
+@kernel(leaf=True)
+def take_along_axle(n, v, turns):
+    """Leave the rotation about the axle of a body in its velocity; that about it [rad/s], 0 without an axle."""
+    s, e = turns.rows[n, 1], turns.axles[n]
+    rate = e[0] * v[s, 0] + e[1] * v[s, 1] + e[2] * v[s, 2]
+    if e[0] != 0.0 or e[1] != 0.0 or e[2] != 0.0:
+        for k in range(3):
+            v[s, k] = rate * e[k]
+    return rate
 
 
 @kernel(apart=("turning", "looks"))
@@ -336,7 +372,9 @@ def turns_within(
         d0 = quaternion_rate(*first, angular_velocity(n, old[0], old[1], turns))
         d1 = quaternion_rate(*last, angular_velocity(n, x, v, turns))
         state[t, 0] = first[0] - 1.0 + blend * (last[0] - first[0]) + rate0 * d0[0] + rate1 * d1[0]
+        state[t, 1] = old[0, t, 1] + blend * (x[t, 1] - old[0, t, 1])
         for k in range(3):
+            state[t, 1] += turns.axles[n, k] * (rate0 * old[1, p, k] + rate1 * v[p, k])
             state[p, k] = first[1 + k] + blend * (last[1 + k] - first[1 + k]) + rate0 * d0[1 + k] + rate1 * d1[1 + k]
     update_attached_nodes(state, speed, turns)
 

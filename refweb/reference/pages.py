@@ -177,8 +177,8 @@ def takes(schema):
         return f"{maximum} {item_text}s" if maximum else f"[{item_text}, ...]"
     if kind == "object":
         value_schema = schema["additionalProperties"]
-        if value_schema is True:
-            return "{" + ", ".join([*schema["properties"], "..."]) + "}"
+        if isinstance(value_schema, bool):
+            return "{" + ", ".join([*schema["properties"], *(["..."] if value_schema else [])]) + "}"
         return "tables by name" if "properties" in value_schema else f"{{name = {takes(value_schema)}}}"
     return {"boolean": "true, false", "string": "text"}.get(kind, "value")
 
@@ -234,6 +234,7 @@ def _part(name):
 def _body(name):
     kind = load(EFFECTS[name])
     yield _page(name, header_of(name), kind, without=["form"])
+    yield _page(f"{name}.axle", "[body.axle]", load("refweb.effects.axle:BodyAxle"))
     for shape, reference in SHAPES.items():
         yield _page(f"body.{shape}", f'[[body]] shape = "{shape}"', load(reference))
 

@@ -168,6 +168,7 @@ def collapse_remark(state):
         return
     moved, points = np.linalg.norm(state.x[: net.nodes], axis=1), net.points[: net.nodes]
     driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(int)
+    driven = driven[driven < net.nodes]
     far, size = float(moved.max() - moved[driven].max(initial=0.0)), float(np.linalg.norm(np.ptp(points, axis=0)))
     if far > size and state.strain.max() < 1.0:
         yield Finding(

@@ -96,7 +96,7 @@ class Carried:
         """Find where entries stand in the pattern of a system, which has `cells`."""
         if self._spun is not None:
             return
-        number = np.full(3 * max(3 + self.turns.rows.max(), 1 + free.max() // 3), -1)
+        number = np.full(3 * max(3 + self.turns.rows.max(), 1 + free.max(initial=0) // 3), -1)
         number[free] = np.arange(len(free))
         keys = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr)) * np.int64(pattern.size) + pattern.indices
         self._spun = [_entries(rows[1:].tolist(), pattern.size, number, keys) for rows in self.turns.rows]

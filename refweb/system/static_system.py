@@ -16,13 +16,15 @@ NEAR = 1e-6
 def at_rest(system):
     """A copy in which what needs velocity is left out and `waiting` bodies are held and feel nothing; or the system.
 
+    Bodies that tables move are where these have them.
+
     Raises
     ------
     InputError
         For a line that is broken.
     """
     refuse_broken(system.net)
-    free = [body for body in system.net.bodies if not body.fixed]
+    free = [body for body in system.net.bodies if not body.prescribed]
     if (system.net.quasi_static or not free) and all(term.timing.at_rest for term in system.terms):
         return system
     absent = waiting(system)
@@ -52,12 +54,17 @@ def at_rest(system):
 def waiting(system):
     """Free bodies that take no part in an equilibrium that dynamics starts from, a list.
 
-    Those that move at the start, and those at rest that carry no nodes and touch nothing; in statics none.
+    Those that move at the start or turn about an axle, and those at rest that carry no nodes and touch nothing; in
+    statics none.
     """
     if system.net.quasi_static:
         return []
-    free = [body for body in system.net.bodies if not body.fixed]
-    return [b for b in free if any(b.velocity) or any(b.angular_velocity) or not (b.carried or _touches(system, b))]
+    free = [body for body in system.net.bodies if not body.prescribed]
+    return [
+        b
+        for b in free
+        if b.axle or any(b.velocity) or any(b.angular_velocity) or not (b.carried or _touches(system, b))
+    ]
 
 
 def _touches(system, body):

@@ -76,6 +76,10 @@ class System:
             if hasattr(effect, "on"):
                 part = effect.on(net)
                 acting += part if isinstance(part, list) else [part]
+        if any(body.axle and body.axle.torque for body in net.bodies):
+            from ..effects.axle import torques
+
+            acting += torques(net)
         self.terms = [a for a in acting if isinstance(a, ForceTerm)]
         self.drives = [a for a in acting if isinstance(a, PrescribedMotion)]
         self.constraints = [a for a in acting if isinstance(a, Constraint)]
@@ -84,7 +88,7 @@ class System:
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
         self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
         for body in net.bodies:
-            self.supported[body.row] = body.fixed
+            self.supported[body.row] = self.supported[body.base] = body.fixed or bool(body.axle)
         for drive in self.drives:
             self.supported[drive.cells[:, 0]] = True
         self.angles = net.quasi_static and self.turning
@@ -113,8 +117,10 @@ class System:
 
     @property
     def fixed(self):
-        """Components that supports hold, or prescribed motion, shape (rows, 3)."""
-        return self.supported & ~self.carried[:, None]
+        """Components of places that supports hold, axles, or prescribed motion, shape (rows, 3)."""
+        fixed = self.supported & ~self.carried[:, None]
+        fixed[self.rows - self.net.spins :] = False
+        return fixed
 
     @property
     def factorized_by(self):
@@ -413,7 +419,8 @@ class System:
     @property
     def symmetric(self):
         """True if K and C are symmetric."""
-        return all(map(self.is_symmetric, self.terms)) and (self.angles or not self.carried.any())
+        felt = any(body.pivot is not None or body.carried for body in self.net.bodies if not body.prescribed)
+        return all(map(self.is_symmetric, self.terms)) and (self.angles or not felt)
 
     def is_symmetric(self, term):
         """Tell if what a term has of K is symmetric: by rotation vectors all that a potential has is."""

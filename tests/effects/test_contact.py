@@ -754,7 +754,7 @@ REFUSED = [
     (dict(FIXED, shape="box", size=[1, 1, 1], axes=[[1, 0, 0]]), "axes = .* must be two vectors, not 1"),
     (dict(FIXED, shape="box", size=[1, -1, 1]), r"size = \[1.0, -1.0, 1.0\] must be > 0 \[m\]"),
     (dict(FIXED, shape="box", size=[1, 1, 1], rounding=0.6), r"rounding = 0.6 must be ≤ 0.5 \[m\]"),
-    (dict(BALL, mass=None), "mass is missing: a free body needs mass"),
+    (dict(BALL, mass=None, velocity=(0, 0, 1)), "mass is missing: a free body needs mass"),
     (dict(FIXED, radius=0.1, angular_velocity=[0, 0, 1]), "angular_velocity = .* must be zero where fixed = true"),
     (dict(BALL, shape="ring", normal=[0, 0, 1], angular_velocity=[0, 1, 1]), "must be along the normal of the ring"),
 ]

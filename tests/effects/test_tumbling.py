@@ -338,7 +338,10 @@ def test_both_faces_of_observables_agree():
 
 BOX = dict(name="it", shape="box", size=[1, 2, 3], mass=1.0, position=[0, 0, 0])
 REFUSED = [
-    (dict(BOX, mass=None), r"mass is missing: a free body needs mass = ... \[kg\] or density = ..."),
+    (
+        dict(BOX, mass=None, velocity=[1, 0, 0]),
+        r"mass is missing: a free body needs mass = ... \[kg\] or density = ...",
+    ),
     (dict(BOX, density=2.0), "mass = 1 and density = 2 exclude each other"),
     (dict(BOX, inertia=0.0), r"inertia = 0.0 must be > 0 \[kg m²\]"),
     (dict(BOX, inertia=[1, 2]), r"inertia = \[1, 2\] must be a number, three, or 3 rows of 3"),

@@ -78,7 +78,6 @@ PULL = 1e7 * 1e-4 * 0.01
 
 
 HOLDING = [(None, True), *((method, fixed) for method in METHODS for fixed in (True, False))]
-HOLDING.remove(("order 4", True))  # it takes nothing that is moved, as a node on a fixed body is
 
 
 @pytest.mark.parametrize("method, fixed", HOLDING)

@@ -61,7 +61,6 @@ UP = (0.0, 0.0, 1.0)
 CARRIED_OFF = dict.fromkeys(STATIC, "no equilibrium: a mechanism of 12 nodes")
 MASSLESS = dict.fromkeys(("central-difference", "explicit", "cvode"), "has no mass, which")
 ADRIFT = {**MASSLESS, "ida": "it has no mass, and no tension holds it"}
-MOVED = {"explicit": "takes nothing that is moved"}
 
 
 def not_explicit(effect):
@@ -445,7 +444,7 @@ MOTIONS = {
     "motion": {
         "all lines snap taut": free(*OUTWARD, web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [], natural_length=1.1),
                                     duration=0.2),
-        "an end that jumps": free(JUMP, supports=RIM, refused=MOVED),
+        "an end that jumps": free(JUMP, supports=RIM),
         "lengths 1 : 1e6": thrown(SHORT, (0, 3), duration=1e-4),
         "a slack line of no length": thrown(MET, (0, 3)),
         "two lines between two nodes": thrown(BESIDE, (0, 3)),

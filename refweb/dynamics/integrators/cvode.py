@@ -103,7 +103,7 @@ class Cvode(Sundials):
         self._at_state = t, x, v
         if self.rotations:
             self.rotations.linearize(x, v)
-        return self.system.stiffness(t, x, v, blocks=self._blocks), self.system.damping(t, x, v, self._blocks)
+        return self.tangents(t, x, v)
 
     # Block elimination
 

@@ -171,14 +171,25 @@ def note_motion(driven, mass, x, v, f, before):
 
 
 @kernel(leaf=True, forceinline=True)
-def book_motion(driven, mass, x, v, f, before, work):
-    """Add the work of prescribed motion in a step: what the kinetic energy gained and the forces took."""
-    last = work.size - 1
+def book_motion(kick, last, driven, mass, v, f, before, work):
+    """Add the work of prescribed motion in a drift between two kicks: what the kinetic energy gained and forces took.
+
+    Velocities are those of the drift; of a rotation the force is the moment, and its velocity the angular one.
+    """
+    for d in range(driven.size):
+        r, taken = driven[d], 0.0
+        for k in range(3):
+            taken += (kick * before[d, 3 + k] + last * f[r, k]) * v[r, k]
+        gained = 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2) - before[d, 6]
+        work[work.size - 1] += gained - taken
+
+
+@kernel(leaf=True, forceinline=True)
+def book_kick(kick, driven, v, f, work):
+    """Add the work of prescribed motion at constant velocities, of the forces in a kick."""
     for d in range(driven.size):
         r = driven[d]
-        work[last] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2) - before[d, 6]
-        for k in range(3):
-            work[last] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
+        work[work.size - 1] -= kick * (f[r, 0] * v[r, 0] + f[r, 1] * v[r, 1] + f[r, 2] * v[r, 2])
 
 
 @kernel(leaf=True, apart=("lengths",))

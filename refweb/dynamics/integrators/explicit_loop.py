@@ -25,6 +25,7 @@ from .energy_balance import (
     act,
     begin_powers,
     book_energies,
+    book_kick,
     book_motion,
     book_potential,
     book_powers,
@@ -88,6 +89,7 @@ def inner_stages(
         drifted, kicked = drifted + drift, kicked + kick
         give_impulse(kick, reaction, running.impulse)
         give_impulse(kick, push, running.ledger.pushed)
+        book_kick(kick, model.inertia.driven, v, f, running.work)
         book_potential(1.0, kicked, x, terms, running.work)
         if model.guard.terms.size + model.walls.terms.size:
             comes_through(now - h, kick, drift, TOLD, model, running)
@@ -181,7 +183,7 @@ def run_steps(
         feel(model.contacts, terms)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, terms)
-        book_motion(driven, mass, x, v, f, before, work)
+        book_motion(kick, last, driven, mass, v, f, before, work)
         give_reaction(kick, last, fixed, flat_f, reaction, impulse)
         if pushing:
             push_on(now, kick, last, x, v, model.outside, terms, extra, push, running.ledger.pushed)

@@ -151,10 +151,10 @@ class Ida(Sundials):
         self._at_state = t, x, v
         if self.rotations:
             self.rotations.linearize(x, v)
-        K = self.system.stiffness(t, x, v, blocks=self._blocks)
+        K, C = self.tangents(t, x, v)
         if self._massless:
             self._adrift = t, self._massless.adrift(K)
-        return K, self.system.damping(t, x, v, self._blocks)
+        return K, C
 
     # Block elimination
 

@@ -23,7 +23,7 @@ from ...net.rotation_bounds import speeds
 
 
 class Rotations:
-    """The bodies of one system that turn.
+    """The bodies of one system that turn by what acts on them.
 
     Parameters
     ----------
@@ -33,14 +33,17 @@ class Rotations:
 
     def __init__(self, system):
         self.turns = turns = RigidRotations.of(system.net)
-        _, self._spin, self._turn = turns.rows.T
         number = np.full(3 * system.rows, -1)
         number[system.free] = np.arange(len(system.free))
+        free = np.flatnonzero(number[3 * turns.rows[:, 1]] >= 0)
+        _, self._spin, self._turn = turns.rows[free].T
+        self._mobility, self._axles = turns.mobility[free], turns.axles[free]
         spin = number[3 * self._spin[:, None] + np.arange(3)]
         self.places = np.column_stack([number[3 * self._turn], spin])
-        self.spins = spin
+        self.spins, self._angles = spin, number[3 * self._turn + 1]
         body = [b for b in system.net.bodies if b.turn is not None]
-        self._extent = np.array([b.extent for b in body])
+        self._extent = np.array([b.extent for b in body])[free]
+        self._on_axle = np.flatnonzero(self._axles.any(axis=1))
 
     def quaternions(self, x):
         """Quaternions (w, x, y, z) of any length at displacements of all rows, shape (bodies, 4)."""
@@ -57,13 +60,26 @@ class Rotations:
         q = self.quaternions(x)
         size = np.linalg.norm(q, axis=1)
         R = self._matrices(q / size[:, None])
-        W, u = R @ self.turns.mobility @ R.swapaxes(1, 2), v[self._spin]
+        W, u = R @ self._mobility @ R.swapaxes(1, 2), v[self._spin]
         return q, size, W, u, (W @ u[:, :, None])[:, :, 0]
 
     def set_rates(self, x, v, rates):
         """Write g of these bodies to the ``rates`` of the unknowns, at displacements and velocities of all rows."""
         q, _, _, _, omega = self._omega(x, v)
-        rates[self.places] = left(q, omega)
+        rates[self.places], on = left(q, omega), self._on_axle
+        rates[self._angles[on]] = (self._axles[on] * omega[on]).sum(axis=1)
+
+    def leave_along_axles(self, force):
+        """Leave of the moments among forces on the unknowns those that turn bodies about their axles."""
+        for n in self._on_axle:
+            force[self.spins[n]] = (self._axles[n] @ force[self.spins[n]]) * self._axles[n]
+
+    def rows_along_axles(self, pattern, values):
+        """Leave the same of the values of a matrix in the pattern of a system."""
+        for n in self._on_axle:
+            at = np.array([np.flatnonzero(pattern.indices == row) for row in self.spins[n]])
+            values[at] = np.outer(self._axles[n], self._axles[n]) @ values[at]
+        return values
 
     def linearize(self, x, v):
         """Find X and V of a state of all rows, shape (bodies, 4, 4) and (bodies, 4, 3)."""

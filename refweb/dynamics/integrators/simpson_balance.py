@@ -179,9 +179,13 @@ class SimpsonBalance:
         if len(driven) and (end.v[driven] != middle.v[driven]).any():
             before, step = end.v.copy(), np.zeros_like(end.v)
             before[driven] = middle.v[driven]
+            if self.system.carriers:
+                self.system.carriers.update_attached_nodes(end.x, before)
             step[driven] = end.v[driven] - before[driven]
             after = before + self.system.mass.kick(step)
             after[driven] = end.v[driven]
+            if self.system.carriers:
+                self.system.carriers.update_attached_nodes(end.x, after)
             self._hold(end.x, after)
             last, end = (Sample(self.system, end.time, end.x, v) for v in (before, after))
             jump = np.zeros(len(course.work) + 6)

@@ -6,9 +6,10 @@ that it lies in its order. The splittings are symplectic, so that energy does no
 Largest values are looked for four times a step, and where parabolas through these turn back, on a polynomial of degree
 5 in between: an oscillator has them to 6e-10 with safety 0.5, and what has a kink to order 2.
 
-Dead loads may follow tables of time: steps end at the corners of these, and between them time is a coordinate that
-goes with the drifts, in which a force is taken where its drifts have come to. Their work is what their potential
-loses in each drift, taken at the time that the kicks have come to, see
+Dead loads and motion may follow tables of time: steps end at the corners of these, and between them time is a
+coordinate that goes with the drifts, in which a force is taken where its drifts have come to, and what is moved at a
+constant velocity has come to its place. The work of motion is that of the forces in each kick; that of loads is what
+their potential loses in each drift, taken at the time that the kicks have come to, see
 `refweb.dynamics.integrators.energy_balance.book_potential`.
 
 The coefficients are those of S. Blanes and P. C. Moan [1]_. On the square web of the paper, thrown by its centre
@@ -118,9 +119,9 @@ class Splitting(CentralDifference):
                     f'[solve] method = "explicit" takes no [{term.name}]{given}, nothing that depends on velocity, '
                     'and of time dead loads alone: use "central-difference" or "cvode"'
                 )
-        if system.drives or system.net.factors:
+        if system.net.factors:
             raise InputError(
-                '[solve] method = "explicit" takes nothing that is moved or reeled: use "central-difference" or "cvode"'
+                '[solve] method = "explicit" takes no [[reel]] and [temperature]: use "central-difference" or "cvode"'
             )
         self.order, (self.kicks, self.drifts) = order, splitting(order)
         self.stretch = _stretch(order)

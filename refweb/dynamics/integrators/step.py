@@ -262,6 +262,7 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
             now = v[driven[d], k]
             running.work[running.work.size - 1] += 0.5 * mass[driven[d]] * (now + was[d, k]) * (now - was[d, k])
             turned = turned or now != was[d, k]
+    update_attached_nodes(x, v, model.inertia.turns)
     if turned and terms.viscous.size + model.implicit_contacts.terms.size:
         f[:] = 0.0
         for i in range(len(forces)):

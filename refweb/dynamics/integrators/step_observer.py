@@ -205,6 +205,8 @@ class StepObserver(Integrator):
         self.stats["nfev"] += 1
         rows = self.system.forces(t, x, v, self._per_cell).force
         force = rows.ravel()[self.system.free]
+        if self.rotations:
+            self.rotations.leave_along_axles(force)
         if self._wrong is None and not np.isfinite(force.sum()):
             self._wrong = t, rows
         return force
@@ -218,6 +220,14 @@ class StepObserver(Integrator):
         position = off_x / (self.atol_position + self.rtol * np.abs(x))
         velocity = off_v / (self.atol_velocity + self.rtol * np.abs(v))
         return np.sqrt(0.5 * (np.mean(position**2) + np.mean(velocity**2)))
+
+    def tangents(self, t, x, v):
+        """Values of K, and of C or None, at a state of all rows."""
+        K, C = self.system.stiffness(t, x, v, blocks=self._blocks), self.system.damping(t, x, v, self._blocks)
+        if not self.rotations:
+            return K, C
+        pattern = self.system.pattern
+        return tuple(None if values is None else self.rotations.rows_along_axles(pattern, values) for values in (K, C))
 
     # What is made of them
 

@@ -24,8 +24,8 @@ FELT_BY_BOTH = 1, 0
 
 
 def pairs_of(net):
-    """All pairs of bodies of a net that may touch: not two that are fixed."""
-    return [(a, b) for a, b in itertools.combinations(net.bodies, 2) if not (a.fixed and b.fixed)]
+    """All pairs of bodies of a net that may touch: not two that nothing moves but tables."""
+    return [(a, b) for a, b in itertools.combinations(net.bodies, 2) if not (a.prescribed and b.prescribed)]
 
 
 def skeleton_of(body):
@@ -133,7 +133,7 @@ def _side(body, spins, law, parts, begin, more):
     (radius, core, round_, *field), (stiffness, *losses) = body.shape.touched(more), law
     mobility = body.mobility[np.triu_indices(3)] if spins == 2 else (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     numbers = [*body.axes.ravel(), *body.offset, spins, body.shape.planar, *mobility, _lever(body, spins), body.extent]
-    numbers += [not body.fixed, body.thickness, parts, begin]
+    numbers += [not body.prescribed, body.thickness, parts, begin]
     pair = [body.shape.extent, stiffness, *np.zeros(6), *losses, radius, *core, round_, False, False]
     pair += [*np.eye(3).ravel(), *field]
     return np.array([*numbers, *pair], dtype=float)

@@ -242,7 +242,7 @@ def add_row_sums(rates, slope, mass, cells, data, c, nodes, spins):
     if pair.once:
         near = all_of = 1.0
     spun = 0.0
-    if spins:
+    if spins and delta > 0.0:
         r = cells[c, nodes + 1]
         spun = min(delta * thick * math.sqrt(mass[b] / mass[r]), 1.0)
         rates[r] += all_of * slope * thick * thick * (1.0 + (1.0 + delta) / spun)

@@ -346,10 +346,10 @@ def first_stiffness(system, body, exponent, load_steps=()):
     It is that of `AIM` of the allowed overlap under the energy ½ μ v² that is there between the web and the body, with
     that by which a body tumbles, and under what pushes them. v is the speed of the body and the free node nearest to it
     towards each other, with what they gain under outer forces until they meet, and that of prescribed motion. μ is the
-    mass of the body if the web has supports, else the reduced mass of both; for a fixed body it is that of all free
-    nodes. The push is the resultant of outer forces on the body, or, for a fixed one, on the web. Statics knows no
-    energy: there contact is at least as stiff as the stiffest line, which costs no steps; so it is, as the softest
-    line, where nothing moves and nothing pushes.
+    mass of the body if the web has supports, else the reduced mass of both; for a body that is fixed or moved by tables
+    it is that of all free nodes. The push is the resultant of outer forces on the body, or, for such a one, on the web.
+    Statics knows no energy: there contact is at least as stiff as the stiffest line, which costs no steps; so it is, as
+    the softest line, where nothing moves and nothing pushes.
 
     Parameters
     ----------
@@ -393,16 +393,16 @@ def first_between(system, bodies, exponent):
         named = " and ".join(f'"{body.name}"' for body in bodies)
         raise InputError(f"stiffness is missing for bodies {named}, whose size is infinite: give stiffness = ...")
     v, force = system.initial_velocity(), np.where(system.supported, 0.0, system.outer_force(0.0))
-    free = [body for body in bodies if not body.fixed]
+    free = [body for body in bodies if not body.prescribed]
     mass = 1.0 / sum(1.0 / net.mass[body.row] for body in free)
-    falls = [np.zeros(3) if body.fixed else force[body.row] / net.mass[body.row] for body in bodies]
+    falls = [np.zeros(3) if body.prescribed else force[body.row] / net.mass[body.row] for body in bodies]
     first, second = sorted(bodies, key=lambda body: not body.shape.ground)
     gap = _distances(net, first, net.points[[second.row]])[0] - sum(map(_reach, bodies))
     square = float(((v[bodies[0].row] - v[bodies[1].row]) ** 2).sum())
     square += 2.0 * float(np.linalg.norm(falls[0] - falls[1])) * max(float(gap), 0.0)
     turns = [body for body in free if body.turn is not None]
     turning = sum(0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v)) for body in turns)
-    push = sum(float(np.linalg.norm(force[body.row])) for body in net.bodies if not body.fixed)
+    push = sum(float(np.linalg.norm(force[body.row])) for body in net.bodies if not body.prescribed)
     stored = (exponent + 1.0) * (0.5 * mass * square + turning)
     return max(push / deep**exponent, stored / deep ** (exponent + 1.0))
 
@@ -417,7 +417,7 @@ def _times(system):
 def _push(system, body, t):
     """Resultant of outer forces on a body that is free, or on the free nodes [N]."""
     force = np.where(system.supported, 0.0, system.outer_force(t))
-    return float(np.linalg.norm(force[: system.net.nodes].sum(axis=0) if body.fixed else force[body.row]))
+    return float(np.linalg.norm(force[: system.net.nodes].sum(axis=0) if body.prescribed else force[body.row]))
 
 
 def _distances(net, body, points):
@@ -450,13 +450,13 @@ def _energy(system, body):
     for t in _times(system) if system.drives else ():
         driven = np.zeros_like(v)
         system.drive(t, np.zeros_like(v), driven)
-        fastest = max(fastest, float(np.linalg.norm(driven, axis=1).max()))
+        fastest = max(fastest, float(np.linalg.norm(driven[: system.rows - net.spins], axis=1).max()))
     force = np.where(system.supported, 0.0, system.outer_force(0.0))
-    falls = np.zeros(3) if body.fixed else force[body.row] / body_mass
-    carried = fixed.any() and not body.fixed
+    falls = np.zeros(3) if body.prescribed else force[body.row] / body_mass
+    carried = fixed.any() and not body.prescribed
     along = np.zeros(3) if carried or not web > 0.0 else force[free].sum(axis=0) / web
     gained = 2.0 * float(np.linalg.norm(falls - along)) * max(float(distance[nearest]) - _reach(body), 0.0)
-    mass = web if body.fixed else body_mass if fixed.any() else body_mass * web / (body_mass + web)
+    mass = web if body.prescribed else body_mass if fixed.any() else body_mass * web / (body_mass + web)
     turning = 0.0
     if body.turn is not None:
         turning = 0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v))

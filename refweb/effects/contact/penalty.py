@@ -169,7 +169,7 @@ def add_row_sums(rates, ahead, speed, mass, cells, data, c, nodes, spins):
         tilt = scale * deep / length if length > 0.0 else 0.0
         steepest = steep * (1.0 + 3.0 * tilt + (2.0 * tilt * thick / length if length > 0.0 else 0.0))
     spun = 0.0
-    if spins:
+    if spins and delta > 0.0:
         r, arm = cells[c, nodes + 1], lever_of(data, c, nodes)
         spun = min(delta * arm * math.sqrt(mass[b] / mass[r]), 1.0)
         rates[r] += steepest * arm * arm * (1.0 + (1.0 + delta) / spun)

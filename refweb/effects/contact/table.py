@@ -153,7 +153,7 @@ class Contact(Table):
         """The net whose free bodies turn where friction turns them."""
 
         def turns(body):
-            return body.turns or not body.fixed and self._of(body, "friction") > 0.0
+            return body.turns or not body.prescribed and self._of(body, "friction") > 0.0
 
         return replace(net, bodies=tuple(replace(body, turns=turns(body)) for body in net.bodies))
 
@@ -237,7 +237,7 @@ class Contact(Table):
             **pairs,
             force=force,
             energy=energy,
-            tangent=Tangent(stiffness, bound, symmetric=spins == 0),  # moments, and quaternions
+            tangent=Tangent(stiffness, bound, symmetric=spins == 0 or all(body.prescribed for body in bodies)),
             balance=Balance("contact_energy", internal=True),
         )
 

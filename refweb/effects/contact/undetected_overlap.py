@@ -26,7 +26,7 @@ MOST = 3
 def silent_of(system):
     """The `Silent` of a system whose bodies may meet and do not touch each other, None where they cannot."""
     bodies = [body for body in system.net.bodies if not body.shape.planar]
-    if len(bodies) < 2 or all(body.fixed for body in bodies) or any(term.contact.pairs for term in system.terms):
+    if len(bodies) < 2 or all(body.prescribed for body in bodies) or any(term.contact.pairs for term in system.terms):
         return None
     return Silent(system.net, bodies)
 
@@ -44,7 +44,7 @@ class Silent:
 
     def __init__(self, net, bodies):
         self._net, self._overlaps = net, {}
-        pairs = [(a, b) for a, b in itertools.combinations(bodies, 2) if not (a.fixed and b.fixed)]
+        pairs = [(a, b) for a, b in itertools.combinations(bodies, 2) if not (a.prescribed and b.prescribed)]
         self._pairs = pairs
         self._rows = np.array([(a.row, b.row) for a, b in pairs])
         self._reach = np.array([a.extent + b.extent for a, b in pairs])

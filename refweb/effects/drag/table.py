@@ -108,7 +108,7 @@ class Drag(Table):
 
     def on(self, net):
         """The terms of the nodes of elements and of free bodies; ``out`` is the power [W]."""
-        free = [body for body in net.bodies if not body.fixed]
+        free = [body for body in net.bodies if not body.prescribed]
         names = [body.name for body in free]
         for name in self.bodies:
             if name not in names:

@@ -33,8 +33,9 @@ class TotalAngularMomentum(Nodal):
         every = observe.node is None and observe.body is None
         counted = np.arange(linear) if every else self.rows(system)
         named = net.bodies if every else self.bodies(net)
-        turning = [body for body in named if body.spin is not None and not body.fixed]
-        return np.column_stack([masses, net.points[:linear]]), counted, [(b.spin, b.moment) for b in turning]
+        turning = [body for body in named if body.spin is not None and not body.prescribed]
+        moments = [(b.spin, b.moment - b.mass * float(b.arm @ b.arm)) for b in turning]
+        return np.column_stack([masses, net.points[:linear]]), counted, moments
 
     def of(self, state):
         """Compute it by sums over rows."""

@@ -201,7 +201,6 @@ def test_an_impact_is_that_of_central_differences(order):
 REFUSED = {
     "damping": refweb.Damping(time=1e-3),
     "rotating frame": refweb.Frame(angular_velocity=(0.0, 0.0, 1.0)),
-    "motion": refweb.Motion(node="rim", displacement=[(0, 0, 0, 0), (1, 0, 0, 1)]),
     "reel": refweb.Reel(lines="all", factor=[(0, 1), (1, 0.9)]),
     "pressure": refweb.Pressure(lines="all", normal=(0, 0, 1), value=1.0),
 }

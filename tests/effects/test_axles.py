@@ -1,0 +1,268 @@
+"""Bodies that turn about axles: closed forms, independent programs, methods side by side, orders, books, refusals."""
+
+import nets
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipj, ellipk
+
+import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
+
+G, MASS, ARM, RADIUS = 9.81, 2.0, 0.4, 0.1
+INERTIA = (0.11, 0.13, 0.07)
+MOMENT = 0.13 + MASS * ARM**2
+"""Of `ROD` about its axle [kg m²]."""
+ROD = dict(
+    name="rod", shape="box", size=[0.1, 0.2, 0.6], mass=MASS, inertia=list(INERTIA), position=[3.0, 0.3, 0.0],
+    axle={"point": [3.0, -1.0, ARM], "direction": [0.0, 2.0, 0.0]},
+)  # fmt: skip
+WEB = {"kind": "inline", "points": [[0, 0, 0], [1, 0, 0], [2, 0, 0]], "lines": [[0, 1], [1, 2]], "supports": [0, 2]}
+SOFT = dict(law="linear", modulus=1e6, area=1e-6, density=1000.0)
+
+
+def solved(method, *observe, **tables):
+    """Run of a scene by a method of `nets.METHODS`, which looks at quantities of a body."""
+    solve = {"kind": "dynamic", **nets.METHODS[method], **tables.pop("solve", {})}
+    name = tables["body"][-1]["name"]
+    observe = [o if isinstance(o, dict) else {"name": o, "quantity": o, "body": name} for o in observe]
+    scene = {"web": WEB, "cable": SOFT, **tables, "observe": [*tables.pop("observe", []), *observe], "solve": solve}
+    return refweb.run(refweb.Scene.from_dict(scene))
+
+
+def pendulum(method, omega=3.0, duration=0.5, **solve):
+    looked = {"name": "pull", "quantity": "support_force", "body": "rod", "component": "z", "reduce": "max"}
+    return solved(
+        method, "axle_angle", looked, gravity={"acceleration": [0.0, 0.0, -G]},
+        body=[ROD | {"angular_velocity": [0.0, omega, 0.0]}], solve={"duration": duration, **solve},
+    )  # fmt: skip
+
+
+def angle_of_pendulum(t, omega):
+    """Angle of a physical pendulum that passes its lowest place with ω: sin(θ/2) = k sn(ω₀ t, k), 2 ω₀ k = ω."""
+    rate = np.sqrt(MASS * G * ARM / MOMENT)
+    k = omega / (2.0 * rate)
+    return 2.0 * np.arcsin(k * ellipj(rate * t, k * k)[0])
+
+
+@pytest.mark.parametrize("method", nets.METHODS)
+def test_body_on_an_axle_is_a_physical_pendulum(method):
+    """Its angle, and the pull m g + m ω² l at the lowest place, within ±; the balance of energy closes."""
+    result = pendulum(method)
+    angle, pull = result.results["axle_angle"], result.results["pull"]
+    assert abs(angle.value - angle_of_pendulum(0.5, 3.0)) <= angle.error < 1e-3
+    assert pull.value == pytest.approx(MASS * (G + 9.0 * ARM), rel=1e-4)
+    assert result.solver["energy_drift"] < 1e-4
+
+
+def test_period_of_the_pendulum():
+    """4 K(k)/ω₀, after which it is back where it was, by order 6; 0.7 of the way to the top."""
+    rate = np.sqrt(MASS * G * ARM / MOMENT)
+    omega = 2.0 * rate * np.sin(0.35 * np.pi)
+    period = 4.0 * ellipk(np.sin(0.35 * np.pi) ** 2) / rate
+    result = pendulum("order 6", omega, period, step_size=2e-3)
+    assert result.results["axle_angle"].value == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "method, order, steps", [("central-difference", 2, (4e-3, 2e-3)), ("order 4", 4, (2e-2, 1e-2))]
+)
+def test_orders_hold_about_an_axle(method, order, steps):
+    exact = angle_of_pendulum(0.5, 3.0)
+    errors = [abs(pendulum(method, step_size=h).results["axle_angle"].value - exact) for h in steps]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+
+
+WHEEL = dict(name="wheel", shape="cylinder", radius=0.2, length=0.1, axis=[1.0, 2.0, 2.0], mass=3.0,
+             inertia=[0.03, 0.03, 0.05], position=[0.0, 4.0, 0.0])  # fmt: skip
+TORQUE = [[0.0, 0.0], [0.2, 0.6], [0.5, -0.3]]
+
+
+@pytest.mark.parametrize("method", nets.METHODS)
+def test_torque_turns_a_wheel(method):
+    """I dω/dt = M(t) by pieces: the angle is a cubic, the work ½ I ω²; moments across the axle turn nothing."""
+    body = WHEEL | {"angular_velocity": [1.0, 2.0, 2.0], "axle": {"direction": [1.0, 2.0, 2.0], "torque": TORQUE}}
+    result = solved(method, "axle_angle", body=[body], solve={"duration": 0.6}, output={"interval": 0.1})
+    found = result.history
+    exact = solve_ivp(
+        lambda t, y: [y[1], np.interp(t, *np.transpose(TORQUE)) / 0.05], (0.0, 0.6), [0.0, 3.0],
+        t_eval=found["time"], rtol=1e-11, atol=1e-12, max_step=1e-3,
+    ).y  # fmt: skip
+    tolerance = {"central-difference": 1e-3, "bdf": 1e-4, "ida": 1e-4}.get(method, 1e-6)  # rows of few steps
+    np.testing.assert_allclose(found["axle_angle"], exact[0], rtol=0, atol=tolerance * exact[0].max())
+    worked = 0.5 * 0.05 * (exact[1] ** 2 - 9.0)
+    np.testing.assert_allclose(found["work"], worked, rtol=0, atol=tolerance * np.abs(worked).max())
+
+
+def test_a_number_is_a_torque_that_stays():
+    body = WHEEL | {"axle": {"direction": [1.0, 2.0, 2.0], "torque": 0.7}}
+    found = solved("order 4", "axle_angle", body=[body], solve={"duration": 0.5}).results
+    assert found["axle_angle"].value == pytest.approx(0.5 * 0.7 / 0.05 * 0.25, rel=1e-12)
+
+
+def gate(method, **solve):
+    """A gate off its axle, held by a line at its corner, the mass of whose end is the gate's."""
+    return solved(
+        method, "axle_angle", {"name": "tension", "quantity": "tension", "line": 0},
+        web={"kind": "inline", "points": [[1.0, 0.0, 0.3], [2.5, 0.4, 0.8]], "lines": [[0, 1]], "supports": [1]},
+        cable=dict(law="linear", modulus=2e8, area=1e-6, density=1e4, prestrain=0.02),
+        body=[dict(name="gate", shape="box", size=[1.0, 0.1, 0.6], mass=MASS, inertia=list(INERTIA),
+                   position=[0.5, 0.0, 0.0], axle={"point": [0.0, 0.0, 0.0], "direction": [0.0, 0.0, 1.0]},
+                   angular_velocity=[0.0, 0.0, -0.5])],
+        attach=[{"body": "gate", "node": 0}], solve={"duration": 0.4, **solve},
+    )  # fmt: skip
+
+
+def gate_by_itself():
+    """Angle and tension of `gate` at 0.4 s: I θ'' = (r × T)_z of one spring, by DOP853."""
+    anchor, corner = np.array([2.5, 0.4, 0.8]), np.array([1.0, 0.0, 0.3])
+    chord = np.linalg.norm(anchor - corner)
+    natural = chord / 1.02
+    knot = 0.5 * 1e4 * 1e-6 * natural
+    moment = INERTIA[2] + MASS * 0.25 + knot * 1.0
+
+    def pull(angle):
+        c, s = np.cos(angle), np.sin(angle)
+        place = np.array([c * corner[0], s * corner[0], corner[2]])
+        away = anchor - place
+        tension = 200.0 * (np.linalg.norm(away) / natural - 1.0)
+        force = tension * away / np.linalg.norm(away)
+        return tension, place[0] * force[1] - place[1] * force[0]
+
+    result = solve_ivp(
+        lambda t, y: [y[1], pull(y[0])[1] / moment], (0.0, 0.4), [0.0, -0.5], method="DOP853", rtol=1e-12, atol=1e-13
+    )
+    return result.y[0, -1], pull(result.y[0, -1])[0]
+
+
+@pytest.mark.parametrize("method", nets.METHODS)
+def test_attached_node_turns_a_gate(method):
+    angle, tension = gate_by_itself()
+    found = gate(method).results
+    assert abs(found["axle_angle"].value - angle) <= max(1.5 * found["axle_angle"].error, 1e-9)
+    assert abs(found["tension"].value - tension) <= max(1.5 * found["tension"].error, 1e-7)
+
+
+def test_axle_in_turning_axes():
+    """In a frame that turns by Ω, a body on an axle along Ω at the distance R swings: I θ'' = −m Ω² R l sin θ."""
+    omega, far, swing = 2.0, 3.0, 1.2
+    body = dict(name="flap", shape="box", size=[0.6, 0.2, 0.1], mass=MASS, inertia=[0.07, 0.11, 0.13],
+                position=[far + ARM, 0.0, 0.0], angular_velocity=[0.0, 0.0, swing],
+                axle={"point": [far, 0.0, 0.0], "direction": [0.0, 0.0, 1.0]})  # fmt: skip
+    web = WEB | {"points": [[0, 0, 1], [1, 0, 1], [2, 0, 1]]}
+    found = solved("central-difference", "axle_angle", web=web, body=[body],
+                   frame={"angular_velocity": [0.0, 0.0, omega]}, solve={"duration": 1, "step_size": 2e-4})  # fmt: skip
+    exact = solve_ivp(
+        lambda t, y: [y[1], -MASS * omega**2 * far * ARM * np.sin(y[0]) / MOMENT],
+        (0.0, 1.0),
+        [0.0, swing],
+        rtol=1e-11,
+        atol=1e-13,
+    ).y[0, -1]
+    angle = found.results["axle_angle"]
+    assert abs(angle.value - exact) <= angle.error < 1e-5
+
+
+PADDLE = dict(name="paddle", shape="box", size=[0.4, 0.2, 0.2], rounding=0.05, mass=0.05, position=[1.1, 0.0, 0.115],
+              axle={"point": [0.8, 0.0, 0.115], "direction": [0.0, 1.0, 0.0]},
+              angular_velocity=[0.0, 3.0, 0.0])  # fmt: skip
+
+
+def paddle(method, **more):
+    return solved(
+        method, "axle_angle", {"name": "lost", "quantity": "dissipated_energy"}, body=[PADDLE],
+        web={"kind": "inline", "points": [[0, -0.5, 0], [0.7, -0.2, 0], [1.2, 0.1, 0], [2, 0, 0]],
+             "lines": [[0, 1], [1, 2], [2, 3]]}, supports={"nodes": [0, 3]},
+        cable=dict(law="linear", modulus=1e8, area=1e-6, density=1e4),
+        contact={"stiffness": 1e4, "friction": 0.3}, solve={"duration": 0.03, **more},
+    )  # fmt: skip
+
+
+def test_contact_with_friction_turns_a_body_on_an_axle():
+    """A paddle off its axle that strikes a line: central differences and CVODE agree within their ±."""
+    first, second = paddle("central-difference").results, paddle("bdf").results
+    assert first["lost"].value > 1e-5
+    for name in first:
+        one, other = first[name], second[name]
+        assert abs(one.value - other.value) <= 2.0 * (one.error + other.error), name
+
+
+def test_atwood():
+    """Two masses on a rope that sticks to a pulley: (m₁ − m₂) g/(m₁ + m₂ + I/r²). Chords stand out by 0.9 % of r, and
+    the masses swing on the rope by 2 % of their velocity; without the pulley they would have 1.6 times of it."""
+    first, second, moment, r, pieces, end = 1.0, 0.8, 0.01, RADIUS, 12, 0.1
+    out = r / np.cos(0.5 * np.pi / pieces)
+    arc = [[-out * np.cos(a), 0.0, out * np.sin(a)] for a in np.linspace(0.0, np.pi, pieces + 1)]
+    points = [[-out, 0.0, -0.2], [-out, 0.0, -0.1], *arc, [out, 0.0, -0.1], [out, 0.0, -0.2]]
+    last = len(points) - 1
+    pulley = dict(name="pulley", shape="cylinder", radius=r, length=0.1, axis=[0.0, 1.0, 0.0], mass=2.0,
+                  inertia=[0.01, 0.01, moment], position=[0.0, 0.0, 0.0],
+                  axle={"direction": [0.0, 1.0, 0.0]})  # fmt: skip
+    speeds = [{"name": "w", "quantity": "angular_velocity", "body": "pulley", "component": "y"},
+              {"name": "v", "quantity": "velocity", "node": 0, "component": "z"}]  # fmt: skip
+    found = solved(
+        "central-difference", *speeds,
+        web={"kind": "inline", "points": points, "lines": [[i, i + 1] for i in range(last)], "supports": []},
+        cable=dict(law="tension-only", modulus=2e10, area=1e-6, density=1000.0), body=[pulley],
+        gravity={"acceleration": [0.0, 0.0, -G]}, contact={"stiffness": 2e5, "friction": 0.5},
+        point_mass=[{"node": 0, "mass": first}, {"node": last, "mass": second}],
+        solve={"duration": end}, accuracy={"error": "none"},
+    ).results  # fmt: skip
+    rate = (first - second) / (first + second + moment / r**2) * G
+    assert found["w"].value == pytest.approx(-rate * end / r, rel=1e-2)
+    assert found["v"].value == pytest.approx(-rate * end, rel=2e-2)
+
+
+@pytest.mark.parametrize("mass", [1e-3, 0.05, 10.0])
+def test_bound_bounds_a_body_off_its_axle(mass):
+    """2/ω of nodes and angle, by differences of the forces, is never below the bound."""
+    scene = dict(web=WEB, cable=SOFT, body=[PADDLE | {"mass": mass}], contact={"stiffness": 1e4})
+    system = refweb.Scene.from_dict(scene | {"solve": {"kind": "dynamic", "duration": 1.0}}).build()
+    (body,), node = system.net.bodies, 1
+
+    def place(y):
+        x = np.zeros((system.rows, 3))
+        x[node], half = y[:3], 0.5 * y[3]
+        x[body.turn, 0], x[body.spin] = np.cos(half) - 1.0, np.sin(half) * body.axle.direction
+        system.drive(0.0, x)
+        return x
+
+    def force(y):
+        f = system.force(0.0, place(y))
+        return np.append(f[node], body.axle.direction @ f[body.spin])
+
+    y, h = np.array([0.0, 0.0, 0.02, 0.05]), 1e-7
+    K = np.array([(force(y - h * e) - force(y + h * e)) / (2.0 * h) for e in np.eye(4)])
+    square = np.linalg.eigvals(K / np.append(np.full(3, system.net.mass[node]), body.moment)[:, None]).real.max()
+    bound = CentralDifference(system).bound(place(y), reach=0.0)
+    assert 0.05 < bound * np.sqrt(square) / 2.0 <= 1.0 + 1e-6
+
+
+NO = dict(name="it", radius=0.1, mass=1.0, position=[0.0, 0.0, 2.0])
+REFUSED = [
+    ({"axle": {"point": [0, 0, 0]}}, r"axle.* direction is missing"),
+    ({"axle": {"direction": [0, 0, 0]}}, r"axle.* direction = \[.*\] must not be zero"),
+    ({"axle": {"direction": [0, 0, 1], "tork": 1.0}}, r'axle.*"?tork"?.*torque'),
+    ({"axle": {"direction": [0, 0, 1], "torque": [[1.0, 0.0], [0.0, 1.0]]}}, r"torque\[1\]\[0\] = 0.0 must be > 1"),
+    ({"axle": {"direction": [0, 0, 1], "torque": "much"}}, r"torque = .*much.* must be a number"),
+    ({"axle": {"direction": [0, 0, 1]}, "fixed": True, "mass": None}, r"axle = .* has no meaning where fixed = true"),
+    ({"axle": {"direction": [0, 0, 1]}, "velocity": [1, 0, 0]}, r"velocity = .* must be zero with axle"),
+    ({"axle": {"direction": [0, 0, 1]}, "angular_velocity": [0, 1, 1]}, r"angular_velocity = .* must be along axle"),
+    ({"axle": {"direction": [0, 0, 1]}, "shape": "ring", "normal": [0, 0, 1]}, r"has no meaning for shape = .ring."),
+    ({"axle": {"direction": [0, 0, 1]}, "mass": None}, r"mass is missing: a free body needs mass"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("given, message", REFUSED)
+def test_what_does_not_turn_is_refused(given, message):
+    body = {key: value for key, value in (NO | given).items() if value is not None}
+    with pytest.raises(refweb.InputError, match=message):
+        refweb.Scene.from_dict(
+            dict(web=WEB, cable=SOFT, body=[body], solve={"kind": "dynamic", "duration": 0.1})
+        ).build()
+
+
+def test_statics_takes_no_axle():
+    body = NO | {"axle": {"direction": [0, 0, 1]}}
+    with pytest.raises(refweb.InputError, match=r"turns freely cannot be used in statics: leave out its mass and give"):
+        refweb.Scene.from_dict(dict(web=WEB, cable=SOFT, body=[body], solve={"kind": "static"})).build()
