@@ -108,9 +108,10 @@ def implicit_drag(nodes):
             contact.drag[0], contact.drag[1] = data[c, NORMAL], data[c, TANGENTIAL]
             for k in range(3):
                 contact.tangent[k] = t[k]
+            contact.count = 1 if contact.group else 0
             if contact.group == 0:
                 continue
-            contact.tag, contact.count, contact.normal_force, contact.damping = 0, 1, 0.0, 0.0
+            contact.tag, contact.normal_force, contact.damping = 0, 0.0, 0.0
             for k in range(3):
                 unit = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
                 set_part(parts[contact.first], cells[c, 0], k, unit, unit)
