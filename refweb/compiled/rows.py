@@ -7,11 +7,15 @@ names, or behind it, a row may have more.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
 from .numba_internals import make_array
+
+_intrinsic: Any = intrinsic  # kernels give all but the first argument
 
 
 def width_of(kind):
@@ -34,7 +38,7 @@ def matrix_of(records):
     return records.view(float).reshape(len(records), width_of(records.dtype))
 
 
-@intrinsic
+@_intrinsic
 def record_at(typing, kind, matrix, row, column):
     """The record of a row of a C-contiguous matrix from a column on, over the same memory, in kernels."""
 

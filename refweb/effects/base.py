@@ -29,7 +29,7 @@ from ..errors import InputError
 LINE_OUT = np.dtype([(name, float) for name in ("tension", "strain", "damped_tension", "power")])
 """What terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law the tension with
 it [N] and its power [W]."""
-TENSION, STRAIN, DAMPED_TENSION, POWER = (column_of(LINE_OUT, name) for name in LINE_OUT.names)
+TENSION, STRAIN, DAMPED_TENSION, POWER = range(4)
 """Columns of these."""
 
 
