@@ -63,17 +63,18 @@ def run(
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     if out is not None:
         check_folder(out, force)
-    clock, scene, repeats = Clock(), scene.settled(), []
+    clock, (scene, system), repeats = Clock(), scene.settle(), []
     with followed(progress) as tell:
         while True:
             try:
-                return _attempt(scene, out, tell, announce, clock, repeats, *checkpoint)
+                return _attempt(scene, system, out, tell, announce, clock, repeats, *checkpoint)
             except PenetrationError as soft:  # repeated with a stiffer contact as often as the chosen one is too soft
                 table = "self_contact" if "self_contact" in soft.stiffness else "contact"
                 repeats.append(Finding("repeated", str(soft), table, NOTE))
                 scene, announce, checkpoint = scene.with_stiffness(soft.stiffness), None, (None, None)
                 if len(repeats) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
                     scene = scene.replace(chosen=())
+                system = scene.build()
 
 
 def trust(scene, budget=None, out=None, force=False, progress: bool | Callable | None = True, announce=None):
@@ -164,13 +165,12 @@ def resume(folder, progress: bool | Callable | None = True, announce=None) -> So
     return run(scene, folder, True, progress, announce, (kept, summary))
 
 
-def _attempt(scene, out, tell, announce, clock, repeats, kept=None, summary=None):
-    """Solve a scene as it stands.
+def _attempt(scene, system, out, tell, announce, clock, repeats, kept=None, summary=None):
+    """Solve a scene as it stands, with its system.
 
     ``repeats`` are the findings of attempts before; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run
     that goes on.
     """
-    system = scene.build()
     if out is None:
         _check_frames(scene, system)
     if announce is not None:

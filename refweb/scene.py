@@ -314,23 +314,7 @@ class Scene:
 
         Names of the bodies that it is chosen for, and "self_contact", stand in ``chosen``.
         """
-        bodies = [effect for effect in self.effects if name_of(EFFECTS, effect) == "body"] if self.contact else []
-        missing = self.contact.left_out(bodies) if bodies else ()
-        if any(name_of(EFFECTS, e) == "self_contact" and e.stiffness is None for e in self.effects):
-            from .effects.self_contact.penetration import first_stiffness as first_of_lines
-
-            system = self.with_stiffness({"self_contact": 1.0}).build()
-            with in_file(self.file):
-                first = first_of_lines(system)
-            return self.with_stiffness({"self_contact": first}).settled()
-        if not missing:
-            return self
-        from .effects.contact.overlap import first_stiffness
-
-        system, steps = self.with_stiffness(dict.fromkeys(missing, 1.0)).build(), getattr(self.solve, "load_steps", ())
-        with in_file(self.file), refused_at("[contact]"):
-            bodies, law = (body for body in system.net.bodies if body.name in missing), self.contact.law_of
-            return self.with_stiffness({b.name: first_stiffness(system, b, law(b)[1], steps) for b in bodies})
+        return self.settle()[0] if self._left_out() else self
 
     def build(self):
         """The `refweb.system.system.System` of this scene, with the stiffness of contact that it leaves out chosen.
@@ -340,10 +324,42 @@ class Scene:
         InputError
             For whatever does not fit together; the message names file and table.
         """
+        return self.settle()[1]
+
+    def _left_out(self):
+        """Names of the bodies, and "self_contact", whose stiffness is left out, a list."""
+        lines = [e for e in self.effects if name_of(EFFECTS, e) == "self_contact" and e.stiffness is None]
+        bodies = [effect for effect in self.effects if name_of(EFFECTS, effect) == "body"] if self.contact else []
+        return ["self_contact" for _ in lines] + [*(self.contact.left_out(bodies) if bodies else ())]
+
+    def settle(self):
+        """(`settled`, `build`) of it: it is built once, with any stiffness, and contact again with those chosen."""
+        missing, chosen = self._left_out(), {}
+        if not missing:
+            return self, self._built()
+        system = self.with_stiffness(dict.fromkeys(missing, 1.0))._built()
+        with in_file(self.file):
+            if "self_contact" in missing:
+                from .effects.self_contact.penetration import first_stiffness as first_of_lines
+
+                chosen["self_contact"] = first_of_lines(system)
+            if bodies := [body for body in system.net.bodies if body.name in missing]:
+                from .effects.contact.overlap import first_stiffness
+
+                law, steps = self.contact.law_of, getattr(self.solve, "load_steps", ())
+                with refused_at("[contact]"):
+                    chosen |= {b.name: first_stiffness(system, b, law(b)[1], steps) for b in bodies}
+        scene = self.with_stiffness(chosen)
+        if len(system.net.web.broken):  # whose contact is not that of the tables
+            return scene, scene._built()
+        tables = {"self_contact" if name == "self_contact" else "contact" for name in chosen}
+        effects = {name_of(EFFECTS, effect): effect for effect in scene.effects}
+        return scene, system.with_effects({name: effects[name] for name in tables})
+
+    def _built(self):
+        """The system of a scene that leaves out no stiffness."""
         from .build import build
 
-        if (settled := self.settled()) is not self:
-            return settled.build()
         with in_file(self.file):
             system = build(
                 web=self.web,

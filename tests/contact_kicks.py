@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from refweb.compiled.rows import records_of
 from refweb.compiled.tables import Functions
 from refweb.effects import contact_solver
-from refweb.effects.base import FELT, OWN
+from refweb.effects.base import CONTACT_COLUMNS, TOUCH
 from refweb.kernels import CONTACT, LAW, MEMORY, PART
 from refweb.net.rotation import RigidRotations
 
@@ -82,8 +83,9 @@ class Solved:
         for term, (begin, end) in zip(self.terms, ends, strict=True):
             out, memory = np.ones((len(term.cells), term.columns)), np.zeros((len(term.cells), 8), MEMORY)
             contact_solver.commit(1, memory, self.mean, contacts, parts, begin, end, out)
-            self.power += out[:, OWN].sum()
-            self.felt += out[:, FELT:].sum(axis=0) if out.shape[1] > FELT else 0.0
+            self.power += out[:, 0].sum()
+            if term.columns == CONTACT_COLUMNS:
+                self.felt += records_of(TOUCH, out)["force"].sum(axis=0)
         self.contacts, self.parts = contacts[:count], parts
 
     def rows(self, contact):

@@ -23,8 +23,8 @@ def run(arguments):
             raise InputError(f"--set has no meaning for {arguments.scene}: it is a study, which has [parameters]")
         print_study(arguments.scene)
         return
-    scene = scene_of(arguments).settled()
-    system, solution = scene.build(), Solution(scene)
+    scene, system = scene_of(arguments).settle()
+    solution = Solution(scene)
     simulation_of(scene, system, solution)
     print_scene(scene, system)
     for finding in [*notices(scene, system), *solution.findings, *doubts_on(scene, system)]:

@@ -23,21 +23,28 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..compiled.rows import column_of, width_of
 from ..errors import InputError
 
+LINE_OUT = np.dtype([(name, float) for name in ("tension", "strain", "damped_tension", "power")])
+"""What terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law the tension with
+it [N] and its power [W]."""
 TENSION, STRAIN, DAMPED_TENSION, POWER = range(4)
-"""Columns of what terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law
-the tension with it [N] and its power [W]."""
+"""Columns of these."""
 
 
-OWN, FELT, CONTACT_COLUMNS = 0, 1, 4
-"""Columns of what terms of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of
-a loss; the first of three of the force on the body that `ContactForce.felt` names [N]; and their number."""
+TOUCH = np.dtype([("value", float), ("force", float, (3,))])
+"""What terms of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of a loss; and
+the force on the body that `ContactForce.felt` names [N]."""
+OWN, CONTACT_COLUMNS = column_of(TOUCH, "value"), width_of(TOUCH)
+"""Column of that value, and number of columns."""
 CONTACT = -2
 """Number that stands, in place of that of a term, for what bodies feel of contact."""
-DEPTH, FORCE, ELEMENT, FELT_COLUMNS = 0, 1, 4, 5
-"""Columns of that: the largest depth of lines in a body, or that of a pair of bodies [m]; the first of three of the
-force on the body [N]; the element of that depth, −1 where nothing touches; and their number."""
+FELT = np.dtype([("depth", float), ("force", float, (3,)), ("element", float)])
+"""That: the largest depth of lines in a body, or that of a pair of bodies [m]; the force on the body [N]; the element
+of that depth, −1 where nothing touches."""
+FELT_COLUMNS = width_of(FELT)
+"""Number of its columns."""
 
 
 class ImplicitContactKernels(NamedTuple):

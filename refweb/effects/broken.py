@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import functools
 
+from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import ENERGY, FORCE, kernel
-from .base import DAMPED_TENSION, STRAIN, TENSION, Balance, ForceTerm, Timing
+from .base import DAMPED_TENSION, LINE_OUT, Balance, ForceTerm, Timing
 from .line_kernels import line_at
 
 HELD = "rupture_energy"
@@ -24,10 +25,10 @@ def kernels(column):
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
             if line_at(data, c).ea == 0.0:
-                out[c, TENSION] = 0.0
-                out[c, STRAIN] = 0.0
+                shows = record_at(LINE_OUT, out, c, 0)
+                shows.tension = shows.strain = 0.0
                 if out.shape[1] > DAMPED_TENSION:
-                    out[c, DAMPED_TENSION] = 0.0
+                    shows.damped_tension = 0.0
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):

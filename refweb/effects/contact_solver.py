@@ -38,9 +38,10 @@ from __future__ import annotations
 
 import math
 
+from ..compiled.rows import record_at
 from ..kernels import LAW, ContactArray, Integers, Matrix, PartArray, kernel
 from ..net.rotation import RigidRotations, matrix_at, times, times_transposed
-from .base import FELT
+from .base import CONTACT_COLUMNS, TOUCH
 from .vectors import cross, dot, solve
 
 SETTLING = 1
@@ -358,6 +359,7 @@ def commit(number, memory, v, contacts, parts, begin, end, out):
         past.tag, past.step = contact.tag, number
         for k in range(3):
             past.force[k] = p * contact.basis[0, k] + q * contact.basis[1, k] + s * contact.basis[2, k]
-        out[contact.cell, 0] += dot((p, q, s), relative_velocity(contact, parts, v))
-        for k in range(out.shape[1] - FELT):
-            out[contact.cell, FELT + k] -= past.force[k]
+        shows = record_at(TOUCH, out, contact.cell, 0)
+        shows.value += dot((p, q, s), relative_velocity(contact, parts, v))
+        for k in range(3 if out.shape[1] == CONTACT_COLUMNS else 0):
+            shows.force[k] -= past.force[k]

@@ -21,11 +21,12 @@ import functools
 
 import numpy as np
 
+from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real, table
-from .base import DAMPED_TENSION, POWER, Balance, ForceTerm, Tangent, Timing, VelocityForce, column
+from .base import LINE_OUT, POWER, Balance, ForceTerm, Tangent, Timing, VelocityForce, column
 from .line_kernels import gradient, law_of, line_at, pull_together, strain
 
 
@@ -79,8 +80,8 @@ def kernels(law, tau, gradients, weights):
                     largest = tension
                 power -= weights[q] * line.natural_length * pull * rate
                 pull_together(f, cells, c, q, nodes, flat, weights[q] * pull * inverse, p0, p1, p2)
-            out[c, DAMPED_TENSION] = largest
-            out[c, POWER] = power
+            shows = record_at(LINE_OUT, out, c, 0)
+            shows.damped_tension, shows.power = largest, power
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):

@@ -14,10 +14,11 @@ import functools
 
 import numpy as np
 
+from ..compiled.rows import record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
 from ..tables import Table, table
-from .base import STRAIN, TENSION, Balance, ForceTerm, Tangent
+from .base import LINE_OUT, Balance, ForceTerm, Tangent
 from .line_kernels import law_of, line_at, pull_together, strain
 
 
@@ -52,7 +53,8 @@ def kernels(law, gradients, weights):
         """Add the forces of an element of one point, and write what it shows."""
         p0, p1, p2, scale, tension, e = pull
         pull_together(f, cells, c, 0, nodes, flat, scale, p0, p1, p2)
-        out[c, TENSION], out[c, STRAIN] = tension, e
+        shows = record_at(LINE_OUT, out, c, 0)
+        shows.tension, shows.strain = tension, e
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -63,8 +65,8 @@ def kernels(law, gradients, weights):
                 if q == 0 or tension > largest:
                     largest, stretched = tension, e
                 pull_together(f, cells, c, q, nodes, flat, scale, p0, p1, p2)
-            out[c, TENSION] = largest
-            out[c, STRAIN] = stretched
+            shows = record_at(LINE_OUT, out, c, 0)
+            shows.tension, shows.strain = largest, stretched
 
     @kernel(FORCE)
     def force_of_four(t, x, v, f, cells, data, out):

@@ -1,40 +1,29 @@
 """Common parts of kernels over line elements: gradients, strain, and forces along the line.
 
 ``gradients`` are dN/dξ of the reference element, by quadrature point and node, as one tuple of numbers. ``data`` of a
-kernel over lines is `refweb.net.line_data.LineData.matrix`: all terms of the compiled loop take matrices. `line_at`
-gives its columns their names.
+kernel over lines is `refweb.net.line_data.LineData.matrix`: all terms of the compiled loop take matrices. `LINE` gives
+its columns their names.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
+from ..compiled.rows import record_at
 from ..kernels import kernel
 from ..net.line_data import FIELDS
 from ..net.tension_laws import MIXED
 
-NATURAL_LENGTH, LAW = 0, int(np.dtype(FIELDS).itemsize // 8)
-"""Column of natural lengths, and that of the number of each element's law, where these differ."""
+LINE = np.dtype([*FIELDS, ("law", float)])
+"""Numbers of an element; the last is that of its law, where these differ."""
 
 
-class Line(NamedTuple):
-    """Numbers of an element, see `refweb.net.line_data.LineData`."""
-
-    natural_length: float
-    ea: float
-    slackness: float
-    smoothing: float
-    g0: float
-    r0: float
-
-
-@kernel()
+@kernel(forceinline=True)
 def line_at(data, c):
-    """The `Line` of cell c."""
-    return Line(data[c, 0], data[c, 1], data[c, 2], data[c, 3], data[c, 4], data[c, 5])
+    """The `LINE` of cell c."""
+    return record_at(LINE, data, c, 0)
 
 
 @kernel(forceinline=True)
@@ -50,14 +39,14 @@ def gradient(v, cells, c, q, nodes, gradients):
 
 
 @kernel(forceinline=True)
-def direction(x, cells, data, c, nodes, along, slopes):
-    """(dx/dξ over its length |d|, 1/|d|), or zeros, of the cell c of so many ``nodes``.
+def direction(x, cells, c, end):
+    """(dx/dξ over its length |d|, 1/|d|), or zeros, of the cell c.
 
-    From column ``along`` on data have d in the web's position, and from ``slopes`` on ∂d/∂x of each node.
+    ``end.along`` is d in the web's position, and ``end.slopes`` are ∂d/∂x of each node.
     """
-    d0, d1, d2 = data[c, along], data[c, along + 1], data[c, along + 2]
-    for b in range(nodes):
-        row, slope = cells[c, b], data[c, slopes + b]
+    d0, d1, d2 = end.along[0], end.along[1], end.along[2]
+    for b in range(end.slopes.size):
+        row, slope = cells[c, b], end.slopes[b]
         d0 += slope * x[row, 0]
         d1 += slope * x[row, 1]
         d2 += slope * x[row, 2]
@@ -69,14 +58,15 @@ def direction(x, cells, data, c, nodes, along, slopes):
 @kernel(forceinline=True)
 def law_of(law, data, c):
     """Number of the law of cell c, where ``law`` is that of all cells or `MIXED`."""
-    return np.int64(data[c, LAW]) if law == MIXED else law
+    return np.int64(line_at(data, c).law) if law == MIXED else law
 
 
 @kernel(forceinline=True)
 def strain(x, cells, data, c, q, nodes, gradients):
     """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c."""
     u0, u1, u2 = gradient(x, cells, c, q, nodes, gradients)
-    natural, r0, r1, r2, r = data[c, 0], data[c, 6], data[c, 7], data[c, 8], data[c, 9]
+    line = line_at(data, c)
+    natural, r0, r1, r2, r = line.natural_length, line.reference[0], line.reference[1], line.reference[2], line.distance
     p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
     length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
     square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2 + (r - natural) * (r + natural)

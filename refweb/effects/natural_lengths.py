@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import (
     ENERGY,
@@ -29,7 +30,7 @@ from ..kernels import (
 )
 from .base import column
 from .elasticity import length_force
-from .line_kernels import NATURAL_LENGTH
+from .line_kernels import LINE
 from .time_tables import flattened, interpolate
 
 
@@ -84,11 +85,11 @@ class NaturalLengths(Record):
 def set_lengths(t: float, lengths: NaturalLengths, lines: Matrix) -> None:
     """Write natural lengths at time t to the numbers of all ``lines``."""
     for c in range(lengths.elements.size):
-        lines[lengths.elements[c], NATURAL_LENGTH] = lengths.built[c]
+        record_at(LINE, lines, lengths.elements[c], 0).natural_length = lengths.built[c]
     for i in range(len(lengths.tables)):
         factor, cells = interpolate(t, lengths.tables[i], 0, 2, 1)[0], lengths.cells[i]
         for c in range(cells.shape[0]):
-            lines[cells[c, 0], NATURAL_LENGTH] *= factor
+            record_at(LINE, lines, cells[c, 0], 0).natural_length *= factor
 
 
 def with_factor(net, lines, table):

@@ -16,14 +16,16 @@ import math
 
 import numpy as np
 
+from ..compiled.rows import column_of, matrix_of, record_at, width_of
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..tables import Several, Table, nodes, real, rows, table, vector
 from .base import CellElements, Tangent, without
 from .outer_load import factor_at, outer_load
 
-# Columns of data: p n; dX/dξ; the factor.
-NORMAL, ALONG, FACTOR = 0, 3, 6
+PUSH = np.dtype([("normal", float, (3,)), ("along", float, (3,))])
+"""Data of a cell, p n and dX/dξ; behind it stands the factor."""
+FACTOR = width_of(PUSH)
 
 
 @functools.cache
@@ -43,11 +45,11 @@ def kernels(nodes, shares, couples):
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            times, power = factor_at(t, data[c], FACTOR), 0.0
-            n0, n1, n2 = times * data[c, 0], times * data[c, 1], times * data[c, 2]
+            times, power, push = factor_at(t, data[c], FACTOR), 0.0, record_at(PUSH, data, c, 0)
+            n0, n1, n2 = times * push.normal[0], times * push.normal[1], times * push.normal[2]
             for a in range(nodes):
                 row, share = cells[c, a], shares[a]
-                d0, d1, d2 = share * data[c, ALONG], share * data[c, ALONG + 1], share * data[c, ALONG + 2]
+                d0, d1, d2 = share * push.along[0], share * push.along[1], share * push.along[2]
                 for b in range(nodes):
                     column, couple = cells[c, b], couples[nodes * a + b]
                     d0 += couple * x[column, 0]
@@ -64,19 +66,20 @@ def kernels(nodes, shares, couples):
     def stiffness(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
-            times = factor_at(t, data[c], FACTOR)
+            times, normal = factor_at(t, data[c], FACTOR), record_at(PUSH, data, c, 0).normal
             for a in range(nodes if not definite else 0):
                 for b in range(nodes):
                     for i in range(3):
                         j, k = (i + 1) % 3, (i + 2) % 3
-                        push = times * couples[nodes * a + b] * data[c, NORMAL + i]
+                        push = times * couples[nodes * a + b] * normal[i]
                         blocks[c, 3 * a + j, 3 * b + k] -= push
                         blocks[c, 3 * a + k, 3 * b + j] += push
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            area = data[c, FACTOR] * math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))
+            largest, n = FACTOR, record_at(PUSH, data, c, 0).normal
+            area = data[c, largest] * math.sqrt(2.0 * (n[0] ** 2 + n[1] ** 2 + n[2] ** 2))
             for a in range(nodes):
                 for b in range(nodes):
                     rates[cells[c, a]] += area * abs(couples[nodes * a + b])
@@ -147,14 +150,15 @@ class Pressure(Table):
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         sides = np.ones(len(net.web.lines)) if self.away_from is None else self._sides(net.web, lines, normal)
         pushed = self.value * sides[net.line[at], None] * normal
-        data = np.hstack([pushed, net.line_data.reference[at]])
+        cells, data = np.ascontiguousarray(net.cells[at]), np.zeros(len(at), PUSH)
+        data["normal"], data["along"] = pushed, net.line_data.reference[at]
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
         arguments = dict(
             force=force,
             tangent=Tangent(stiffness, bound, symmetric=False),
-            elements=CellElements(at, without(slice(NORMAL, NORMAL + 3))),
+            elements=CellElements(at, without(slice(column_of(PUSH, "normal"), column_of(PUSH, "along")))),
         )
-        return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **arguments)
+        return outer_load(net, "pressure", cells, matrix_of(data), self.factor, **arguments)
 
     def _sides(self, web, lines, normal):
         """Sign of each line: 1 if it pushes away from the point by itself, −1 if not."""

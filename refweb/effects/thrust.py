@@ -14,6 +14,7 @@ import functools
 
 import numpy as np
 
+from ..compiled.rows import matrix_of, record_at, width_of
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import quote
@@ -26,20 +27,26 @@ SHORTER = 0.5
 """Length, of that at a history row, down to which a line may shrink until the next within the bound of the step."""
 
 
-# Columns of data: F; d at x = 0; ∂d/∂x of each node, the first of which is the one that is pulled; the factor.
-ALONG, SLOPES = 1, 4
+def end_of(nodes):
+    """Dtype of the data of elements with so many nodes; behind it stands the factor.
+
+    F; d at x = 0; ∂d/∂x of each node, the first of which is the one that is pulled.
+    """
+    return np.dtype([("force", float), ("along", float, (3,)), ("slopes", float, (nodes,))])
 
 
 @functools.cache
 def kernels(nodes):
     """Force, stiffness and bound kernels of elements with so many nodes."""
-    times = SLOPES + nodes
+    End = end_of(nodes)
+    times = width_of(End)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            (e0, e1, e2), _ = direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            row, pull = cells[c, 0], data[c, 0] * factor_at(t, data[c], times)
+            end = record_at(End, data, c, 0)
+            (e0, e1, e2), _ = direction(x, cells, c, end)
+            row, pull = cells[c, 0], end.force * factor_at(t, data[c], times)
             f[row, 0] += pull * e0
             f[row, 1] += pull * e1
             f[row, 2] += pull * e2
@@ -49,21 +56,23 @@ def kernels(nodes):
     def stiffness(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
-            e, inverse = direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            turn = data[c, 0] * factor_at(t, data[c], times) * inverse
+            end = record_at(End, data, c, 0)
+            e, inverse = direction(x, cells, c, end)
+            turn = end.force * factor_at(t, data[c], times) * inverse
             for b in range(nodes if not definite else 0):
                 for i in range(3):
                     for j in range(3):
                         across = (1.0 if i == j else 0.0) - e[i] * e[j]
-                        blocks[c, i, 3 * b + j] = -turn * data[c, SLOPES + b] * across
+                        blocks[c, i, 3 * b + j] = -turn * end.slopes[b] * across
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            _, inverse = direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            turn = 1.4 * abs(data[c, 0]) * data[c, times] * inverse / SHORTER  # row sums of I − e⊗e are below 1.4
+            end = record_at(End, data, c, 0)
+            _, inverse = direction(x, cells, c, end)
+            turn = 1.4 * abs(end.force) * data[c, times] * inverse / SHORTER  # row sums of I − e⊗e are below 1.4
             for b in range(nodes):
-                rates[cells[c, 0]] += turn * abs(data[c, SLOPES + b])
+                rates[cells[c, 0]] += turn * abs(end.slopes[b])
 
     return force, stiffness, bound
 
@@ -118,13 +127,14 @@ class Thrust(Table):
         power = np.arange(len(order))
         functions = np.linalg.inv(np.vander(net.places, increasing=True))
         slopes = sign * (power[1:] * position ** (power[1:] - 1)) @ functions[1:]
-        reference = sign * net.line_data.reference[cell]
-        cells, data = np.ascontiguousarray(net.cells[[cell]][:, order]), [[self.force, *reference, *slopes[order]]]
+        end = np.zeros(1, end_of(len(order)))
+        end["force"], end["along"], end["slopes"] = self.force, sign * net.line_data.reference[cell], slopes[order]
+        cells = np.ascontiguousarray(net.cells[[cell]][:, order])
         force, stiffness, bound = kernels(len(order))
         parts = dict(
             force=force, tangent=Tangent(stiffness, bound, False), elements=CellElements(np.array([cell]), without(0))
         )
-        return outer_load(net, "thrust", cells, data, self.factor, **parts)
+        return outer_load(net, "thrust", cells, matrix_of(end), self.factor, **parts)
 
     def _line(self, web, node):
         """Number of the line that ends at a node."""

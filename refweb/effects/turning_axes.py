@@ -19,14 +19,23 @@ import math
 
 import numpy as np
 
+from ..compiled.rows import matrix_of, record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from .base import ForceTerm, Tangent, Timing, VelocityForce, column
 
-STIFFEST, MASS = 9, 10
-"""Columns of data of the first part, behind G: the largest eigenvalue of −G, at least 0; the mass matrix of the cell,
-behind which stand the positions of its nodes in the web."""
-TURNED = 3
-"""First column of a cell's mass matrix behind Ω, of the Coriolis force."""
+
+def position_of(nodes):
+    """Dtype of the data of M G r of cells of so many nodes.
+
+    G; the largest eigenvalue of −G, at least 0; the mass matrix of the cell, and the positions of its nodes in the web.
+    """
+    cell = [("mass", float, (nodes, nodes)), ("points", float, (nodes, 3))]
+    return np.dtype([("pull", float, (3, 3)), ("stiffest", float), *cell])
+
+
+def velocity_of(nodes):
+    """Dtype of the data of the Coriolis force: Ω, and the mass matrix of a cell of so many nodes."""
+    return np.dtype([("speed", float, (3,)), ("mass", float, (nodes, nodes))])
 
 
 @functools.cache
@@ -38,73 +47,78 @@ def kernels_of_place(nodes):
     nodes : int
         Nodes per cell, which its mass matrix couples.
     """
-    rest = MASS + nodes * nodes
+    Position = position_of(nodes)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
+            masses = record_at(Position, data, c, 0)
+            pull, at = masses.pull, masses.points
             for b in range(nodes):
-                row, at = cells[c, b], rest + 3 * b
-                p0, p1, p2 = data[c, at] + x[row, 0], data[c, at + 1] + x[row, 1], data[c, at + 2] + x[row, 2]
+                row = cells[c, b]
+                p0, p1, p2 = at[b, 0] + x[row, 0], at[b, 1] + x[row, 1], at[b, 2] + x[row, 2]
                 for a in range(nodes):
-                    to, m = cells[c, a], data[c, MASS + nodes * a + b]
+                    to, m = cells[c, a], masses.mass[a, b]
                     for i in range(3):
-                        f[to, i] += m * (data[c, 3 * i] * p0 + data[c, 3 * i + 1] * p1 + data[c, 3 * i + 2] * p2)
+                        f[to, i] += m * (pull[i, 0] * p0 + pull[i, 1] * p1 + pull[i, 2] * p2)
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
         for c in range(cells.shape[0]):
-            out[c] = 0.0
+            masses, out[c] = record_at(Position, data, c, 0), 0.0
+            pull, at = masses.pull, masses.points
             for b in range(nodes):
-                row, at = cells[c, b], rest + 3 * b
-                p0, p1, p2 = 2.0 * data[c, at], 2.0 * data[c, at + 1], 2.0 * data[c, at + 2]
+                row = cells[c, b]
+                p0, p1, p2 = 2.0 * at[b, 0], 2.0 * at[b, 1], 2.0 * at[b, 2]
                 p0, p1, p2 = p0 + x[row, 0], p1 + x[row, 1], p2 + x[row, 2]
                 for a in range(nodes):
-                    to, m = cells[c, a], data[c, MASS + nodes * a + b]
+                    to, m = cells[c, a], masses.mass[a, b]
                     for i in range(3):
-                        pull = data[c, 3 * i] * p0 + data[c, 3 * i + 1] * p1 + data[c, 3 * i + 2] * p2
-                        out[c] -= 0.5 * m * x[to, i] * pull
+                        out[c] -= 0.5 * m * x[to, i] * (pull[i, 0] * p0 + pull[i, 1] * p1 + pull[i, 2] * p2)
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
-            blocks[c] = 0.0
+            masses, blocks[c] = record_at(Position, data, c, 0), 0.0
             for a in range(nodes if not definite else 0):
                 for b in range(nodes):
-                    m = data[c, MASS + nodes * a + b]
+                    m = masses.mass[a, b]
                     for i in range(3):
                         for j in range(3):
-                            blocks[c, 3 * a + i, 3 * b + j] -= m * data[c, 3 * i + j]
+                            blocks[c, 3 * a + i, 3 * b + j] -= m * masses.pull[i, j]
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
+            masses = record_at(Position, data, c, 0)
             for a in range(nodes):
                 for b in range(nodes):
-                    rates[cells[c, a]] += data[c, STIFFEST] * abs(data[c, MASS + nodes * a + b])
+                    rates[cells[c, a]] += masses.stiffest * abs(masses.mass[a, b])
 
     return force, energy, stiffness, bound
 
 
 @kernel()
-def turned(data, c, a0, a1, a2):
+def turned(w0, w1, w2, a0, a1, a2):
     """Ω × a."""
-    w0, w1, w2 = data[c, 0], data[c, 1], data[c, 2]
     return w1 * a2 - w2 * a1, w2 * a0 - w0 * a2, w0 * a1 - w1 * a0
 
 
 @functools.cache
 def kernels_of_velocity(nodes):
     """Force, damping and its bound of the Coriolis force, of cells of so many nodes."""
+    Velocity = velocity_of(nodes)
 
     @kernel(FORCE)
     def coriolis(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
+            velocity = record_at(Velocity, data, c, 0)
+            w = velocity.speed
             for b in range(nodes):
                 row = cells[c, b]
-                q0, q1, q2 = turned(data, c, v[row, 0], v[row, 1], v[row, 2])
+                q0, q1, q2 = turned(w[0], w[1], w[2], v[row, 0], v[row, 1], v[row, 2])
                 for a in range(nodes):
-                    to, m = cells[c, a], 2.0 * data[c, TURNED + nodes * a + b]
+                    to, m = cells[c, a], 2.0 * velocity.mass[a, b]
                     f[to, 0] -= m * q0
                     f[to, 1] -= m * q1
                     f[to, 2] -= m * q2
@@ -112,22 +126,24 @@ def kernels_of_velocity(nodes):
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
-            blocks[c] = 0.0
+            velocity, blocks[c] = record_at(Velocity, data, c, 0), 0.0
             for a in range(nodes if not definite else 0):
                 for b in range(nodes):
-                    m = 2.0 * data[c, TURNED + nodes * a + b]
+                    m = 2.0 * velocity.mass[a, b]
                     for i in range(3):
                         j, k = (i + 1) % 3, (i + 2) % 3
-                        blocks[c, 3 * a + j, 3 * b + k] -= m * data[c, i]
-                        blocks[c, 3 * a + k, 3 * b + j] += m * data[c, i]
+                        blocks[c, 3 * a + j, 3 * b + k] -= m * velocity.speed[i]
+                        blocks[c, 3 * a + k, 3 * b + j] += m * velocity.speed[i]
 
     @kernel(BOUND)
     def damping_bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            largest = math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))  # of row sums of Ω ×
+            velocity = record_at(Velocity, data, c, 0)
+            w = velocity.speed
+            largest = math.sqrt(2.0 * (w[0] ** 2 + w[1] ** 2 + w[2] ** 2))  # of row sums of Ω ×
             for a in range(nodes):
                 for b in range(nodes):
-                    rates[cells[c, a]] += 2.0 * largest * abs(data[c, TURNED + nodes * a + b])
+                    rates[cells[c, a]] += 2.0 * largest * abs(velocity.mass[a, b])
 
     return coriolis, damping, damping_bound
 
@@ -164,18 +180,14 @@ def force_terms(net, frame, pull, **arguments):
     return terms
 
 
-def _numbers(head, *parts):
-    """Rows that begin with the same numbers, each part flat behind them."""
-    flat = [np.reshape(part, (len(part), int(np.prod(np.shape(part)[1:])))) for part in parts]
-    return np.ascontiguousarray(np.hstack([np.tile(head, (len(parts[0]), 1)), *flat]))
-
-
 def _of_place(cells, mass, points, pull, frame, arguments):
-    stiffest = max(-float(np.linalg.eigvalsh(pull)[0]), 0.0)
+    stiffest, data = max(-float(np.linalg.eigvalsh(pull)[0]), 0.0), np.zeros(len(cells), position_of(cells.shape[1]))
+    data["pull"], data["stiffest"], data["points"] = pull, stiffest, np.reshape(points, data["points"].shape)
+    data["mass"] = np.reshape(mass, data["mass"].shape)
     force, energy, stiffness, bound = kernels_of_place(cells.shape[1])
     return ForceTerm(
         cells=cells,
-        data=_numbers([*np.ravel(pull), stiffest], mass, points),
+        data=matrix_of(data),
         force=force,
         energy=energy,
         tangent=Tangent(stiffness, bound if stiffest else None),  # what only lowers frequencies makes no step shorter
@@ -185,10 +197,12 @@ def _of_place(cells, mass, points, pull, frame, arguments):
 
 
 def _of_velocity(cells, mass, frame, arguments):
+    data = np.zeros(len(cells), velocity_of(cells.shape[1]))
+    data["speed"], data["mass"] = frame.angular_velocity, np.reshape(mass, data["mass"].shape)
     force, damping, damping_bound = kernels_of_velocity(cells.shape[1])
     return ForceTerm(
         cells=cells,
-        data=_numbers(frame.angular_velocity, mass),
+        data=matrix_of(data),
         force=force,
         tangent=Tangent(symmetric=False),
         velocity=VelocityForce(damping, damping_bound),

@@ -15,23 +15,35 @@ import math
 
 import numpy as np
 
+from ..compiled.rows import matrix_of, record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..net.rotation import RigidRotations, matrix_at, times, to_quaternion
 from .base import ForceTerm, Tangent, Timing, VelocityForce
 from .vectors import cross
 
-PULL, SPEED, SPREAD, MOBILITY, LARGEST = 0, 9, 12, 21, 30
-"""Columns of data: G, Ω, S and W at the start, and the largest eigenvalue of S times that of W [kg m²]."""
+_matrix = float, (3, 3)
+BODY = np.dtype(
+    [
+        ("pull", *_matrix),
+        ("speed", float, (3,)),
+        ("spread", *_matrix),
+        ("mobility", *_matrix),
+        ("largest", float),
+    ]
+)
+"""Data of a body: G, Ω, S and W at the start, and the largest eigenvalue of S times that of W [kg m²]."""
 
 
-@kernel()
-def rows_of(data, c, at):
-    """A matrix of the numbers of a cell, by rows."""
-    return (
-        (data[c, at], data[c, at + 1], data[c, at + 2]),
-        (data[c, at + 3], data[c, at + 4], data[c, at + 5]),
-        (data[c, at + 6], data[c, at + 7], data[c, at + 8]),
-    )
+@kernel(forceinline=True)
+def body_at(data, c):
+    """The `BODY` of cell c."""
+    return record_at(BODY, data, c, 0)
+
+
+@kernel(forceinline=True)
+def rows_of(m):
+    """A matrix, by rows."""
+    return (m[0, 0], m[0, 1], m[0, 2]), (m[1, 0], m[1, 1], m[1, 2]), (m[2, 0], m[2, 1], m[2, 2])
 
 
 @kernel()
@@ -73,8 +85,9 @@ def unit(j):
 @kernel(FORCE)
 def force(t, x, v, f, cells, data, out):
     for c in range(cells.shape[0]):
-        s = turned(matrix_at(x, cells[c, 0], cells[c, 1]), rows_of(data, c, SPREAD))
-        moment = turning_of(s, rows_of(data, c, PULL))
+        body = body_at(data, c)
+        s = turned(matrix_at(x, cells[c, 0], cells[c, 1]), rows_of(body.spread))
+        moment = turning_of(s, rows_of(body.pull))
         for k in range(3):
             f[cells[c, 0], k] += moment[k]
 
@@ -82,8 +95,9 @@ def force(t, x, v, f, cells, data, out):
 @kernel(ENERGY)
 def energy(t, x, cells, data, out):
     for c in range(cells.shape[0]):
-        start = rows_of(data, c, SPREAD)
-        s, g = turned(matrix_at(x, cells[c, 0], cells[c, 1]), start), rows_of(data, c, PULL)
+        body = body_at(data, c)
+        start = rows_of(body.spread)
+        s, g = turned(matrix_at(x, cells[c, 0], cells[c, 1]), start), rows_of(body.pull)
         out[c] = 0.0
         for i in range(3):
             for j in range(3):
@@ -94,7 +108,8 @@ def energy(t, x, cells, data, out):
 def stiffness(t, x, v, blocks, cells, data, definite):
     blocks[:] = 0.0
     for c in range(cells.shape[0] if not definite else 0):
-        s, g = turned(matrix_at(x, cells[c, 0], cells[c, 1]), rows_of(data, c, SPREAD)), rows_of(data, c, PULL)
+        body = body_at(data, c)
+        s, g = turned(matrix_at(x, cells[c, 0], cells[c, 1]), rows_of(body.spread)), rows_of(body.pull)
         for j in range(3):
             change = turning_of(changed(unit(j), s), g)
             for i in range(3):
@@ -105,18 +120,19 @@ def stiffness(t, x, v, blocks, cells, data, definite):
 @kernel(BOUND)
 def bound(reach, speed, x, mass, rates, cells, data):
     for c in range(cells.shape[0]):
-        size = 0.0
-        for k in range(9):
-            size += data[c, PULL + k] ** 2
-        rates[cells[c, 0]] += 4.0 * data[c, LARGEST] * math.sqrt(size)
+        size, body = 0.0, body_at(data, c)
+        for i in range(3):
+            for j in range(3):
+                size += body.pull[i, j] ** 2
+        rates[cells[c, 0]] += 4.0 * body.largest * math.sqrt(size)
 
 
 @kernel()
 def whirl(x, v, data, c, cells):
     """(ω, S Ω, W) along the axes of the scene."""
-    m, a = matrix_at(x, cells[c, 0], cells[c, 1]), cells[c, 0]
-    w, o = turned(m, rows_of(data, c, MOBILITY)), (data[c, SPEED], data[c, SPEED + 1], data[c, SPEED + 2])
-    s = times(turned(m, rows_of(data, c, SPREAD)), o)
+    m, a, body = matrix_at(x, cells[c, 0], cells[c, 1]), cells[c, 0], body_at(data, c)
+    w, o = turned(m, rows_of(body.mobility)), (body.speed[0], body.speed[1], body.speed[2])
+    s = times(turned(m, rows_of(body.spread)), o)
     return times(w, (v[a, 0], v[a, 1], v[a, 2])), s, w
 
 
@@ -133,9 +149,9 @@ def coriolis(t, x, v, f, cells, data, out):
 def coriolis_stiffness(t, x, v, blocks, cells, data, definite):
     blocks[:] = 0.0
     for c in range(cells.shape[0] if not definite else 0):
-        (omega, own_velocity, w), a = whirl(x, v, data, c, cells), cells[c, 0]
-        s = turned(matrix_at(x, a, cells[c, 1]), rows_of(data, c, SPREAD))
-        u, o = (v[a, 0], v[a, 1], v[a, 2]), (data[c, SPEED], data[c, SPEED + 1], data[c, SPEED + 2])
+        (omega, own_velocity, w), a, body = whirl(x, v, data, c, cells), cells[c, 0], body_at(data, c)
+        s = turned(matrix_at(x, a, cells[c, 1]), rows_of(body.spread))
+        u, o = (v[a, 0], v[a, 1], v[a, 2]), (body.speed[0], body.speed[1], body.speed[2])
         for j in range(3):
             e = unit(j)
             first, less = cross(e, omega), times(w, cross(e, u))
@@ -160,8 +176,9 @@ def damping(t, x, v, blocks, cells, data, definite):
 @kernel(BOUND)
 def damping_bound(reach, speed, x, mass, rates, cells, data):
     for c in range(cells.shape[0]):
-        size = data[c, SPEED] ** 2 + data[c, SPEED + 1] ** 2 + data[c, SPEED + 2] ** 2
-        rates[cells[c, 0]] += 2.0 * math.sqrt(3.0 * size) * data[c, LARGEST]
+        body = body_at(data, c)
+        size = body.speed[0] ** 2 + body.speed[1] ** 2 + body.speed[2] ** 2
+        rates[cells[c, 0]] += 2.0 * math.sqrt(3.0 * size) * body.largest
 
 
 def force_terms(net, speed, pull, arguments):
@@ -169,15 +186,14 @@ def force_terms(net, speed, pull, arguments):
     turns = RigidRotations.of(net)
     tensors = [body.axes.T @ body.inertia @ body.axes for body in net.bodies if body.turn is not None]
     spreads = [0.5 * np.trace(tensor) * np.eye(3) - tensor for tensor in tensors]
-    largest = [
+    data = np.zeros(len(spreads), BODY)
+    data["pull"], data["speed"], data["spread"], data["mobility"] = pull, speed, spreads, turns.mobility
+    data["largest"] = [
         np.linalg.eigvalsh(spread)[-1] * np.linalg.eigvalsh(mobility)[-1]
         for spread, mobility in zip(spreads, turns.mobility, strict=True)
     ]
     cells = np.ascontiguousarray(turns.rows[:, 1:], dtype=np.int32)
-    head = np.tile([*np.ravel(pull), *speed], (len(cells), 1))
-    parts = head, *(np.reshape(part, (len(cells), 9)) for part in (spreads, turns.mobility)), np.array(largest)
-    data = np.ascontiguousarray(np.column_stack(parts))
-    shared: dict = dict(cells=cells, data=data, **arguments)
+    shared: dict = dict(cells=cells, data=matrix_of(data), **arguments)
     still = ForceTerm(force=force, energy=energy, tangent=Tangent(stiffness, bound, symmetric=False), **shared)
     moving = ForceTerm(
         force=coriolis,

@@ -20,10 +20,11 @@ from ..errors import InputError
 
 POINT, SEGMENT, ARC = 0.0, 1.0, 2.0
 """Kinds of a part."""
-KIND, THICKNESS, FROM, TO, THIRD, OWNS, COLUMNS = 0, 1, 2, 5, 8, 11, 13
-"""Columns of a part: kind; thickness [m]; the point, both ends of a line, or the centre of an arc and two vectors at
-right angles of its radius, of which the places are centre + TO cos φ + THIRD sin φ [m]; whether it owns its ends, or φ
-at both ends [rad]. All is from the centre of the shape along its axes."""
+_vectors = [(name, float, (3,)) for name in ("start", "end", "third")]
+PART = np.dtype([("kind", float), ("thickness", float), *_vectors, ("owns", float, (2,))])
+"""A part: its kind; thickness [m]; the point, both ends of a line, or the centre of an arc and two vectors at right
+angles of its radius, of which the places are start + end cos φ + third sin φ [m]; whether it owns its ends, or φ at
+both ends [rad]. All is from the centre of the shape along its axes."""
 ARCS = 4
 """Number of arcs in a row around a rim."""
 FLAT = 1e-3
@@ -33,35 +34,34 @@ MOST = 3000
 
 
 def points(places, thickness):
-    """Parts that are points (n, 3), shape (n, `COLUMNS`)."""
-    rows = np.zeros((len(places), COLUMNS))
-    rows[:, KIND], rows[:, THICKNESS], rows[:, FROM:TO] = POINT, thickness, places
-    return rows
+    """Parts that are points (n, 3), an array of `PART`."""
+    parts = np.zeros(len(places), PART)
+    parts["kind"], parts["thickness"], parts["start"] = POINT, thickness, places
+    return parts
 
 
 def edges(places, pairs, thickness):
-    """Parts that are the lines between pairs (n, 2) of points (n, 3), shape (n, `COLUMNS`).
+    """Parts that are the lines between pairs (n, 2) of points (n, 3), an array of `PART`.
 
     Each point belongs to the first line that ends there.
     """
-    rows, owned = np.zeros((len(pairs), COLUMNS)), set()
-    rows[:, KIND], rows[:, THICKNESS] = SEGMENT, thickness
-    for n, pair in enumerate(pairs):
-        for end, (corner, column) in enumerate(zip(pair, (FROM, TO), strict=True)):
-            rows[n, column : column + 3] = places[corner]
-            rows[n, OWNS + end] = corner not in owned
+    parts, owned = np.zeros(len(pairs), PART), set()
+    parts["kind"], parts["thickness"] = SEGMENT, thickness
+    for part, pair in zip(parts, pairs, strict=True):
+        for end, (corner, name) in enumerate(zip(pair, ("start", "end"), strict=True)):
+            part[name], part["owns"][end] = places[corner], corner not in owned
             owned.add(corner)
-    return rows
+    return parts
 
 
 def rim(radius, height, thickness):
-    """Parts of a circle about the third axis, shape (2 `ARCS`, `COLUMNS`)."""
-    rows = np.zeros((2 * ARCS, COLUMNS))
-    rows[:, KIND], rows[:, THICKNESS] = ARC, thickness
-    rows[:, FROM + 2], rows[:, TO], rows[:, THIRD + 1] = height, radius, radius
-    rows[:, OWNS] = math.pi / ARCS * np.arange(2 * ARCS)
-    rows[:, OWNS + 1] = rows[:, OWNS] + 2.0 * math.pi / ARCS
-    return rows
+    """Parts of a circle about the third axis, an array of 2 `ARCS` of `PART`."""
+    parts = np.zeros(2 * ARCS, PART)
+    parts["kind"], parts["thickness"] = ARC, thickness
+    parts["start"], parts["end"], parts["third"] = (0.0, 0.0, height), (radius, 0.0, 0.0), (0.0, radius, 0.0)
+    begin = math.pi / ARCS * np.arange(2 * ARCS)
+    parts["owns"] = np.column_stack([begin, begin + 2.0 * math.pi / ARCS])
+    return parts
 
 
 def of_box(grown):
@@ -96,7 +96,7 @@ def of_cylinder(grown):
             parts.append(edges(np.array([[0.0, 0.0, at] for at in heights]), [(0, 1)], thickness))
         else:
             parts.append(points(np.zeros((1, 3)), thickness))
-    return np.vstack(parts)
+    return np.concatenate(parts)
 
 
 def of_surface(corners, triangles):

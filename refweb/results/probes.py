@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from ..effects.base import DEPTH, ELEMENT, FORCE
+from ..compiled.rows import record_at
+from ..effects.base import FELT
 from ..kernels import INTEGERS, MATRIX, kernel
 
 PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, MATRIX, INTEGERS)
@@ -187,10 +188,8 @@ def contact_force(t, x, v, f, lines, rows, data, where):
     total0 = total1 = total2 = 0.0
     where[0] = -1
     for n in range(1, rows.size):
-        r = rows[n]
-        total0 += data[r, FORCE]
-        total1 += data[r, FORCE + 1]
-        total2 += data[r, FORCE + 2]
+        force = record_at(FELT, data, rows[n], 0).force
+        total0, total1, total2 = total0 + force[0], total1 + force[1], total2 + force[2]
     return component_of(rows[0], total0, total1, total2)
 
 
@@ -199,8 +198,9 @@ def contact_depth(t, x, v, f, lines, rows, data, where):
     """Largest depth in some rows of what bodies feel, 0 where nothing touches."""
     deepest, where[0] = 0.0, -1
     for r in rows:
-        if data[r, DEPTH] > deepest:
-            deepest, where[0] = data[r, DEPTH], int(data[r, ELEMENT])
+        felt = record_at(FELT, data, r, 0)
+        if felt.depth > deepest:
+            deepest, where[0] = felt.depth, int(felt.element)
     return deepest
 
 
@@ -280,8 +280,8 @@ def selected_contact(t, x, v, f, lines, rows, data, where):
     """
     select, count, best = rows[0], rows[2], -math.inf
     for n in range(count):
-        r = rows[3 + n]
-        score = _score(select, component_of(rows[1], data[r, FORCE], data[r, FORCE + 1], data[r, FORCE + 2]))
+        force = record_at(FELT, data, rows[3 + n], 0).force
+        score = _score(select, component_of(rows[1], force[0], force[1], force[2]))
         if score > best:
             best, where[0] = score, rows[3 + count + n]
     return _counted(select, best)

@@ -6,7 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..effects.base import OWN
+from ..compiled.rows import records_of
+from ..effects.base import TOUCH
 from ..findings import Finding
 from ..net.tension_laws import LINEAR, SMOOTH, Law
 from .columns import static_energies
@@ -34,7 +35,8 @@ class State:
     @cached_property
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
-        contact = {i: per_cell[i][:, OWN] for i, f in enumerate(self.system.terms) if f.contact.with_lines}
+        lines = [i for i, term in enumerate(self.system.terms) if term.contact.with_lines]
+        contact = {i: records_of(TOUCH, per_cell[i])["value"] for i in lines}
         felt = self.system.contact_forces.of(per_cell) if any(f.contact.felt for f in self.system.terms) else None
         return force, per_cell.tension, contact, felt
 

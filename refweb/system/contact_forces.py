@@ -13,7 +13,8 @@ from typing import Annotated
 import numpy as np
 from numba import from_dtype, types
 
-from ..effects.base import DEPTH, ELEMENT, FELT, FELT_COLUMNS, FORCE, OWN, pairs_of
+from ..compiled.rows import record_at, records_of
+from ..effects.base import FELT, FELT_COLUMNS, TOUCH, pairs_of
 from ..kernels import kernel
 
 CONTACT_TERM = np.dtype([(name, np.int64) for name in ("number", "body", "partner", "elements", "pairs", "chosen")])
@@ -62,7 +63,7 @@ class ContactForces:
 
     def force_on(self, body, felt):
         """Force of contact on a body [N], shape (3,), of what bodies feel."""
-        return felt[self.row(body), FORCE : FORCE + 3]
+        return records_of(FELT, felt)["force"][self.row(body)]
 
     def lines_on(self, body):
         """(number of the term, slice of its cells) of the push of lines on a body; cells are in order of elements."""
@@ -92,28 +93,27 @@ class ContactForces:
 def forget(felt):
     """Begin with no contact."""
     for r in range(felt.shape[0]):
-        for k in range(ELEMENT):
-            felt[r, k] = 0.0
-        felt[r, ELEMENT] = -1.0
+        row = record_at(FELT, felt, r, 0)
+        row.depth = row.force[0] = row.force[1] = row.force[2] = 0.0
+        row.element = -1.0
 
 
 @kernel(leaf=True)
 def add_felt(first, term, cells, chosen, out, felt):
     """Add what bodies feel of the cells of a term; of those that are ``chosen`` where any are, shape (cells, 1)."""
     for c in range(cells.shape[0]):
-        x, y, z, cell_depth = out[c, FELT], out[c, FELT + 1], out[c, FELT + 2], out[c, OWN]
-        if cell_depth == 0.0 and x == 0.0 and y == 0.0 and z == 0.0:
+        touch = record_at(TOUCH, out, c, 0)
+        depth, force = touch.value, touch.force
+        if depth == 0.0 and force[0] == 0.0 and force[1] == 0.0 and force[2] == 0.0:
             continue
-        body, cell = cells[c, term.body] - first, chosen[c, 0] if chosen.shape[0] else c
-        felt[body, FORCE] += x
-        felt[body, FORCE + 1] += y
-        felt[body, FORCE + 2] += z
+        body, cell = record_at(FELT, felt, cells[c, term.body] - first, 0), chosen[c, 0] if chosen.shape[0] else c
+        for k in range(3):
+            body.force[k] += force[k]
         if term.partner >= 0:
-            partner_row = cells[c, term.partner] - first
-            felt[partner_row, FORCE] -= x
-            felt[partner_row, FORCE + 1] -= y
-            felt[partner_row, FORCE + 2] -= z
-        if term.elements > 0 and cell_depth > felt[body, DEPTH]:
-            felt[body, DEPTH], felt[body, ELEMENT] = cell_depth, float(cell % term.elements)
+            partner = record_at(FELT, felt, cells[c, term.partner] - first, 0)
+            for k in range(3):
+                partner.force[k] -= force[k]
+        if term.elements > 0 and depth > body.depth:
+            body.depth, body.element = depth, float(cell % term.elements)
         if term.pairs >= 0:
-            felt[term.pairs + cell, DEPTH] = cell_depth
+            record_at(FELT, felt, term.pairs + cell, 0).depth = depth

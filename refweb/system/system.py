@@ -31,6 +31,12 @@ MOST_TURN = 0.5
 """Largest angle by which a step of statics turns a body [rad]."""
 
 
+def parts_of(effects, net):
+    """Terms, motions, constraints and limits of effects on a net, in their order, a list."""
+    parts = [effect.on(net) for effect in effects if hasattr(effect, "on")]
+    return [item for part in parts for item in (part if isinstance(part, list) else [part])]
+
+
 class System:
     """A net, the effects on it and its supports.
 
@@ -71,11 +77,7 @@ class System:
         net = with_rotations(net)
         self.net, self.effects = net, effects
         self.rows = len(net.points)
-        acting = []
-        for effect in effects:
-            if hasattr(effect, "on"):
-                part = effect.on(net)
-                acting += part if isinstance(part, list) else [part]
+        acting = parts_of(effects, net)
         if any(body.axle and body.axle.torque for body in net.bodies):
             from ..effects.axle import torques
 
@@ -316,6 +318,14 @@ class System:
         changed.net = replace(self.net, line_data=numbers)
         changed._at_time = None
         changed.__dict__.pop("lengths", None)
+        return changed
+
+    def with_effects(self, effects):
+        """The same system with other numbers of some effects, by the name of their terms: these have the same cells."""
+        changed, terms = copy.copy(self), {}
+        for name, effect in effects.items():
+            terms[name] = iter(parts_of([effect], self.net))
+        changed.terms = [next(terms[term.name]) if term.name in terms else term for term in self.terms]
         return changed
 
     def data_of(self, term, t):

@@ -6,6 +6,7 @@ import pytest
 import scipy.optimize
 
 import refweb
+from refweb.kernels import CONTACT, PART
 from refweb.net.web import Web
 
 AIR, WATER = 1.2, 1000.0
@@ -105,6 +106,19 @@ def test_wind_does_work(keys):
     np.testing.assert_allclose(solution.results["speed"].value, speed, rtol=1e-3)  # of order 2: 1000 steps
     np.testing.assert_allclose(work, kinetic, rtol=1e-3)
     assert "dissipated_energy" not in solution.history and solution.solver["energy_drift"] < 1e-3
+
+
+def test_contacts_that_share_a_row_have_no_parts():
+    """Whatever stood in the memory of a contact before: only the first of a group has a part, the others have none."""
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0]).web()
+    system = nets.system(
+        web, refweb.Cable(law="linear", modulus=1e6, area=1e-6, density=1e3), [refweb.Drag(density=WATER)]
+    )
+    term = next(term for term in system.terms if term.name == "drag")
+    contacts, parts = np.zeros(4, CONTACT), np.zeros(4, PART)
+    contacts["count"], contacts["first"] = 10**6, np.arange(4)
+    assert term.velocity.implicit.detect(np.zeros((3, 3)), term.cells, term.data, contacts, parts, 0) == 4
+    assert contacts["group"].tolist() == [1, 2, 0, 1] and contacts["count"].tolist() == [1, 1, 0, 1]
 
 
 def test_steps_are_not_limited_by_drag():

@@ -12,6 +12,7 @@ import solids
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects.contact.nonconvex_contacts import share_out
+from refweb.effects.contact.pair import LINE_CONTACT
 
 SIZE, ROUND = (0.3, 0.4, 0.24), 0.08
 AXES = [(2.0, 1.0, -1.0), (-1.0, 2.0, 0.0)]
@@ -265,11 +266,11 @@ def test_a_surface_is_drawn_as_it_is(files):
 
 def test_shares_of_losses_are_those_of_the_rise():
     """Of maxima F = 3, 5, 2 with minima of 1 between the first two, they add up to (3 + 5 + 2 − 1) in all."""
-    found = np.zeros((4, 6))
-    found[:, 3], found[:, 5] = (1.0, -1.0, 1.0, 1.0), (3.0, 1.0, 5.0, 2.0)
+    found = np.zeros(4, LINE_CONTACT)
+    found["weight"], found["rise"] = (1.0, -1.0, 1.0, 1.0), (3.0, 1.0, 5.0, 2.0)
     share_out(found, 0, 4)
-    assert (found[:, 4] * found[:, 5]).sum() == pytest.approx(9.0)
-    np.testing.assert_allclose(found[:, 4], [1 - 0.5 / 3, 0.0, 1 - 0.5 / 5, 1.0])
+    assert (found["share"] * found["rise"]).sum() == pytest.approx(9.0)
+    np.testing.assert_allclose(found["share"], [1 - 0.5 / 3, 0.0, 1 - 0.5 / 5, 1.0])
 
 
 def test_friction_on_a_mesh_takes_energy(files):

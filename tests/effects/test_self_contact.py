@@ -10,20 +10,10 @@ import pytest
 from scipy.optimize import brentq, lsq_linear
 
 import refweb
+from refweb.compiled.rows import matrix_of
 from refweb.dynamics import schedule
 from refweb.effects.self_contact import line_line_damping, line_line_friction, line_line_penalty, search, table
-from refweb.effects.self_contact.pair import (
-    DAMPING,
-    FRICTION,
-    LENGTH,
-    OTHER,
-    ROLLS,
-    SCALE,
-    SHAPE,
-    SLIP,
-    TOUCH,
-    WIDTH,
-)
+from refweb.effects.self_contact.pair import PAIR
 from refweb.errors import InputError, SolverError
 from refweb.net import discretisation
 from refweb.net.web import Web
@@ -42,11 +32,12 @@ class Pair:
     def __init__(self, points, damping=0.3, rolling=True):
         self.points = np.array(points, dtype=float)
         p, touch = self.points, 2.0 * RADIUS
-        self.data = np.zeros((1, WIDTH))
-        self.data[0, [TOUCH, SCALE, DAMPING]] = touch, STIFFNESS / (np.sqrt(12.0) * touch**3), damping
-        self.data[0, [LENGTH, OTHER]] = np.linalg.norm(p[1] - p[0]), np.linalg.norm(p[3] - p[2])
-        self.data[0, SHAPE : SHAPE + 9] = (p[1:] - p[0]).ravel()
-        self.data[0, [FRICTION, SLIP, ROLLS]] = 0.4, 0.02, rolling
+        self.pair = np.zeros(1, PAIR)
+        self.pair["touch"], self.pair["scale"] = touch, STIFFNESS / (np.sqrt(12.0) * touch**3)
+        self.pair["length"], self.pair["second"] = np.linalg.norm(p[1] - p[0]), np.linalg.norm(p[3] - p[2])
+        self.pair["vectors"], self.pair["damping"], self.pair["rolls"] = p[1:] - p[0], damping, rolling
+        self.pair["friction"], self.pair["slip_velocity"] = 0.4, 0.02
+        self.data = matrix_of(self.pair)
 
     def energy(self, x=REST):
         out = np.zeros(1)
@@ -124,7 +115,7 @@ def test_stretched_lines_push_with_the_mean_of_their_stretches():
     """Of lines that cross: times k h (4 r² − h²)^(3/2)/(√27 r³), up to (c/L)² of lines 1000 radii long."""
     height, lengths = 0.13, (80.0, 125.0)
     pair = Pair(1000.0 * RADIUS * np.array(lines(1.1, 0.0)) + [[0, 0, 0], [0, 0, 0], [0, 0, height], [0, 0, height]])
-    pair.data[0, [LENGTH, OTHER]] = lengths
+    pair.pair["length"], pair.pair["second"] = lengths
     force, _ = pair.force()
     push = STIFFNESS * height * (4.0 * RADIUS**2 - height**2) ** 1.5 / (np.sqrt(27.0) * RADIUS**3)
     stretches = 1000.0 * RADIUS / np.array(lengths)
@@ -217,7 +208,7 @@ def test_friction_of_lines_that_do_not_roll():
     """It is μ N against how fast the other centre line goes past, spread as the push is; it keeps momentum, has a
     moment of 2r times itself, and takes energy. Tangents are those of the forces, to the kinks of the push."""
     for pair, x, v in some_pairs(40):
-        pair.data[0, ROLLS] = 0.0
+        pair.pair["rolls"] = 0.0
         force, power = pair.rub(x, v)
         size = np.abs(force).max()
         assert power < 0.0 and power == pytest.approx((force * v).sum(), rel=1e-11)
@@ -272,7 +263,7 @@ def test_what_slides_along_a_line_feels_no_joint():
         total = 0.0
         for first, last in itertools.pairwise(ends):
             pair = Pair([[first, 0, 0], [last, 0, 0], *other])
-            factor = np.sqrt(np.sin(1.2) ** 2 + 4.0 * RADIUS**2 / (pair.data[0, LENGTH] * 1.9))
+            factor = np.sqrt(np.sin(1.2) ** 2 + 4.0 * RADIUS**2 / (pair.pair["length"][0] * 1.9))
             total += pair.energy() / factor
         energies.append(total)
     np.testing.assert_allclose(energies, energies[0], rtol=1e-12)

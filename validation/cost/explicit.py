@@ -29,8 +29,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from refweb.compiled.rows import column_of, records_of
 from refweb.dynamics.simulation import Simulation
-from refweb.effects.contact.pair import AWAY, PENALTY, RADIUS
+from refweb.effects.contact.pair import AWAY, SPHERE
 from refweb.scene import Scene
 from refweb.solution import Solution
 
@@ -233,8 +234,8 @@ def compiled(folder, name):
         return None
     source, library = pathlib.Path(folder) / f"{name}.c", pathlib.Path(folder) / f"{name}.so"
     source.write_text(LEAN if name == "lean" else SOURCE)
-    names = {"REFERENCE": 6, "LENGTH": 0, "AXIAL": 1}  # see `refweb.net.line_data.FIELDS`
-    names |= {"RADIUS": RADIUS, "PENALTY": PENALTY, "AWAY": AWAY}
+    names = {"REFERENCE": 6, "LENGTH": 0, "AXIAL": 1, "AWAY": AWAY}  # see `refweb.net.line_data.FIELDS`
+    names |= {name: column_of(SPHERE, field) for name, field in (("RADIUS", "radius"), ("PENALTY", "stiffness"))}
     flags = [f"-D{name}={value}" for name, value in names.items()]
     command = [compiler, *FLAGS[name], "-shared", "-fPIC", *flags, "-o", library, source, "-lm"]
     subprocess.run(command, check=True)
@@ -300,13 +301,14 @@ def c_run(name, loop, system, counts, sizes):
     pairs = len(contact.cells) if contact else 0
     touch = contact.cells if contact else np.zeros((0, 3), dtype=np.int32)
     bodies = contact.data if contact else np.zeros((1, 8))
+    sphere = records_of(SPHERE, bodies)[0]
     if name == "lean":
         x += net.points
         natural = net.line_data.natural_length.copy()
         stiffness = net.line_data.ea / natural
         own = (
-            address(stiffness), address(natural), long(pairs > 0), double(bodies[0, RADIUS]),
-            double(bodies[0, PENALTY]),
+            address(stiffness), address(natural), long(pairs > 0), double(sphere["radius"]),
+            double(sphere["stiffness"]),
         )  # fmt: skip
     else:
         out, pressed, impulse = np.zeros((len(net.cells), 2)), np.zeros(max(pairs, 1)), np.zeros(3)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...effects.line_kernels import NATURAL_LENGTH
+from ...compiled.rows import record_at
+from ...effects.line_kernels import LINE
 from ...effects.natural_lengths import NaturalLengths, set_lengths
 from ...errors import EnergyDriftError
 from ...kernels import (
@@ -210,11 +211,11 @@ def change_lengths(t: float, x: Matrix, model: Model, was: Vector, length_force:
     """Set natural lengths at time t, and add the work of that, ½ (∂E/∂L + ∂E/∂L) ΔL."""
     lengths, cells, lines = model.lengths, model.terms.cells[0], model.terms.data[0]
     for c in range(was.size):
-        was[c] = lines[lengths.elements[c], NATURAL_LENGTH]
+        was[c] = record_at(LINE, lines, lengths.elements[c], 0).natural_length
     set_lengths(t, lengths, lines)
     write_length_force(t, x, lengths, cells, lines, length_force[1])
     for c in range(was.size):
-        change = lines[lengths.elements[c], NATURAL_LENGTH] - was[c]
+        change = record_at(LINE, lines, lengths.elements[c], 0).natural_length - was[c]
         work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * change
         length_force[0, c] = length_force[1, c]
 

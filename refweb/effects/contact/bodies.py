@@ -11,10 +11,11 @@ import itertools
 
 import numpy as np
 
+from ...compiled.rows import records_of, width_of
 from ...errors import InputError
-from ...net.skeleton import COLUMNS, THICKNESS
+from ...net.skeleton import PART
 from ..base import OWN, Balance, ContactForce, ForceTerm, Tangent, Timing, VelocityForce
-from .body_body_detection import PARTS, SIDE, SIDES
+from .body_body_detection import BODIES
 from .pair import lever
 
 PER_PART, MORE = 3, 1024
@@ -86,7 +87,7 @@ def _friction(net, depths, group):
 
     force, stiffness, damping, implicit = kernels(*depths)
     shared = _shared(net, group)
-    parts = shared["data"][:, [SIDES + PARTS, SIDES + SIDE + PARTS]].sum(axis=1)
+    parts = records_of(BODIES, shared["data"])["sides"]["parts"].sum(axis=1)
     return ForceTerm(
         **shared,
         force=force,
@@ -104,7 +105,8 @@ def _shared(net, group) -> dict:
     rows = np.zeros((len(data), max(len(row) for row in data)))
     for row, values in zip(rows, data, strict=True):
         row[: len(values)] = values
-    rows[:, 0] = rows[:, 0].max()
+    largest = records_of(BODIES, rows)["room"]
+    largest[:] = largest.max()
     cells = np.array(cells, dtype=np.int32)
     return dict(name="contact", cells=cells, data=rows)
 
@@ -114,17 +116,22 @@ def _pair(net, first, second, law):
     skeletons = [skeleton_of(body) for body in (first, second)]
     points = [len(parts) == 1 and body.shape.once for parts, body in zip(skeletons, (first, second), strict=True)]
     if points[0] or points[1]:
-        skeletons[0 if points[1] and not points[0] else 1] = np.zeros((0, COLUMNS))
-    rows, sides, begin = [first.row, second.row], [], SIDES + 2 * SIDE
-    grown = [max(parts[:, THICKNESS], default=0.0) for parts in reversed(skeletons)]
+        skeletons[0 if points[1] and not points[0] else 1] = np.zeros(0, PART)
+    rows, sides, begin = [first.row, second.row], [], width_of(BODIES)
+    grown = [max(parts["thickness"], default=0.0) for parts in reversed(skeletons)]
     for body, parts, more in zip((first, second), skeletons, grown, strict=True):
         spins = [row for row in (body.spin, body.turn) if row is not None]
         rows += (spins + [body.row, body.row])[:2]
         sides.append(_side(body, len(spins), law, len(parts), begin, more))
-        begin += parts.size
+        begin += parts.size * width_of(PART)
     convex = all(getattr(body.shape.depth(), "convex", True) for body in (first, second))
     size = 1 + PER_PART * sum(len(parts) for parts in skeletons) + (0 if convex else MORE)
-    numbers = [[size], net.points[first.row] - net.points[second.row], *sides, *(parts.ravel() for parts in skeletons)]
+    numbers = [
+        [size],
+        net.points[first.row] - net.points[second.row],
+        *sides,
+        *(parts.view(float) for parts in skeletons),
+    ]
     return rows, np.concatenate(numbers)
 
 

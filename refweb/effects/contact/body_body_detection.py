@@ -16,34 +16,56 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compiled.rows import column_of, record_at, width_of
 from ...kernels import kernel
 from ...net.rotation import matrix_at, times, times_transposed
-from ...net.skeleton import ARC, COLUMNS, FROM, KIND, OWNS, SEGMENT, THICKNESS, THIRD, TO
+from ...net.skeleton import ARC, PART, SEGMENT
 from ..vectors import dot
 from .contact_points import climb, hessian_times, places, window
 from .nonconvex_contacts import STEEPEST
-from .pair import _DAMPING, _EXPONENT, _FIELD, _FRICTION, _GROWTH, _SLIP, AWAY, PENALTY, pair_of
+from .pair import AWAY, LINE_CONTACT, SPHERE, SURFACE, pair_of
 
-ROOM, APART, SIDES = 0, 1, 4
-"""Columns of data: number of contacts there is room for, the first body's row from the second's at the start [m], and
-the first of two sides."""
-AXES, OFFSET, SPINS, PLANAR, MOBILITY, LEVER, EXTENT, FREE = 0, 9, 12, 13, 14, 20, 21, 22
-"""Columns of a side: the body's axes at the start, the centre of its shape, number of rows of its rotation that count,
-and what `refweb.effects.contact.pair.Pair` has; greatest distance of its surface from its row [m]; whether it moves."""
-THICK, PARTS, BEGIN, PAIR = 23, 24, 25, 26
-"""Least distance from its middle to its surface [m]; number of parts, and the column of the first; what
+BEHIND = AWAY + 6
+"""Column of the `refweb.effects.contact.pair.SURFACE` of a line with two ends on a body."""
+PAIR_WIDTH = BEHIND + width_of(SURFACE)
+"""Number of columns of such a pair."""
+SIDE = np.dtype(
+    [
+        ("axes", float, (3, 3)),
+        ("offset", float, (3,)),
+        ("spins", float),
+        ("planar", float),
+        ("mobility", float, (6,)),
+        *((name, float) for name in ("lever", "extent", "free", "thick", "parts", "begin")),
+        ("touched", float, (PAIR_WIDTH,)),
+    ]
+)
+"""Data of one of two bodies: its axes at the start, the centre of its shape, number of rows of its rotation that count,
+and what `refweb.effects.contact.pair.Pair` has; greatest distance of its surface from its row [m]; whether it moves;
+least distance from its middle to its surface [m]; number of parts, and the column of the first; what
 `refweb.effects.contact.pair.pair_of` reads of the body as one that is touched, without axes."""
-PAIR_WIDTH = AWAY + 6 + _FIELD + 1
-SIDE = PAIR + PAIR_WIDTH
-"""Number of columns of a side."""
+BODIES = np.dtype([("room", float), ("away", float, (3,)), ("sides", SIDE, (2,))])
+"""Data of a pair: number of contacts there is room for, the first body's row from the second's at the start [m], and
+both sides; behind these stand their parts, see `refweb.net.skeleton.PART`."""
+SIDES, SIDE_WIDTH, PART_WIDTH = column_of(BODIES, "sides"), width_of(SIDE), width_of(PART)
+TOUCHED = SIDES + column_of(SIDE, "touched")
+"""Column of the pair that has the law of both."""
 LINE = (1.0, 0.0, -1.0, 1.0)
 """Shares of both ends of a line."""
 SAMPLES = 8
 """Number of parts of an arc between whose ends its deepest place is looked for."""
-TOUCHED, FIRST, SECOND, NORMAL, DEPTH, WEIGHT, SHARE, SLOT, DOWN, INNER, WIDTH = 0, 1, 4, 7, 10, 11, 12, 13, 14, 15, 16
-"""Columns of a contact: the side that is touched; its point from either body's row [m]; G, as from the first body into
-the second; depth [m]; by what its energy counts, and its losses; which contact of the pair it is; how far from its
-point, along G, the bodies touch [m]; whether its place moves."""
+_numbers = "depth weight share down inner"
+BODY_CONTACT = np.dtype(
+    [
+        ("points", float, (2, 3)),
+        ("normal", float, (3,)),
+        *((name, float) for name in _numbers.split()),
+        ("slot", np.int64),
+    ]
+)
+"""A contact: its point from each body's row [m]; G, as from the first body into the second; depth [m]; by what its
+energy counts, and its losses; how far from its point, along G, the bodies touch [m]; whether its place moves; which
+contact of the pair it is."""
 
 
 class Frame(NamedTuple):
@@ -85,43 +107,33 @@ class Space(NamedTuple):
 
 
 @kernel()
-def side(s):
-    """First column of a side."""
-    return SIDES + SIDE * s
+def side_of(data, c, s):
+    """The `SIDE` of a body of pair c."""
+    return record_at(SIDE, data, c, SIDES + SIDE_WIDTH * s)
 
 
 @kernel()
 def frame_of(x, cells, data, c, s):
     """The `Frame` of a side of a pair."""
-    at = side(s)
-    axes = (
-        (data[c, at], data[c, at + 1], data[c, at + 2]),
-        (data[c, at + 3], data[c, at + 4], data[c, at + 5]),
-        (data[c, at + 6], data[c, at + 7], data[c, at + 8]),
-    )
-    if data[c, at + SPINS] == 2.0:
+    side = side_of(data, c, s)
+    axes, w = (vector(side.axes[0]), vector(side.axes[1]), vector(side.axes[2])), side.mobility
+    if side.spins == 2.0:
         turned = matrix_at(x, cells[c, 2 + 2 * s], cells[c, 3 + 2 * s])
         axes = times(turned, axes[0]), times(turned, axes[1]), times(turned, axes[2])
-    m = at + MOBILITY
-    mobility = data[c, m], data[c, m + 1], data[c, m + 2], data[c, m + 3], data[c, m + 4], data[c, m + 5]
-    return Frame(axes, data[c, at + PLANAR] != 0.0, mobility)
+    return Frame(axes, side.planar != 0.0, (w[0], w[1], w[2], w[3], w[4], w[5]))
 
 
 @kernel()
 def apart(x, cells, data, c):
     """The first body's row from the second's [m]."""
-    a, b = cells[c, 0], cells[c, 1]
-    return (
-        data[c, APART] + x[a, 0] - x[b, 0],
-        data[c, APART + 1] + x[a, 1] - x[b, 1],
-        data[c, APART + 2] + x[a, 2] - x[b, 2],
-    )
+    a, b, away = cells[c, 0], cells[c, 1], record_at(BODIES, data, c, 0).away
+    return away[0] + x[a, 0] - x[b, 0], away[1] + x[a, 1] - x[b, 1], away[2] + x[a, 2] - x[b, 2]
 
 
-@kernel()
-def vector_at(data, c, at):
-    """Three numbers from a column on."""
-    return data[c, at], data[c, at + 1], data[c, at + 2]
+@kernel(forceinline=True)
+def vector(numbers):
+    """Three numbers."""
+    return numbers[0], numbers[1], numbers[2]
 
 
 @kernel()
@@ -139,13 +151,13 @@ def less(p, q):
 @kernel()
 def law_of(data, c):
     """The `Law` of two bodies."""
-    at = SIDES + PAIR + AWAY + 6
+    surface = record_at(SURFACE, data, c, TOUCHED + BEHIND)
     return Law(
-        data[c, SIDES + PAIR + PENALTY],
-        data[c, at + _EXPONENT],
-        data[c, at + _DAMPING],
-        data[c, at + _FRICTION],
-        data[c, at + _SLIP],
+        record_at(SPHERE, data, c, TOUCHED).stiffness,
+        surface.exponent,
+        surface.damping,
+        surface.friction,
+        surface.slip_velocity,
     )
 
 
@@ -219,51 +231,49 @@ def arcs(depth):
 
 @functools.cache
 def pressing(depth):
-    """(kernel that finds contacts of one skeleton in the depth of the other body, shape of its space).
+    """(kernel that finds contacts of one skeleton in the depth of the other body, contacts of a line on it at most).
 
     The kernel ``(ahead, x, cells, data, c, s, space, count)`` writes those of the skeleton of side ``s``, grown by
     ``ahead`` more, to rows of ``space.contacts`` from ``count`` on, and returns the row behind them.
     """
-    _, _, contacts, touch_of, shape = places(depth, 0)
+    _, _, contacts, touch_of, limit = places(depth, 0)
     arc = arcs(depth)
 
     @kernel()
     def record(space, count, s, slot, path, y, g, contact_data, thickness, touching):
         """Write a contact; ``y`` and ``g`` are along the axes of the body that is touched."""
-        axes, offset, own_axes, contacts = touching.axes, path[0], path[1], space.contacts
+        axes, offset, own_axes, contact = touching.axes, path[0], path[1], space.contacts[count]
         away = times_transposed(axes, add(y, offset))  # from the row of the body that is touched
         g, near = times_transposed(axes, g), add(away, own_axes)
-        deep, weight, share, inner = contact_data
         for k in range(3):
-            contacts[count, FIRST + k] = near[k] if s == 0 else away[k]
-            contacts[count, SECOND + k] = away[k] if s == 0 else near[k]
-            contacts[count, NORMAL + k] = g[k] if s == 0 else -g[k]
-        contacts[count, TOUCHED], contacts[count, DEPTH], contacts[count, WEIGHT] = 1 - s, deep, weight
-        contacts[count, SHARE], contacts[count, SLOT], contacts[count, INNER] = share, slot, inner
-        contacts[count, DOWN] = (thickness - 0.5 * deep) * (1.0 if s == 0 else -1.0)
+            contact.points[s, k], contact.points[1 - s, k] = near[k], away[k]
+            contact.normal[k] = g[k] if s == 0 else -g[k]
+        contact.depth, contact.weight, contact.share, contact.inner = contact_data
+        contact.down, contact.slot = (thickness - 0.5 * contact.depth) * (1.0 if s == 0 else -1.0), slot
 
     @kernel()
     def press(ahead, x, cells, data, c, s, space, count):
         frame_a, frame_b = frame_of(x, cells, data, c, s), frame_of(x, cells, data, c, 1 - s)
-        mine, its = side(s), side(1 - s)
+        mine, its = side_of(data, c, s), side_of(data, c, 1 - s)
         away = apart(x, cells, data, c)
         if s == 1:
             away = -away[0], -away[1], -away[2]
-        centre, offset = vector_at(data, c, mine + OFFSET), vector_at(data, c, its + OFFSET)
+        centre, offset = vector(mine.offset), vector(its.offset)
         path, row = (offset, (-away[0], -away[1], -away[2])), space.data
         for k in range(PAIR_WIDTH):
-            row[0, k] = data[c, its + PAIR + k]
-        growth, extent, limit = row[0, AWAY + 6 + _GROWTH], row[0, 0], space.contacts.shape[0]
-        before = int(data[c, its + PARTS]) if s == 1 else 0
-        for n in range(int(data[c, mine + PARTS])):
-            at = int(data[c, mine + BEGIN]) + COLUMNS * n
-            kind, thickness, slot = data[c, at + KIND], data[c, at + THICKNESS], 3 * (before + n)
-            row[0, AWAY + 6 + _GROWTH], row[0, 0] = growth + thickness + ahead, extent + thickness + ahead
-            p = add(times_transposed(frame_a.axes, add(vector_at(data, c, at + FROM), centre)), away)
+            row[0, k] = its.touched[k]
+        ball, surface, limit = record_at(SPHERE, row, 0, 0), record_at(SURFACE, row, 0, BEHIND), space.contacts.shape[0]
+        growth, extent = surface.growth, ball.radius
+        before = int(its.parts) if s == 1 else 0
+        for n in range(int(mine.parts)):
+            part = record_at(PART, data, c, int(mine.begin) + PART_WIDTH * n)
+            kind, thickness, slot = part.kind, part.thickness, 3 * (before + n)
+            surface.growth, ball.radius = growth + thickness + ahead, extent + thickness + ahead
+            p = add(times_transposed(frame_a.axes, add(vector(part.start), centre)), away)
             p = less(times(frame_b.axes, p), offset)
             pair = pair_of(row, 0, 2)
             if kind == SEGMENT:
-                q = add(times_transposed(frame_a.axes, add(vector_at(data, c, at + TO), centre)), away)
+                q = add(times_transposed(frame_a.axes, add(vector(part.end), centre)), away)
                 q = less(times(frame_b.axes, q), offset)
                 d, middle = less(q, p), (0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]), 0.5 * (p[2] + q[2]))
                 if depth(middle, pair.shape)[0] + 0.5 * STEEPEST * math.sqrt(dot(d, d)) <= 0.0:
@@ -273,7 +283,7 @@ def pressing(depth):
                 for m in range(contacts(space.x, space.cells, row, 0, 1, 2, LINE, space.contact_data)):
                     touch = touch_of(space.x, space.cells, row, 2, LINE, space.contact_data, m)
                     end = 1 if touch.xi > 0.5 else 0
-                    if (touch.inner or data[c, at + OWNS + end] != 0.0) and count < limit:
+                    if (touch.inner or part.owns[end] != 0.0) and count < limit:
                         w = window(False, touch.xi, touch.inner)[0]
                         contact_data = touch.spot.depth, w * touch.weight, w * touch.share, 1.0 if touch.inner else 0.0
                         which = slot + (2 if touch.inner else end)
@@ -291,9 +301,9 @@ def pressing(depth):
                         )
                         count += 1
             elif kind == ARC:
-                relative = times(frame_b.axes, times_transposed(frame_a.axes, vector_at(data, c, at + TO)))
-                two = times(frame_b.axes, times_transposed(frame_a.axes, vector_at(data, c, at + THIRD)))
-                _, w, y, deep, g = arc(data[c, at + OWNS], data[c, at + OWNS + 1], p, relative, two, pair)
+                relative = times(frame_b.axes, times_transposed(frame_a.axes, vector(part.end)))
+                two = times(frame_b.axes, times_transposed(frame_a.axes, vector(part.third)))
+                _, w, y, deep, g = arc(part.owns[0], part.owns[1], p, relative, two, pair)
                 if w > 0.0 and count < limit:
                     record(space, count, s, slot, path, y, g, (deep, w, w, 1.0), thickness, frame_b)
                     count += 1
@@ -304,7 +314,7 @@ def pressing(depth):
                     count += 1
         return count
 
-    return press, shape
+    return press, limit
 
 
 @functools.cache
@@ -314,23 +324,22 @@ def meeting(first, second):
     ``space_of(data)`` is the `Space`, and ``detect(ahead, x, cells, data, c, space)`` the number of contacts of a pair
     that it holds.
     """
-    (press, shape), (press_back, second_shape) = pressing(second), pressing(first)
-    rows, columns = max(shape[0], second_shape[0]), max(shape[1], second_shape[1])
+    (press, first_limit), (press_back, second_limit) = pressing(second), pressing(first)
+    rows = max(first_limit, second_limit)
 
     @kernel()
     def space_of(data):
         cells = np.empty((1, 3), dtype=np.int32)
         for k in range(3):
             cells[0, k] = k
-        largest = int(data[0, ROOM]) if data.shape[0] else 0
-        return Space(
-            np.zeros((3, 3)), cells, np.empty((1, PAIR_WIDTH)), np.empty((rows, columns)), np.empty((largest, WIDTH))
-        )
+        largest = int(record_at(BODIES, data, 0, 0).room) if data.shape[0] else 0
+        contacts = np.empty(largest, BODY_CONTACT)
+        return Space(np.zeros((3, 3)), cells, np.empty((1, PAIR_WIDTH)), np.empty(rows, LINE_CONTACT), contacts)
 
     @kernel()
     def detect(ahead, x, cells, data, c, space):
         away = apart(x, cells, data, c)
-        reach = data[c, SIDES + EXTENT] + data[c, SIDES + SIDE + EXTENT] + ahead
+        reach = side_of(data, c, 0).extent + side_of(data, c, 1).extent + ahead
         if dot(away, away) > reach * reach:
             return 0
         count = press(ahead, x, cells, data, c, 0, space, 0)

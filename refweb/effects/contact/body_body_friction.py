@@ -16,21 +16,7 @@ from ...net.rotation import times, times_transposed
 from ..base import ImplicitContactKernels
 from ..contact_solver import direction, friction_law, set_basis, set_part
 from ..vectors import cross, dot
-from .body_body_detection import (
-    DOWN,
-    FIRST,
-    NORMAL,
-    SECOND,
-    SHARE,
-    SIDE,
-    SIDES,
-    SLOT,
-    SPINS,
-    frame_of,
-    law_of,
-    meeting,
-    vector_at,
-)
+from .body_body_detection import frame_of, law_of, meeting, side_of, vector
 from .body_body_penalty import force_of, push, slopes_of
 from .contact_points import hessian_times
 from .friction import facing, friction_force, turned_by
@@ -41,18 +27,18 @@ SLOTS = 3
 
 
 @kernel()
-def place_of(contacts, n, s):
+def place_of(contact, s):
     """Contact point of two bodies, from the row of one of them [m]."""
-    g = vector_at(contacts, n, NORMAL)
+    g, y = vector(contact.normal), contact.points[s]
     size = math.sqrt(dot(g, g))
-    y, path = vector_at(contacts, n, FIRST if s == 0 else SECOND), contacts[n, DOWN] / size if size > 0.0 else 0.0
+    path = contact.down / size if size > 0.0 else 0.0
     return y[0] + path * g[0], y[1] + path * g[1], y[2] + path * g[2]
 
 
 @kernel()
 def turned_velocity(v, data, cells, c, s, frame):
     """Angular velocity of a body [rad/s]."""
-    spins, r = data[c, SIDES + SIDE * s + SPINS], cells[c, 2 + 2 * s]
+    spins, r = side_of(data, c, s).spins, cells[c, 2 + 2 * s]
     if spins == 0.0:
         return 0.0, 0.0, 0.0
     w = times(frame.axes, (v[r, 0], v[r, 1], v[r, 2]))
@@ -61,15 +47,15 @@ def turned_velocity(v, data, cells, c, s, frame):
 
 
 @kernel()
-def set_contact(contact, parts, points, m, x, cells, data, c):
-    """Write contact m of pair c: its rows are those of both bodies, and of their rotations."""
+def set_contact(contact, parts, point, x, cells, data, c):
+    """Write a contact of pair c: its rows are those of both bodies, and of their rotations."""
     law, frame_a, frame_b = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
-    spins_a, spins_b = int(data[c, SIDES + SPINS]), int(data[c, SIDES + SIDE + SPINS])
-    y, z = place_of(points, m, 0), place_of(points, m, 1)
-    steep, g = facing(vector_at(points, m, NORMAL))
+    spins_a, spins_b = int(side_of(data, c, 0).spins), int(side_of(data, c, 1).spins)
+    y, z = place_of(point, 0), place_of(point, 1)
+    steep, g = facing(vector(point.normal))
     set_basis(contact, g if steep > 0.0 else (1.0, 0.0, 0.0))  # where nothing pushes any will do
-    contact.cell, contact.owner, contact.tag, contact.group = c, c, int(points[m, SLOT]), 1
-    contact.normal_force, contact.damping = push(law, points, m, SHARE) * steep, law.damping * steep
+    contact.cell, contact.owner, contact.tag, contact.group = c, c, point.slot, 1
+    contact.normal_force, contact.damping = push(law, point.share, point.depth) * steep, law.damping * steep
     contact.friction, contact.slip_velocity, contact.wind[:] = law.friction, law.slip_velocity, 0.0
     for i in range(3):
         e = direction(contact, i)
@@ -100,23 +86,24 @@ def kernels(first, second):
         """Add the forces of a pair; their power [W], and the force on the second body [N]."""
         law, frame_a, frame_b = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
         power, felt = 0.0, (0.0, 0.0, 0.0)
-        a, b, contacts = cells[c, 0], cells[c, 1], space.contacts
+        a, b = cells[c, 0], cells[c, 1]
         w, o = turned_velocity(v, data, cells, c, 0, frame_a), turned_velocity(v, data, cells, c, 1, frame_b)
         for n in range(detect(0.0, x, cells, data, c, space)):
-            y, z = place_of(contacts, n, 0), place_of(contacts, n, 1)
+            contact = space.contacts[n]
+            y, z = place_of(contact, 0), place_of(contact, 1)
             p, q = cross(w, y), cross(o, z)
             u = (
                 v[a, 0] + p[0] - v[b, 0] - q[0],
                 v[a, 1] + p[1] - v[b, 1] - q[1],
                 v[a, 2] + p[2] - v[b, 2] - q[2],
             )
-            friction = friction_force(law, push(law, contacts, n, SHARE), vector_at(contacts, n, NORMAL), u)
+            friction = friction_force(law, push(law, contact.share, contact.depth), vector(contact.normal), u)
             power += dot(friction, u)
             felt = felt[0] - friction[0], felt[1] - friction[1], felt[2] - friction[2]
             for s in range(2):
-                frame, arm, sign, spins = (frame_a, y, 1.0, data[c, SIDES + SPINS])
+                frame, arm, sign, spins = frame_a, y, 1.0, side_of(data, c, s).spins
                 if s == 1:
-                    frame, arm, sign, spins = (frame_b, z, -1.0, data[c, SIDES + SIDE + SPINS])
+                    frame, arm, sign = frame_b, z, -1.0
                 for k in range(3):
                     f[cells[c, s], k] += sign * friction[k]
                 if spins > 0.0:
@@ -144,7 +131,7 @@ def kernels(first, second):
         for c in range(cells.shape[0]):
             for m in range(detect(0.0, x, cells, data, c, space)):
                 if count < contacts.size:
-                    set_contact(contacts[count], parts, space.contacts, m, x, cells, data, c)
+                    set_contact(contacts[count], parts, space.contacts[m], x, cells, data, c)
                 count += 1
         return count
 

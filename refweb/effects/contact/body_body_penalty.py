@@ -13,28 +13,11 @@ import math
 
 import numpy as np
 
+from ...compiled.rows import record_at
 from ...kernels import BOUND, ENERGY, FORCE, NEAR, STIFFNESS, kernel
-from ..base import FELT, OWN
+from ..base import TOUCH
 from ..vectors import cross, dot
-from .body_body_detection import (
-    DEPTH,
-    EXTENT,
-    FIRST,
-    FREE,
-    INNER,
-    LEVER,
-    NORMAL,
-    SECOND,
-    SIDE,
-    SIDES,
-    SPINS,
-    THICK,
-    WEIGHT,
-    apart,
-    law_of,
-    meeting,
-    vector_at,
-)  # fmt: skip
+from .body_body_detection import apart, law_of, meeting, side_of, vector
 from .pair import power_of_depth
 from .penalty import SHALLOW, slope_of_power
 
@@ -49,21 +32,21 @@ CURVED = 1.2
 
 
 @kernel()
-def push(law, contacts, n, column):
-    """k W δ^p of a contact, W in a column [N]."""
-    return law.stiffness * contacts[n, column] * power_of_depth(law.exponent, contacts[n, DEPTH])
+def push(law, weight, depth):
+    """k W δ^p of a contact [N]."""
+    return law.stiffness * weight * power_of_depth(law.exponent, depth)
 
 
 @kernel()
-def add_push(f, cells, data, c, contacts, n, size):
+def add_push(f, cells, data, c, contact, size):
     """Push two bodies apart at a contact, by ``size`` times G."""
-    g = vector_at(contacts, n, NORMAL)
+    g = vector(contact.normal)
     for s in range(2):
         force = -size if s == 0 else size
         for k in range(3):
             f[cells[c, s], k] += force * g[k]
-        if data[c, SIDES + SIDE * s + SPINS] == 2.0:
-            moment = cross(vector_at(contacts, n, FIRST if s == 0 else SECOND), g)
+        if side_of(data, c, s).spins == 2.0:
+            moment = cross(vector(contact.points[s]), g)
             for k in range(3):
                 f[cells[c, 2 + 2 * s], k] += force * moment[k]
 
@@ -76,8 +59,10 @@ def force_of(space_of, add_forces):
     def force(t, x, v, f, cells, data, out):
         space = space_of(data)
         for c in range(cells.shape[0]):
-            rows, (f0, f1, f2) = add_forces(x, v, f, cells, data, c, space)
-            out[c, OWN], out[c, FELT], out[c, FELT + 1], out[c, FELT + 2] = rows, f0, f1, f2
+            touch = record_at(TOUCH, out, c, 0)
+            touch.value, force = add_forces(x, v, f, cells, data, c, space)
+            for k in range(3):
+                touch.force[k] = force[k]
 
     return force
 
@@ -105,10 +90,10 @@ def slopes_of(space_of, add_forces):
             for r in range(6):
                 for k in range(3):
                     x6[r, k], v6[r, k] = x[cells[c, r], k], v[cells[c, r], k]
-            numbers, size = data[c : c + 1], min(data[c, SIDES + THICK], data[c, SIDES + SIDE + THICK])
+            numbers, size = data[c : c + 1], min(side_of(data, c, 0).thick, side_of(data, c, 1).thick)
             varied = v6 if moving else x6
             for r in range(6):
-                spins = 2.0 if r < 2 else data[c, SIDES + SIDE * ((r - 2) // 2) + SPINS]
+                spins = 2.0 if r < 2 else side_of(data, c, (r - 2) // 2).spins
                 if spins == 0.0 or (spins == 1.0 and (r % 2 == 1 or not moving)) or (moving and r in (3, 5)):
                     continue
                 step = STEP * (min(size, 1.0) if r < 2 else 1.0)
@@ -130,11 +115,11 @@ def slopes_of(space_of, add_forces):
 @kernel()
 def share_of(data, c, s, mass, cells):
     """(1/√m, lever/√I) of a body; 0 of one that does not move."""
-    at = SIDES + SIDE * s
-    if data[c, at + FREE] == 0.0:
+    side = side_of(data, c, s)
+    if side.free == 0.0:
         return 0.0, 0.0
-    turns = data[c, at + SPINS] > (0.0 if law_of(data, c).friction > 0.0 else 1.0)
-    turned = data[c, at + LEVER] / math.sqrt(mass[cells[c, 2 + 2 * s]]) if turns else 0.0
+    turns = side.spins > (0.0 if law_of(data, c).friction > 0.0 else 1.0)
+    turned = side.lever / math.sqrt(mass[cells[c, 2 + 2 * s]]) if turns else 0.0
     return 1.0 / math.sqrt(mass[cells[c, s]]), turned
 
 
@@ -144,7 +129,7 @@ def add_rates(rates, steep, speed, mass, cells, data, c):
 
     Half the bound are steps of a tenth of the thickness of a body, so that nothing passes through between two.
     """
-    thick = min(data[c, SIDES + THICK], data[c, SIDES + SIDE + THICK])
+    thick = min(side_of(data, c, 0).thick, side_of(data, c, 1).thick)
     (p, q), (r, s) = share_of(data, c, 0, mass, cells), share_of(data, c, 1, mass, cells)
     total = p + q + r + s
     for side in range(2):
@@ -159,7 +144,7 @@ def add_rates(rates, steep, speed, mass, cells, data, c):
 def near(skin, x, cells, data, chosen):
     count = 0
     for c in range(cells.shape[0]):
-        away, reach = apart(x, cells, data, c), data[c, SIDES + EXTENT] + data[c, SIDES + SIDE + EXTENT] + skin
+        away, reach = apart(x, cells, data, c), side_of(data, c, 0).extent + side_of(data, c, 1).extent + skin
         if not dot(away, away) >= reach * reach:  # what is not a number is near
             chosen[count] = c
             count += 1
@@ -177,10 +162,11 @@ def kernels(first, second):
         deepest, felt, law = 0.0, (0.0, 0.0, 0.0), law_of(data, c)
         count = detect(0.0, x, cells, data, c, space)
         for n in range(count):
-            size, g = push(law, space.contacts, n, WEIGHT), vector_at(space.contacts, n, NORMAL)
-            deepest = max(deepest, space.contacts[n, DEPTH])
+            contact = space.contacts[n]
+            size, g = push(law, contact.weight, contact.depth), contact.normal
+            deepest = max(deepest, contact.depth)
             felt = felt[0] + size * g[0], felt[1] + size * g[1], felt[2] + size * g[2]
-            add_push(f, cells, data, c, space.contacts, n, size)
+            add_push(f, cells, data, c, contact, size)
         if count == space.contacts.shape[0]:  # there is no room for all: the run is to end
             f[cells[c, 0], 0] = math.nan
         return deepest, felt
@@ -193,7 +179,8 @@ def kernels(first, second):
         for c in range(cells.shape[0]):
             law, out[c] = law_of(data, c), 0.0
             for n in range(detect(0.0, x, cells, data, c, space)):
-                out[c] += push(law, space.contacts, n, WEIGHT) * space.contacts[n, DEPTH] / (law.exponent + 1.0)
+                contact = space.contacts[n]
+                out[c] += push(law, contact.weight, contact.depth) * contact.depth / (law.exponent + 1.0)
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
@@ -205,8 +192,9 @@ def kernels(first, second):
         for c in range(cells.shape[0]):  # of places alone
             law = law_of(data, c)
             for n in range(detect(0.0, x, cells, data, c, space)):
-                g, weight = vector_at(space.contacts, n, NORMAL), max(space.contacts[n, WEIGHT], 0.0)
-                steep = law.stiffness * weight * slope_of_power(law.exponent, space.contacts[n, DEPTH])
+                contact = space.contacts[n]
+                g, weight = contact.normal, max(contact.weight, 0.0)
+                steep = law.stiffness * weight * slope_of_power(law.exponent, contact.depth)
                 for i in range(3):
                     for j in range(3):
                         value = steep * g[i] * g[j]
@@ -220,10 +208,11 @@ def kernels(first, second):
         space = space_of(data)
         for c in range(cells.shape[0]):
             law, steep = law_of(data, c), 0.0
-            thick = min(data[c, SIDES + THICK], data[c, SIDES + SIDE + THICK])
+            thick = min(side_of(data, c, 0).thick, side_of(data, c, 1).thick)
             for n in range(detect(min(reach, FARTHEST), x, cells, data, c, space)):
-                steepness = law.stiffness * slope_of_power(law.exponent, min(space.contacts[n, DEPTH], thick))
-                steep += CURVED * steepness * (INWARD if space.contacts[n, INNER] != 0.0 else 1.0)
+                contact = space.contacts[n]
+                steepness = law.stiffness * slope_of_power(law.exponent, min(contact.depth, thick))
+                steep += CURVED * steepness * (INWARD if contact.inner != 0.0 else 1.0)
             steep *= 1.0 + law.friction + SHALLOW * law.damping * speed * (1.0 + law.friction)
             if steep > 0.0:
                 add_rates(rates, steep, speed, mass, cells, data, c)

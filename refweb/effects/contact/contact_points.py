@@ -128,14 +128,20 @@ def place_moves(touch, moving, nodes, functions, z):
             z[a, k] = -(w1 * value * g[k] + distance * (value * turned[k] + slope * g[k])) / curve
 
 
+@kernel(forceinline=True)
+def set_place(contact, c, xi, inner):
+    """Write the place of a contact of a line."""
+    contact.cell, contact.xi, contact.inner = c, xi, inner
+
+
 class Places(NamedTuple):
-    """Kernels that find where lines touch bodies of one depth, see `places`, and the shape of what they find."""
+    """Kernels that find where lines touch bodies of one depth, see `places`, and how many contacts an element has."""
 
     within: Callable
     deepest: Callable
     contacts: Callable
     touch_of: Callable
-    buffer: tuple
+    limit: int
 
 
 @kernel(forceinline=True)
@@ -160,8 +166,8 @@ def places(depth, spins=0):
 
     ``within(x, cells, data, c, nodes, functions, xi)`` is the `ContactPoint` at a place of cell c, ``deepest`` of all
     but the place (place, depth) of the contact between the ends of a cell, or `NOWHERE`. ``contacts`` finds those of a
-    line, and ``touch_of`` is the `PointContact` that is one of them. ``buffer`` is (rows for each element, columns) of
-    what it finds.
+    line, and ``touch_of`` is the `PointContact` that is one of them. ``limit`` is the largest number of contacts of an
+    element.
 
     Parameters
     ----------
@@ -227,7 +233,7 @@ def places(depth, spins=0):
 
     @kernel(forceinline=True)
     def contacts(x, cells, data, first, pieces, nodes, functions, buffer):
-        """Write (cell, place, whether the place moves) of each contact of a line to ``buffer``; return their number."""
+        """Write each contact of a line to ``buffer``, an array of `LINE_CONTACT`; return their number."""
         count, best = 0, 0.0
         for c in range(first, first + pieces):
             if far(x, cells, data, c, nodes):
@@ -239,29 +245,29 @@ def places(depth, spins=0):
             if pair_of(data, c, nodes).once:
                 if deep > best:
                     best, count = deep, 1
-                    buffer[0, 0], buffer[0, 1], buffer[0, 2] = c, xi, inner
+                    set_place(buffer[0], c, xi, 1.0 if inner else 0.0)
                 continue
             if deep > 0.0 and inner:
-                buffer[count, 0], buffer[count, 1], buffer[count, 2] = c, xi, 1.0
+                set_place(buffer[count], c, xi, 1.0)
                 count += 1
             for end in range(2):
                 if within(x, cells, data, c, nodes, functions, float(end)).depth > 0.0:
-                    buffer[count, 0], buffer[count, 1], buffer[count, 2] = c, end, 0.0
+                    set_place(buffer[count], c, float(end), 0.0)
                     count += 1
         return count
 
     @kernel(forceinline=True)
     def touch_of(x, cells, data, nodes, functions, buffer, n):
-        c, xi = int(buffer[n, 0]), buffer[n, 1]
+        c, xi = buffer[n].cell, buffer[n].xi
         spot = within(x, cells, data, c, nodes, functions, xi)
-        weight, share = (1.0, 1.0) if convex else (buffer[n, 3], buffer[n, 4])
-        return PointContact(c, xi, buffer[n, 2] > 0.0, paired(x, cells, data, c, nodes), spot, weight, share)
+        weight, share = (1.0, 1.0) if convex else (buffer[n].weight, buffer[n].share)
+        return PointContact(c, xi, buffer[n].inner > 0.0, paired(x, cells, data, c, nodes), spot, weight, share)
 
     if convex:
-        return Places(within, deepest, contacts, touch_of, (3, 3))
-    from .nonconvex_contacts import COLUMNS, PLACES, several
+        return Places(within, deepest, contacts, touch_of, 3)
+    from .nonconvex_contacts import PLACES, several
 
-    return Places(within, *several(within, rise), touch_of, (PLACES, COLUMNS))
+    return Places(within, *several(within, rise), touch_of, PLACES)
 
 
 @functools.cache

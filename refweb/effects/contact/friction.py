@@ -26,13 +26,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compiled.rows import record_at
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
 from ...net.rotation import times, times_transposed, to_quaternion
-from ..base import FELT
+from ..base import TOUCH
 from ..vectors import cross, dot
 from .contact_points import hessian_times, place_moves, places, window
 from .nearest_point import lightness, share
-from .pair import lever_of, pair_of, pairing
+from .pair import LINE_CONTACT, lever_of, pair_of, pairing
 from .penalty import SHALLOW, foresight, rubbed_by, slope_of_power, thickness, turn_block
 from .rotational_stiffness import add_push, add_rotation, add_velocities, set_arms
 
@@ -264,12 +265,12 @@ def kernels(depth, pieces, nodes, functions, spins):
         Number of rows behind the body in a cell that are its rotation: 1 or 2, see `refweb.net.rotation`, or 0.
     """
     rows, paired = nodes + (2 if spins else 1), pairing(spins)
-    _, _, contacts, touch_of, (limit, columns) = places(depth, spins)
+    _, _, contacts, touch_of, limit = places(depth, spins)
     depth_ahead = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        buffer = np.empty((limit * pieces, columns))
+        buffer = np.empty(limit * pieces, LINE_CONTACT)
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
@@ -277,13 +278,14 @@ def kernels(depth, pieces, nodes, functions, spins):
                 c, xi, pair, y = touch.c, touch.xi, touch.pair, touch.spot.y
                 u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, xi, y)
                 friction = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
-                out[c, 0] += dot(friction, u)
+                shows = record_at(TOUCH, out, c, 0)
+                shows.value += dot(friction, u)
                 turned = times_transposed(pair.axes, friction)
                 for k in range(3):
                     for a in range(nodes):
                         f[cells[c, a], k] += share(a, nodes, functions, xi)[0] * turned[k]
                     f[cells[c, nodes], k] -= turned[k]
-                    out[c, FELT + k] -= turned[k]
+                    shows.force[k] -= turned[k]
                 if spins:
                     moment = times_transposed(pair.axes, turned_by(pair.planar, cross(y, friction)))
                     for k in range(3):
@@ -291,7 +293,7 @@ def kernels(depth, pieces, nodes, functions, spins):
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
-        buffer, z, q = np.empty((limit * pieces, columns)), np.empty((nodes + 1, 3)), np.empty((3, 3))
+        buffer, z, q = np.empty(limit * pieces, LINE_CONTACT), np.empty((nodes + 1, 3)), np.empty((3, 3))
         by_y, by_u = np.empty((3, 3)), np.empty((3, 3))
         pushes, arms = np.empty((pieces, nodes, 3)), np.empty((nodes, 3))
         damped = np.empty_like(blocks if spins == 2 else blocks[:0])
@@ -321,7 +323,7 @@ def kernels(depth, pieces, nodes, functions, spins):
 
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):
-        buffer, q, by_u = np.empty((limit * pieces, columns)), np.empty((3, 3)), np.empty((3, 3))
+        buffer, q, by_u = np.empty(limit * pieces, LINE_CONTACT), np.empty((3, 3)), np.empty((3, 3))
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):

@@ -17,11 +17,12 @@ from __future__ import annotations
 import functools
 import math
 
+from ...compiled.rows import record_at
 from ...kernels import MEETS, kernel
 from ..vectors import dot
 from .nearest_point import closest
 from .overlap import CORE
-from .pair import RADIUS, pair_of
+from .pair import SPHERE, pair_of
 
 MIDDLE = 0.7
 """Depth that lines stay below, over the distance from the middle of a body to its surface: depth is 0.737 of that in
@@ -70,7 +71,8 @@ def passing(depth, nodes, functions, spins=0):
         @kernel()
         def below(x, cells, data, c, share, margin):
             away = math.sqrt(closest(x, cells, data, c, nodes, functions)[1])
-            return data[c, RADIUS] - away < share * data[c, RADIUS] - margin
+            radius = record_at(SPHERE, data, c, 0).radius
+            return radius - away < share * radius - margin
 
     else:
         from .contact_points import places
@@ -102,7 +104,7 @@ def passing(depth, nodes, functions, spins=0):
     def meets(margin, path, kick, drift, x, v, f, inverse, cells, data, met):
         for c in range(cells.shape[0]):
             allowance = margin + nearing(cells, c, nodes, kick, drift, v, f, inverse)
-            reach = data[c, RADIUS] + allowance
+            reach = record_at(SPHERE, data, c, 0).radius + allowance
             if closest(x, cells, data, c, nodes, functions)[1] > reach * reach:
                 continue
             if not below(x, cells, data, c, MIDDLE, allowance):

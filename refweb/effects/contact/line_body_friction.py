@@ -20,6 +20,7 @@ from ..vectors import cross, dot
 from .contact_points import hessian_times, places
 from .friction import facing
 from .nearest_point import share
+from .pair import LINE_CONTACT
 from .penalty import rubbed_by
 
 SLOTS = 3
@@ -83,11 +84,11 @@ def kernels(depth, pieces, functions, spins):
 @functools.cache
 def detecting(depth, pieces, functions, spins):
     """The kernel that detects contacts of elements with two nodes, with the parameters of `kernels`."""
-    _, _, contacts_of, touch_of, (limit, columns) = places(depth, spins)
+    _, _, contacts_of, touch_of, limit = places(depth, spins)
 
     @kernel(DETECT)
     def detect(x, cells, data, contacts, parts, begin):
-        buffer, count = np.empty((limit * pieces, columns)), begin
+        buffer, count = np.empty(limit * pieces, LINE_CONTACT), begin
         at_node = np.full(x.shape[0], -1)
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts_of(x, cells, data, first, pieces, 2, functions, buffer)):

@@ -11,10 +11,11 @@ from __future__ import annotations
 import functools
 import math
 
+from ...compiled.rows import record_at
 from ...kernels import NEAR, kernel
 from ...net.rotation import times
 from ..vectors import dot
-from .pair import AWAY, RADIUS, from_shape, pairing
+from .pair import AWAY, SPHERE, from_shape, pairing
 
 SAMPLES = 8
 """Places on a curved element from which Newton's method may start to its nearest point."""
@@ -70,7 +71,8 @@ def far(x, cells, data, c, nodes):
     """Tell if the whole of cell c is certainly out of reach: its first node is, by more than twice its length."""
     b, first, length = cells[c, nodes], 0.0, 0.0
     for k in range(3):
-        distance = data[c, AWAY + k] + x[cells[c, 0], k] - x[b, k]
+        at = AWAY + k
+        distance = data[c, at] + x[cells[c, 0], k] - x[b, k]
         first += distance * distance
     for a in range(1, nodes):
         line = 0.0
@@ -81,7 +83,8 @@ def far(x, cells, data, c, nodes):
         length = line if nodes == 2 else length + 2.0 * math.sqrt(line)
     if nodes > 2:
         length = length * length
-    return first > 2.0 * (data[c, RADIUS] * data[c, RADIUS] + length)  # then |first| > radius + length
+    radius = record_at(SPHERE, data, c, 0).radius
+    return first > 2.0 * (radius * radius + length)  # then |first| > radius + length
 
 
 @kernel()
@@ -126,13 +129,13 @@ def touched(x, cells, data, first, pieces, nodes, functions):
             xi, square = closest(x, cells, data, c, nodes, functions)
             if square < best:
                 nearest, where, best = c, xi, square
-    return (nearest if best < data[first, RADIUS] ** 2 else -1), where, best
+    return (nearest if best < record_at(SPHERE, data, first, 0).radius ** 2 else -1), where, best
 
 
 @kernel(forceinline=True)
 def in_sphere(skin, x, cells, data, c, nodes, functions):
     """Tell if cell c may touch, within a skin, the sphere around its body."""
-    reach = data[c, RADIUS] + skin
+    reach = record_at(SPHERE, data, c, 0).radius + skin
     return not closest(x, cells, data, c, nodes, functions)[1] >= reach * reach
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from ...kernels import kernel
 from ..vectors import dot
 from .nearest_point import far, point
-from .pair import pair_of, power_of_depth
+from .pair import LINE_CONTACT, pair_of, power_of_depth
 
 SAMPLES = 256
 """Largest number of parts of an element between whose ends slopes are looked at."""
@@ -37,17 +37,13 @@ FURTHER = 1.8
 """How far the next sample is from one outside, over its distance from the surface: at 2 both see all between."""
 STEEPEST = 1.25
 """Largest gradient of a depth."""
-WEIGHT, SHARE, RISE = 3, 4, 5
-"""Columns of what is found: 1 of a maximum or an end and −1 of a minimum; share of the push that losses have; F."""
-COLUMNS = 6
-"""Number of columns."""
 
 
 @kernel()
-def record(buffer, n, c, xi, inner, weight, rise):
-    """Write a contact to a row."""
-    buffer[n, 0], buffer[n, 1], buffer[n, 2] = c, xi, inner
-    buffer[n, WEIGHT], buffer[n, SHARE], buffer[n, RISE] = weight, max(weight, 0.0), rise
+def record(contact, c, xi, inner, weight, rise):
+    """Write a contact."""
+    contact.cell, contact.xi, contact.inner = c, xi, inner
+    contact.weight, contact.share, contact.rise = weight, max(weight, 0.0), rise
 
 
 @kernel()
@@ -67,10 +63,10 @@ def least_between(begin, slope, end, last):
 def share_out(buffer, begin, end):
     """Write the shares of the maxima among the places between the ends of an element."""
     for n in range(begin, end):
-        if buffer[n, WEIGHT] > 0.0:
-            before = buffer[n - 1, RISE] if n > begin and buffer[n - 1, WEIGHT] < 0.0 else 0.0
-            after = buffer[n + 1, RISE] if n + 1 < end and buffer[n + 1, WEIGHT] < 0.0 else 0.0
-            buffer[n, SHARE] = max(1.0 - 0.5 * (before + after) / buffer[n, RISE], 0.0)
+        if buffer[n].weight > 0.0:
+            before = buffer[n - 1].rise if n > begin and buffer[n - 1].weight < 0.0 else 0.0
+            after = buffer[n + 1].rise if n + 1 < end and buffer[n + 1].weight < 0.0 else 0.0
+            buffer[n].share = max(1.0 - 0.5 * (before + after) / buffer[n].rise, 0.0)
 
 
 @functools.cache
@@ -149,7 +145,7 @@ def several(within, rise):
                     deep = within(x, cells, data, c, nodes, functions, at).depth
                     if deep > 0.0 and 0.0 < at < 1.0:
                         felt = 4.0 * at * (1.0 - at) * deep * power_of_depth(pair.exponent, deep)
-                        record(buffer, count, c, at, 1.0, sign, felt)
+                        record(buffer[count], c, at, 1.0, sign, felt)
                         count += 1
             if n == parts:
                 last = spot.depth
@@ -162,13 +158,13 @@ def several(within, rise):
 
     @kernel()
     def deepest(x, cells, data, c, nodes, functions):
-        buffer, where, largest = np.empty((PLACES, COLUMNS)), 0.0, -math.inf
+        buffer, where, largest = np.empty(PLACES, LINE_CONTACT), 0.0, -math.inf
         count, first, last = scan(x, cells, data, c, nodes, functions, buffer, 0)
         largest = max(first, last)
         for n in range(count):
-            deep = within(x, cells, data, c, nodes, functions, buffer[n, 1]).depth
+            deep = within(x, cells, data, c, nodes, functions, buffer[n].xi).depth
             if deep > largest:
-                where, largest = buffer[n, 1], deep
+                where, largest = buffer[n].xi, deep
         return where, largest
 
     @kernel()
@@ -180,7 +176,7 @@ def several(within, rise):
             count, begin, end = scan(x, cells, data, c, nodes, functions, buffer, count)
             for at, deep in ((0.0, begin), (1.0, end)):
                 if deep > 0.0:
-                    record(buffer, count, c, at, 0.0, 1.0, 0.0)
+                    record(buffer[count], c, at, 0.0, 1.0, 0.0)
                     count += 1
         return count
 

@@ -30,7 +30,8 @@ one for all lines at a node in place of their ends, with (1 − 2 ξ)²     0.00
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -109,47 +110,50 @@ def push_along(body, overlap, length):
     return min(ALONG * (overlap**2 / (length * (body.radius or body.thickness))) ** (1.0 / 3.0), 1.0)
 
 
-class Deepest(NamedTuple):
-    """The deepest contact of a body.
+@dataclass(frozen=True)
+class Deepest:
+    """The deepest contact of lines with a body, or of two bodies.
 
     Attributes
     ----------
-    body : refweb.net.rigid_body.RigidBody
-        The body.
+    bodies : tuple of refweb.net.rigid_body.RigidBody
+        The body, or both.
     overlap : float
         Depth [m], 0 where nothing has touched.
     time : float
         Time [s]; in statics the load step.
-    line : int, optional
-        The line.
     stiffness, exponent : float
-        k [N/m^p] and p of its contact.
-    moving : bool
-        Whether it comes with energy, in dynamics, or is pushed.
+        k [N/m^p] and p of their contact.
+    chosen : tuple of str
+        Names of those whose stiffness is refweb's choice.
     smallest : float
-        Stiffness that its energy, or what pushes, asks for at the start [N/m^p].
-    chosen : bool
-        Whether the stiffness is refweb's choice.
+        Stiffness that their energy, or what pushes, asks for at the start [N/m^p].
     initial : float
         Overlap at t = 0 [m], which no stiffness changes.
-    fixed : bool
-        Whether it is deeper than allowed, and neither the line nor the body is free to give way.
     allowed : float
         Overlap that is allowed [m].
+    moving : bool
+        Whether they come with energy, in dynamics, or are pushed.
+    fixed : bool
+        Whether it is deeper than allowed, and neither the line nor the body is free to give way.
     """
 
-    body: RigidBody
+    bodies: tuple[RigidBody, ...]
     overlap: float
     time: float
-    line: int | None
     stiffness: float
     exponent: float
-    moving: bool
+    chosen: tuple
     smallest: float
-    chosen: bool
     initial: float
-    fixed: bool
     allowed: float
+    moving: bool = True
+    fixed: bool = False
+
+    @property
+    def thickness(self):
+        """Least distance from a middle to its surface [m]."""
+        return min(body.thickness for body in self.bodies)
 
     @property
     def too_deep(self):
@@ -163,8 +167,8 @@ class Deepest(NamedTuple):
 
     @property
     def in_core(self):
-        """True if the line is in the core."""
-        return self.overlap > CORE * self.body.thickness
+        """True if the line, or a body, is in the core."""
+        return self.overlap > CORE * self.thickness
 
     @property
     def enough(self):
@@ -178,9 +182,46 @@ class Deepest(NamedTuple):
 
     def plain(self):
         """Convert to values for ``run.json``."""
-        size = self.allowed
-        values = {"overlap": self.overlap, "time": self.time if self.overlap > 0.0 else None, "line": self.line}
-        values |= {"allowed": size if math.isfinite(size) else None, "stiffness": self.stiffness, "chosen": self.chosen}
+        allowed = self.allowed if math.isfinite(self.allowed) else None
+        when = self.time if self.overlap > 0.0 else None
+        return {"overlap": self.overlap, "time": when, "allowed": allowed, "stiffness": self.stiffness}
+
+    def refuse(self):
+        """Refuse what is in the core, and a choice that was too soft.
+
+        Raises
+        ------
+        PenetrationError
+            Where refweb chose the stiffness and the overlap is not allowed.
+        SolverError
+            Where a line or a body is in the core.
+        """
+        if self.in_core and self.at_start:
+            raise SolverError(self._at_start_text)
+        if self.chosen and not self.fixed and self.too_deep and self.overlap > DEEPER * self.initial:
+            raise too_soft(self, self._where, self.allowed, self.chosen)
+        if self.in_core:
+            raise SolverError(self._in_core_text)
+
+    _where: ClassVar[Any]
+    _at_start_text: ClassVar[Any]
+    _in_core_text: ClassVar[Any]
+
+
+@dataclass(frozen=True)
+class DeepestLine(Deepest):
+    """The deepest contact of a body with lines, and the ``line``."""
+
+    line: int | None = None
+
+    @property
+    def body(self):
+        """The body."""
+        return self.bodies[0]
+
+    def plain(self):
+        """Convert to values for ``run.json``."""
+        values = super().plain() | {"line": self.line, "chosen": bool(self.chosen)}
         return values | ({"surface_error": error} if (error := self.body.shape.error) is not None else {})
 
     @property
@@ -192,31 +233,25 @@ class Deepest(NamedTuple):
     def _size(self):
         return "the shortest line" if self.body.shape.ground else "its size"
 
-    def _where(self):
+    @property
+    def _depth(self):
         instant = f"t = {self.time:.6g} s" if self.moving else f"load step {self.time:g}"
         return f'{self.overlap:.3g} m deep in body "{self.body.name}" at {instant}'
 
-    def refuse(self):
-        """Refuse a line in the core, and a choice that was too soft.
+    @property
+    def _where(self):
+        return f"line {self.line} is {self._depth}"
 
-        Raises
-        ------
-        TooSoft
-            Where refweb chose the stiffness and the overlap is not allowed.
-        SolverError
-            Where a line is in the core.
-        """
-        if self.in_core and self.at_start:
-            raise SolverError(
-                f"line {self.line} starts in the core of a body, {self._where()}: move the body or the web"
-            )
-        if self.chosen and not self.fixed and self.too_deep and self.overlap > DEEPER * self.initial:
-            raise too_soft(self, f"line {self.line} is {self._where()}", self.allowed, [self.body.name])
-        if self.in_core:
-            raise SolverError(
-                f"line {self.line} passes the core of a body: it is {self._where()}, whose middle is "
-                f"{self.body.thickness:.3g} m below its surface; {self._remedy()}"
-            )
+    @property
+    def _at_start_text(self):
+        return f"line {self.line} starts in the core of a body, {self._depth}: move the body or the web"
+
+    @property
+    def _in_core_text(self):
+        return (
+            f"line {self.line} passes the core of a body: it is {self._depth}, whose middle is {self.thickness:.3g} m "
+            f"below its surface; {self._remedy()}"
+        )
 
     def remarks(self, what="the web"):
         """Remarks for a reader of the results; ``what`` is all that it might have touched."""
@@ -226,10 +261,10 @@ class Deepest(NamedTuple):
             )
         elif self.too_deep:
             remedy = "there it starts" if self.at_start else self._remedy()
-            text = f"line {self.line} is up to {self._where()}, {self._percent:.3g} % of {self._size}; {remedy}"
+            text = f"line {self.line} is up to {self._depth}, {self._percent:.3g} % of {self._size}; {remedy}"
             yield Finding("deep-contact", text, "contact")
         elif self.overlap > max(NOTED * self.allowed / SHARE, DEEPER * self.initial) and not self.fixed:
-            text = f"line {self.line} is up to {self._where()}, {self._percent:.2g} % of {self._size}: results may "
+            text = f"line {self.line} is up to {self._depth}, {self._percent:.2g} % of {self._size}: results may "
             text += f"move with the stiffness of contact; {self.enough:g} holds it to {100.0 * AIM * SHARE:g} %, and "
             yield Finding("soft-contact", text + "refweb trust says by how much", "contact")
 
@@ -278,19 +313,10 @@ class Overlaps:
         if self._moving and time == 0.0:
             self._initial[i] = overlap
         net, unmoved = self.system.net, self.system.fixed
-        limit = allowed_in(net, body)
+        limit, chosen = allowed_in(net, body), (body.name,) if body.name in self._chosen else ()
         fixed_pair = overlap > limit and bool(unmoved[[body.row, *net.cells[net.line == line].ravel()]].all())
-        fields = (
-            stiffness,
-            exponent,
-            self._moving,
-            smallest,
-            body.name in self._chosen,
-            self._initial[i],
-            fixed_pair,
-            limit,
-        )
-        return Deepest(body, overlap, time, line, *fields)
+        law, more = (stiffness, exponent, chosen, smallest, self._initial[i], limit), (self._moving, fixed_pair, line)
+        return DeepestLine((body,), overlap, time, *law, *more)
 
     def stiffness_of(self, body):
         """Stiffness of the contact of a body [N/m^p]."""

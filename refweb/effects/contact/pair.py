@@ -1,7 +1,7 @@
 """Numbers of a pair, one element and one body, as the kernels of contact read them.
 
-Data of a cell begin with the columns `RADIUS` to `AWAY`, and vectors from the centre to the cell's nodes in the web's
-position; behind these stands the rest of a `Pair`, which spheres alone do not need, and at the end what turning takes.
+Data of a cell begin with a `SPHERE` and the vectors from the centre to the cell's nodes in the web's position; behind
+these stands a `SURFACE`, which spheres alone do not need, and at the end a `TURNING` of a body that turns in space.
 """
 
 from __future__ import annotations
@@ -12,15 +12,31 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compiled.rows import record_at, width_of
 from ...kernels import kernel
 from ...net.rigid_body import Grown
 from ...net.rotation import matrix_at, times
 
-RADIUS, PENALTY, AWAY = 0, 1, 2
-"""Columns of data: radius of a sphere around the body [m], stiffness of the penalty, first of the vectors."""
-_EXPONENT, _DAMPING, _FRICTION, _SLIP, _GROWTH, _CORE, _ROUND, _ONCE, _PLANAR, _AXES = 0, 1, 2, 3, 4, 5, 8, 9, 10, 11
-_FINE, _THICK, _FIELD, _MOBILITY, _LEVER, _OFFSET = 20, 21, 22, 23, 29, 30
-"""Columns behind the vectors."""
+SPHERE = np.dtype([("radius", float), ("stiffness", float)])
+"""Radius of a sphere around the body [m], stiffness of the penalty."""
+SURFACE = np.dtype(
+    [
+        *((name, float) for name in ("exponent", "damping", "friction", "slip_velocity", "growth")),
+        ("core", float, (3,)),
+        *((name, float) for name in ("rounded", "once", "planar")),
+        ("axes", float, (3, 3)),
+        *((name, float) for name in ("fine", "thick", "field")),
+    ]
+)
+"""What a `Pair` has besides."""
+TURNING = np.dtype([("mobility", float, (6,)), ("lever", float), ("offset", float, (3,))])
+"""Mobility of a `Pair`, what `lever` says, and the centre of the shape from the body's row [m]."""
+LINE_CONTACT = np.dtype([("cell", np.int64), *((name, float) for name in ("xi", "inner", "weight", "share", "rise"))])
+"""A contact that is found on a line: its cell, place, and whether that moves; on bodies that are not convex by what its
+energy counts, 1 of a maximum or an end and −1 of a minimum, the share of the push that losses have, and F of
+`refweb.effects.contact.nonconvex_contacts`."""
+AWAY, WIDTH = width_of(SPHERE), width_of(SURFACE)
+"""First column of the vectors; number of columns of a `SURFACE`."""
 
 
 class Pair(NamedTuple):
@@ -87,16 +103,22 @@ def lever(body):
 
 
 @kernel(forceinline=True)
+def turning_of(data, c, nodes):
+    """The `TURNING` of cell c."""
+    return record_at(TURNING, data, c, AWAY + 3 * nodes + WIDTH)
+
+
+@kernel(forceinline=True)
 def lever_of(data, c, nodes):
     """Data of `lever` for the body of cell c."""
-    return data[c, AWAY + 3 * nodes + _LEVER]
+    return turning_of(data, c, nodes).lever
 
 
 @kernel(forceinline=True)
 def from_shape(p, data, c, nodes):
     """Vector at p, from the row of the body of cell c, from the centre of its shape; along its axes."""
-    at = AWAY + 3 * nodes + _OFFSET
-    return p[0] - data[c, at], p[1] - data[c, at + 1], p[2] - data[c, at + 2]
+    offset = turning_of(data, c, nodes).offset
+    return p[0] - offset[0], p[1] - offset[1], p[2] - offset[2]
 
 
 @functools.cache
@@ -115,7 +137,7 @@ def pairing(spins):
         if spins < 2:
             return pair
         turned = matrix_at(x, cells[c, nodes + 1], cells[c, nodes + 2])
-        at, axes = AWAY + 3 * nodes + _MOBILITY, pair.axes
+        w, axes = turning_of(data, c, nodes).mobility, pair.axes
         return Pair(
             pair.stiffness,
             pair.exponent,
@@ -126,7 +148,7 @@ def pairing(spins):
             (times(turned, axes[0]), times(turned, axes[1]), times(turned, axes[2])),
             pair.once,
             pair.planar,
-            (data[c, at], data[c, at + 1], data[c, at + 2], data[c, at + 3], data[c, at + 4], data[c, at + 5]),
+            (w[0], w[1], w[2], w[3], w[4], w[5]),
         )
 
     return paired
@@ -135,29 +157,29 @@ def pairing(spins):
 @kernel(forceinline=True)
 def pair_of(data, c, nodes):
     """The `Pair` of cell c as its body starts; what is not read of it costs nothing."""
-    at = AWAY + 3 * nodes
-    a, k = at + _AXES, at + _CORE
+    surface = record_at(SURFACE, data, c, AWAY + 3 * nodes)
+    core, axes = surface.core, surface.axes
     return Pair(
-        data[c, PENALTY],
-        data[c, at + _EXPONENT],
-        data[c, at + _DAMPING],
-        data[c, at + _FRICTION],
-        data[c, at + _SLIP],
+        record_at(SPHERE, data, c, 0).stiffness,
+        surface.exponent,
+        surface.damping,
+        surface.friction,
+        surface.slip_velocity,
         Grown(
-            data[c, at + _GROWTH],
-            (data[c, k], data[c, k + 1], data[c, k + 2]),
-            data[c, at + _ROUND] != 0.0,
-            data[c, at + _FINE],
-            data[c, at + _THICK],
-            data[c, at + _FIELD],
+            surface.growth,
+            (core[0], core[1], core[2]),
+            surface.rounded != 0.0,
+            surface.fine,
+            surface.thick,
+            surface.field,
         ),
         (
-            (data[c, a], data[c, a + 1], data[c, a + 2]),
-            (data[c, a + 3], data[c, a + 4], data[c, a + 5]),
-            (data[c, a + 6], data[c, a + 7], data[c, a + 8]),
+            (axes[0, 0], axes[0, 1], axes[0, 2]),
+            (axes[1, 0], axes[1, 1], axes[1, 2]),
+            (axes[2, 0], axes[2, 1], axes[2, 2]),
         ),
-        data[c, at + _ONCE] != 0.0,
-        data[c, at + _PLANAR] != 0.0,
+        surface.once != 0.0,
+        surface.planar != 0.0,
         (1.0, 0.0, 0.0, 1.0, 0.0, 1.0),
     )
 

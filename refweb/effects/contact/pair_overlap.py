@@ -12,45 +12,19 @@ followed one by one, see `refweb.dynamics.integrators.body_body_ccd`.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
 
-from ...errors import SolverError
 from ...findings import Finding
-from ...net.rigid_body import RigidBody
 from ..base import pairs_of
-from .overlap import AIM, CORE, DEEPER, allowed, first_between, rounded_up, size_of, too_soft
+from .overlap import AIM, CORE, Deepest, allowed, first_between, size_of
 
 WAY = 0.2
 """Way of two bodies in an explicit step, over the thickness of the smaller and ``safety``: what the bound allows."""
 
 
-class DeepestPair(NamedTuple):
-    """The deepest contact of two bodies.
-
-    Attributes
-    ----------
-    bodies : tuple of 2 refweb.net.rigid_body.RigidBody
-        The bodies.
-    overlap, time : float
-        Depth [m], 0 where they have not touched, and when [s].
-    stiffness, exponent : float
-        k [N/m^p] and p of their contact.
-    chosen : tuple of str
-        Names of those whose stiffness is refweb's choice.
-    smallest : float
-        Stiffness that their energy asks for at the start [N/m^p], where they are still getting deeper, else 0.
-    initial : float
-        Overlap at t = 0 [m], which no stiffness changes.
-    """
-
-    bodies: tuple[RigidBody, RigidBody]
-    overlap: float
-    time: float
-    stiffness: float
-    exponent: float
-    chosen: tuple
-    smallest: float
-    initial: float
+@dataclass(frozen=True)
+class DeepestPair(Deepest):
+    """The deepest contact of two bodies."""
 
     @property
     def name(self):
@@ -58,64 +32,24 @@ class DeepestPair(NamedTuple):
         return " and ".join(f'"{body.name}"' for body in self.bodies)
 
     @property
-    def allowed(self):
-        """Overlap that is allowed [m]."""
-        return min(map(allowed, self.bodies))
-
-    @property
-    def thickness(self):
-        """Least distance from a middle to its surface [m]."""
-        return min(body.thickness for body in self.bodies)
-
-    @property
-    def moving(self):
-        """True: bodies that push each other come with energy."""
-        return True
-
-    @property
-    def in_core(self):
-        """True if one is in the core of the other."""
-        return self.overlap > CORE * self.thickness
-
-    @property
-    def enough(self):
-        """Stiffness that would do [N/m^p]: of an overlap that is `AIM` of what is allowed."""
-        factor = self.stiffness * (self.overlap / (AIM * self.allowed)) ** (self.exponent + 1.0)
-        return rounded_up(max(factor, self.smallest) if self.in_core else factor)
-
-    def plain(self):
-        """Convert to values for ``run.json``."""
-        when = self.time if self.overlap > 0.0 else None
-        return {"overlap": self.overlap, "time": when, "allowed": self.allowed, "stiffness": self.stiffness}
-
-    @property
     def _where(self):
         return f"bodies {self.name} are {self.overlap:.3g} m deep in each other at t = {self.time:.6g} s"
 
-    def refuse(self):
-        """Refuse a body in the core of another, and a choice that was too soft.
+    @property
+    def _at_start_text(self):
+        return f"{self._where}, in the core, where they start: move one of them"
 
-        Raises
-        ------
-        TooSoft
-            Where refweb chose the stiffness and the overlap is not allowed.
-        SolverError
-            Where one is in the core of the other.
-        """
-        if self.in_core and self.overlap <= self.initial:
-            raise SolverError(f"{self._where}, in the core, where they start: move one of them")
-        if self.chosen and self.overlap > self.allowed and self.overlap > DEEPER * self.initial:
-            raise too_soft(self, self._where, self.allowed, self.chosen)
-        if self.in_core:
-            raise SolverError(
-                f"{self._where}, in the core, more than {CORE:g} of the {self.thickness:.3g} m from the middle of the "
-                f"smaller to its surface; {self._remedy}"
-            )
+    @property
+    def _in_core_text(self):
+        return (
+            f"{self._where}, in the core, more than {CORE:g} of the {self.thickness:.3g} m from the middle of the "
+            f"smaller to its surface; {self._remedy}"
+        )
 
     def remarks(self):
         """Remarks for a reader of the results."""
-        if self.overlap > self.allowed:
-            remedy = "there they start" if self.overlap <= self.initial else self._remedy
+        if self.too_deep:
+            remedy = "there they start" if self.at_start else self._remedy
             share = 100.0 * self.overlap / min(map(size_of, self.bodies))
             yield Finding("deep-contact", f"{self._where}, {share:.3g} % of the smaller; {remedy}", "contact")
 
@@ -150,7 +84,8 @@ class PairOverlaps:
         chosen = tuple(body.name for body in bodies if body.name in self._chosen)
         deep = overlap > CORE * min(body.thickness for body in bodies)
         smallest = first_between(self._system, bodies, exponent) if deep else 0.0
-        return DeepestPair(bodies, overlap, time, stiffness, exponent, chosen, smallest, initial)
+        limit = min(map(allowed, bodies))
+        return DeepestPair(bodies, overlap, time, stiffness, exponent, chosen, smallest, initial, limit)
 
     def record(self, i, overlap, time):
         """Note the deepest overlap [m] of pair ``i`` and its time [s], if it is deeper than before."""
@@ -174,7 +109,7 @@ class PairOverlaps:
         self._met = met
 
     def refuse(self):
-        """Refuse what may not be, see `DeepestPair.refuse`."""
+        """Refuse what may not be, see `Deepest.refuse`."""
         for deepest in self.deepest:
             deepest.refuse()
 

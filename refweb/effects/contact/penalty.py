@@ -19,13 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compiled.rows import record_at
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ...net.rotation import times_transposed, to_quaternion
-from ..base import FELT
+from ..base import TOUCH
 from ..vectors import cross, dot
 from .contact_points import hessian_times, place_moves, places, window
 from .nearest_point import lightness, point, share
-from .pair import lever_of, pair_of, pairing, power_of_depth
+from .pair import LINE_CONTACT, lever_of, pair_of, pairing, power_of_depth
 from .rotational_stiffness import add_moments, add_push, add_rotation, set_arms
 
 SHALLOW = 0.05
@@ -198,24 +199,25 @@ def kernels(depth, pieces, nodes, functions, spins=0):
         2 where the last rows of a cell are those of the rotation of the body, else 0.
     """
     arity, paired = nodes + 1 + spins, pairing(spins)
-    _, _, contacts, touch_of, (limit, columns) = places(depth, spins)
+    _, _, contacts, touch_of, limit = places(depth, spins)
     depth_ahead = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        buffer = np.empty((limit * pieces, columns))
+        buffer = np.empty(limit * pieces, LINE_CONTACT)
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
                 touch = touch_of(x, cells, data, nodes, functions, buffer, n)
                 c, push = touch.c, push_of(touch)
-                out[c, 0] = max(out[c, 0], touch.spot.depth)
+                shows = record_at(TOUCH, out, c, 0)
+                shows.value = max(shows.value, touch.spot.depth)
                 g = times_transposed(touch.pair.axes, touch.spot.gradient)
                 for k in range(3):
                     for a in range(nodes):
                         f[cells[c, a], k] -= share(a, nodes, functions, touch.xi)[0] * push * g[k]
                     f[cells[c, nodes], k] += push * g[k]
-                    out[c, FELT + k] += push * g[k]
+                    shows.force[k] += push * g[k]
                 if spins:
                     moment = times_transposed(touch.pair.axes, cross(touch.spot.y, touch.spot.gradient))
                     for k in range(3):
@@ -223,7 +225,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
-        buffer = np.empty((limit * pieces, columns))
+        buffer = np.empty(limit * pieces, LINE_CONTACT)
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
@@ -234,7 +236,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
-        buffer, z, q = np.empty((limit * pieces, columns)), np.empty((nodes + 1, 3)), np.empty((3, 3))
+        buffer, z, q = np.empty(limit * pieces, LINE_CONTACT), np.empty((nodes + 1, 3)), np.empty((3, 3))
         pushes, arms, turning = np.empty((pieces, nodes, 3)), np.empty((nodes, 3)), spins > 0 and not definite
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):

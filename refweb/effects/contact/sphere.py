@@ -13,11 +13,12 @@ import math
 
 import numpy as np
 
+from ...compiled.rows import record_at
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..base import CONTACT_COLUMNS, FELT
+from ..base import CONTACT_COLUMNS, TOUCH
 from ..vectors import dot
 from .nearest_point import closest, lightness, point, share, touched
-from .pair import PENALTY, RADIUS
+from .pair import SPHERE
 
 
 @functools.cache
@@ -43,18 +44,18 @@ def kernels(pieces, nodes, functions):
             c, xi, square = touched(x, cells, data, first, pieces, nodes, functions)
             if c < 0:
                 continue
-            distance = math.sqrt(square)
-            out[c, 0] = data[c, RADIUS] - distance
+            distance, ball, shows = math.sqrt(square), record_at(SPHERE, data, c, 0), record_at(TOUCH, out, c, 0)
+            shows.value = ball.radius - distance
             if square == 0.0:
                 continue
             p, _, _ = point(x, cells, data, c, nodes, functions, xi)
-            push = data[c, PENALTY] * out[c, 0]
+            push = ball.stiffness * shows.value
             for k in range(3):
                 pull = push * p[k] / distance
                 for a in range(nodes):
                     f[cells[c, a], k] += share(a, nodes, functions, xi)[0] * pull
                 f[cells[c, nodes], k] -= pull
-                out[c, FELT + k] = -pull
+                shows.force[k] = -pull
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
@@ -63,8 +64,9 @@ def kernels(pieces, nodes, functions):
                 out[c] = 0.0
             c, _, square = touched(x, cells, data, first, pieces, nodes, functions)
             if c >= 0:
-                depth = data[c, RADIUS] - math.sqrt(square)
-                out[c] = 0.5 * data[c, PENALTY] * depth * depth
+                ball = record_at(SPHERE, data, c, 0)
+                depth = ball.radius - math.sqrt(square)
+                out[c] = 0.5 * ball.stiffness * depth * depth
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
@@ -83,8 +85,9 @@ def kernels(pieces, nodes, functions):
                 for k in range(3):
                     gradient[3 * a + k] = value * p[k] / distance
                     mixed[3 * a + k] = value * d[k] + slope * p[k]
-            penalty = data[c, PENALTY]
-            curved = 0.0 if definite else penalty * (data[c, RADIUS] - distance) / distance
+            ball = record_at(SPHERE, data, c, 0)
+            penalty = ball.stiffness
+            curved = 0.0 if definite else penalty * (ball.radius - distance) / distance
             inside = 0.0 < xi < 1.0
             for r in range(size):
                 for s in range(size):
@@ -104,7 +107,8 @@ def kernels(pieces, nodes, functions):
             b = cells[first, nodes]
             for c in range(first, first + pieces):
                 xi, square = closest(x, cells, data, c, nodes, functions)
-                radius, penalty, distance = data[c, RADIUS], data[c, PENALTY], math.sqrt(square)
+                ball, distance = record_at(SPHERE, data, c, 0), math.sqrt(square)
+                radius, penalty = ball.radius, ball.stiffness
                 if distance - radius >= reach:
                     before = 0.0
                     continue

@@ -206,8 +206,10 @@ class Contact(Table):
         data = [pair_data(body, along, net.points, law, spins == 2) for body, law in zip(bodies, laws, strict=True)]
         nodes = along.shape[1]
 
+        vectors = slice(AWAY, AWAY + 3 * nodes)
+
         def disable(numbers):
-            numbers[:, AWAY : AWAY + 3 * nodes] += np.tile(OUT_OF_REACH, nodes)
+            numbers[:, vectors] += np.tile(OUT_OF_REACH, nodes)
 
         return dict(
             name="contact",
@@ -223,7 +225,8 @@ class Contact(Table):
         if depth is None:
             from .sphere import kernels
 
-            pairs["data"] = np.ascontiguousarray(pairs["data"][:, : AWAY + 3 * element[1]])
+            columns = AWAY + 3 * element[1]
+            pairs["data"] = np.ascontiguousarray(pairs["data"][:, :columns])
             (force, energy, stiffness, bound), within = kernels(*element), in_sphere
         else:
             from .contact_points import in_reach

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...findings import Finding
-from ...net.skeleton import ARC, FROM, KIND, OWNS, POINT, THICKNESS, THIRD, TO
+from ...net.skeleton import ARC, POINT
 
 PLACES = 9
 """Number of places that are looked at on each part."""
@@ -94,8 +94,8 @@ def _depth(body, body_b, places, x):
     points_in_b = (_along(parts) + body.offset) @ axes + places[body.row] - places[body_b.row]
     points_in_b = points_in_b @ its.T - body_b.offset
     depth, deepest = body_b.shape.depth(), 0.0
-    grown = body_b.shape.touched(float(parts[:, THICKNESS].max()))
-    for point, thickness in zip(points_in_b, np.repeat(parts[:, THICKNESS], PLACES), strict=True):
+    grown = body_b.shape.touched(float(parts["thickness"].max()))
+    for point, thickness in zip(points_in_b, np.repeat(parts["thickness"], PLACES), strict=True):
         thick = grown._replace(radius=float(grown.radius + thickness))
         deepest = max(deepest, depth(tuple(point.tolist()), thick)[0])
     return deepest
@@ -106,10 +106,11 @@ def _along(parts):
     points = np.empty((len(parts), PLACES, 3))
     for n, part in enumerate(parts):
         share = np.linspace(0.0, 1.0, PLACES)[:, None]
-        if part[KIND] == ARC:
-            angle = part[OWNS] + share * (part[OWNS + 1] - part[OWNS])
-            points[n] = part[FROM:TO] + np.cos(angle) * part[TO:THIRD] + np.sin(angle) * part[THIRD:OWNS]
+        if part["kind"] == ARC:
+            begin, end = part["owns"]
+            angle = begin + share * (end - begin)
+            points[n] = part["start"] + np.cos(angle) * part["end"] + np.sin(angle) * part["third"]
         else:
-            end = part[FROM:TO] if part[KIND] == POINT else part[TO:THIRD]
-            points[n] = (1.0 - share) * part[FROM:TO] + share * end
+            end = part["start"] if part["kind"] == POINT else part["end"]
+            points[n] = (1.0 - share) * part["start"] + share * end
     return points.reshape(-1, 3)

@@ -14,13 +14,23 @@ from __future__ import annotations
 import functools
 import math
 
+import numpy as np
+
+from ...compiled.rows import record_at
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..line_kernels import direction
 from ..vectors import dot
 
-NORMAL, TANGENTIAL, WIND, ALONG, GROUP, LENGTH, SLOPES = 0, 1, 2, 5, 8, 9, 10
-"""Columns of data: c_n and c_t [kg/m]; w; d = dx/dξ of the web; the number of cells of one row, where they begin, else
-0; natural length [m]; ∂d/∂x of each node, the first of which bears the force."""
+
+def end_of(nodes):
+    """Dtype of the data of cells of so many nodes.
+
+    c_n and c_t [kg/m]; w; d = dx/dξ of the web; the number of cells of one row, where they begin, else 0; natural
+    length [m]; ∂d/∂x of each node, the first of which bears the force.
+    """
+    vectors = [("wind", float, (3,)), ("along", float, (3,))]
+    numbers = [("group", float), ("length", float), ("slopes", float, (nodes,))]
+    return np.dtype([("normal", float), ("tangential", float), *vectors, *numbers])
 
 
 @kernel()
@@ -51,21 +61,22 @@ def slope_of(t, u, normal, tangential):
 
 
 @kernel()
-def relative(v, cells, data, c):
-    """u of cell c."""
-    row = cells[c, 0]
-    return v[row, 0] - data[c, WIND], v[row, 1] - data[c, WIND + 1], v[row, 2] - data[c, WIND + 2]
+def relative(v, row, wind):
+    """u of a row."""
+    return v[row, 0] - wind[0], v[row, 1] - wind[1], v[row, 2] - wind[2]
 
 
 @functools.cache
 def kernels(nodes):
     """Force, stiffness, damping and bound of cells of so many nodes."""
+    End = end_of(nodes)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            row, (e, _) = cells[c, 0], direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            force_ = drag_on(e, relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL])
+            row, end = cells[c, 0], record_at(End, data, c, 0)
+            e, _ = direction(x, cells, c, end)
+            force_ = drag_on(e, relative(v, row, end.wind), end.normal, end.tangential)
             power = 0.0
             for k in range(3):
                 f[row, k] += force_[k]
@@ -76,9 +87,10 @@ def kernels(nodes):
     def stiffness(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
-            e, inverse = direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            along, n, size = split(e, relative(v, cells, data, c))
-            normal, tangential = data[c, NORMAL], data[c, TANGENTIAL]
+            end = record_at(End, data, c, 0)
+            e, inverse = direction(x, cells, c, end)
+            along, n, size = split(e, relative(v, cells[c, 0], end.wind))
+            normal, tangential = end.normal, end.tangential
             for j in range(3 if not definite else 0):
                 faster = n[j] * inverse  # ∂(t·u)/∂d
                 for i in range(3):
@@ -88,14 +100,15 @@ def kernels(nodes):
                         change -= normal * n[i] * along * faster / size
                     change += tangential * abs(along) * (2.0 * faster * e[i] + along * turned)
                     for b in range(nodes):
-                        blocks[c, i, 3 * b + j] = data[c, SLOPES + b] * change
+                        blocks[c, i, 3 * b + j] = end.slopes[b] * change
 
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
-            e, _ = direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            slope = slope_of(e, relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL])
+            end = record_at(End, data, c, 0)
+            e, _ = direction(x, cells, c, end)
+            slope = slope_of(e, relative(v, cells[c, 0], end.wind), end.normal, end.tangential)
             for i in range(3):
                 for j in range(3):
                     blocks[c, i, j] = slope[i][j]
@@ -104,10 +117,11 @@ def kernels(nodes):
     def bound(reach, speed, x, mass, rates, cells, data):
         # Of the turn of a tangent, whose entries are below 2 (c_n + c_t) |u|²/|d| each; a taut line is as long as this.
         for c in range(cells.shape[0]):
-            w0, w1, w2 = data[c, WIND], data[c, WIND + 1], data[c, WIND + 2]
+            end = record_at(End, data, c, 0)
+            w0, w1, w2 = end.wind[0], end.wind[1], end.wind[2]
             fastest = speed + math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
-            coefficient = 4.0 * (data[c, NORMAL] + data[c, TANGENTIAL]) * fastest * fastest / data[c, LENGTH]
+            coefficient = 4.0 * (end.normal + end.tangential) * fastest * fastest / end.length
             for b in range(nodes):
-                rates[cells[c, 0]] += coefficient * abs(data[c, SLOPES + b])
+                rates[cells[c, 0]] += coefficient * abs(end.slopes[b])
 
     return force, stiffness, damping, bound

@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import functools
 
+from ...compiled.rows import record_at
 from ...kernels import DETECT, LAW, kernel
 from ..base import ImplicitContactKernels
 from ..contact_solver import acceleration, apply_force, set_part
 from ..line_kernels import direction
 from ..vectors import add, solve
-from .force import ALONG, GROUP, NORMAL, SLOPES, TANGENTIAL, WIND, drag_on, slope_of
+from .force import drag_on, end_of, slope_of
 
 MOST_STEPS, CLOSE = 60, 4e-16
 """Steps of Newton's method, and what they leave of the equations, over velocities, at which they end."""
@@ -99,22 +100,25 @@ def drag_law(h, number, n, f, inverse, contacts, parts):
 @functools.cache
 def implicit_drag(nodes):
     """The `ImplicitContactKernels` of cells of so many nodes, where those of a row stand together."""
+    End = end_of(nodes)
 
     @kernel(DETECT)
     def detect(x, cells, data, contacts, parts, begin):
         for c in range(cells.shape[0] if begin + cells.shape[0] <= contacts.size else 0):
-            contact, (t, _) = contacts[begin + c], direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            contact.cell, contact.owner, contact.group = c, c, int(data[c, GROUP])
-            contact.drag[0], contact.drag[1] = data[c, NORMAL], data[c, TANGENTIAL]
+            contact, end = contacts[begin + c], record_at(End, data, c, 0)
+            t, _ = direction(x, cells, c, end)
+            contact.cell, contact.owner, contact.group = c, c, int(end.group)
+            contact.drag[0], contact.drag[1] = end.normal, end.tangential
             for k in range(3):
                 contact.tangent[k] = t[k]
+            contact.count = 1 if contact.group else 0
             if contact.group == 0:
                 continue
-            contact.tag, contact.count, contact.normal_force, contact.damping = 0, 1, 0.0, 0.0
+            contact.tag, contact.normal_force, contact.damping = 0, 0.0, 0.0
             for k in range(3):
                 unit = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
                 set_part(parts[contact.first], cells[c, 0], k, unit, unit)
-                contact.wind[k] = data[c, WIND + k]
+                contact.wind[k] = end.wind[k]
                 for j in range(3):
                     contact.basis[k, j] = unit[j]
         return begin + cells.shape[0]

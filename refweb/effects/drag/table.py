@@ -10,11 +10,12 @@ import math
 import numpy as np
 
 from ...accepted import accepts, by_name
+from ...compiled.rows import matrix_of
 from ...errors import InputError
 from ...messages import nearest
 from ...tables import Several, Table, field, real, table, vector
 from ..base import Balance, CellElements, ForceTerm, Tangent, Timing, VelocityForce, without
-from .force import kernels
+from .force import end_of, kernels
 from .implicit_drag import implicit_drag
 
 SPHERE = 0.47
@@ -115,10 +116,10 @@ class Drag(Table):
                 raise InputError(f'bodies."{name}" is not a free body, {nearest(name, names)}')
         terms = [self._term(net, *self._ends(net))]
         if free:
-            numbers = np.zeros((len(free), 11))
-            numbers[:, 0], numbers[:, 2:5] = [self._of(body) for body in free], self.wind
-            numbers[:, 8] = numbers[:, 9] = 1.0
-            terms.append(self._term(net, np.array([[body.row] for body in free], dtype=np.int32), numbers))
+            ends = np.zeros(len(free), end_of(1))
+            ends["normal"], ends["wind"] = [self._of(body) for body in free], self.wind
+            ends["group"] = ends["length"] = 1.0
+            terms.append(self._term(net, np.array([[body.row] for body in free], dtype=np.int32), ends))
         return terms
 
     def _ends(self, net):
@@ -129,21 +130,21 @@ class Drag(Table):
         shares = functions.T @ (1.0 / (power + 1.0))
         diameter = np.sqrt(4.0 * net.area / math.pi) if self.diameter is None else np.full(elements, self.diameter)
         pressed = 0.5 * self.density * diameter * net.natural_length
-        cells, numbers = [], []
+        cells, ends = [], np.zeros((count, elements), end_of(count))
+        ends["wind"], ends["along"], ends["length"] = self.wind, net.line_data.reference, net.natural_length
         for a, position in enumerate(net.places):
             order = [a, *(b for b in range(count) if b != a)]
             slopes = (power[1:] * position ** (power[1:] - 1)) @ functions[1:]
             both = np.outer(shares[a] * pressed, [self.normal, math.pi * self.tangential])
-            rest = np.tile([*self.wind], (elements, 1)), net.line_data.reference
-            tail = np.zeros((elements, 1)), net.natural_length[:, None], np.tile(slopes[order], (elements, 1))
+            ends[a]["normal"], ends[a]["tangential"] = both.T
+            ends[a]["slopes"] = slopes[order]
             cells.append(net.cells[:, order])
-            numbers.append(np.hstack([both, *rest, *tail]))
-        cells, numbers = np.vstack(cells), np.vstack(numbers)
+        cells = np.vstack(cells)
         order = np.argsort(cells[:, 0], kind="stable")
-        cells, numbers = cells[order], numbers[order]
+        cells, ends = cells[order], ends.ravel()[order]
         _, first, group = np.unique(cells[:, 0], return_index=True, return_counts=True)
-        numbers[first, 8] = group
-        return np.ascontiguousarray(cells, dtype=np.int32), np.ascontiguousarray(numbers), order % elements
+        ends["group"][first] = group
+        return np.ascontiguousarray(cells, dtype=np.int32), ends, order % elements
 
     def _of(self, body):
         """½ ρ C A of a body [kg/m]."""
@@ -154,13 +155,13 @@ class Drag(Table):
         coefficient = SPHERE if settings.coefficient is None else settings.coefficient
         return 0.5 * self.density * coefficient * (settings.area or math.pi * body.shape.grown().radius ** 2)
 
-    def _term(self, net, cells, data, elements=None):
+    def _term(self, net, cells, ends, elements=None):
         blows = any(self.wind)
         force, stiffness, damping, bound = kernels(cells.shape[1])
         return ForceTerm(
             name="drag",
             cells=cells,
-            data=data,
+            data=matrix_of(ends),
             force=force,
             balance=Balance("work" if blows else "dissipated_energy", power=0),
             tangent=Tangent(*((stiffness, bound) if cells.shape[1] > 1 else (None, None)), symmetric=False),

@@ -17,9 +17,10 @@ import math
 
 import numpy as np
 
+from ...compiled.rows import records_of, width_of
 from ...kernels import CCD_NEIGHBOURS, MEETS, TIME_TO_CONTACT, kernel
 from ..vectors import dot
-from .pair import SCALE, SHAPE, TOUCH, WIDTH, nearest, place_of
+from .pair import PAIR, nearest, numbers_of, place_of
 from .search import near_pairs
 
 MEETING = 1e-9
@@ -107,8 +108,9 @@ def meets(margin, path, kick, drift, x, v, f, inverse, cells, data, met):
     if cells.shape[1] != 4:
         _, cells, data = near_pairs(max(path, 0.0) + margin, x, cells, data)
     for c in range(cells.shape[0]):
-        if data[c, SCALE] > 0.0:
-            near, joined = margin + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
+        of = numbers_of(data, c)
+        if of.scale > 0.0:
+            near, joined = margin + MEETING * of.touch, cells[c, 0] == cells[c, 2]
             ways = ways_of(cells, c, kick, drift, v, f, inverse)
             if would_meet(near, place_of(x, cells, data, c), ways, joined)[0]:
                 record_pair(cells, c, met)
@@ -133,12 +135,12 @@ def watch(margin, path, kick, drift, x, v, f, inverse, cells, data, due, chosen,
         if due[c] > past + path + margin:
             next_one = min(next_one, due[c])
             continue
-        near, joined = margin + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
-        ways = ways_of(cells, c, kick, drift, v, f, inverse)
+        of, joined = numbers_of(data, c), cells[c, 0] == cells[c, 2]
+        near, ways = margin + MEETING * of.touch, ways_of(cells, c, kick, drift, v, f, inverse)
         closed, start, _ = would_meet(near, place_of(x, cells, data, c), ways, joined)
         due[c] = past + start
         next_one = min(next_one, due[c])
-        if closed and data[c, SCALE] > 0.0 and not came:
+        if closed and of.scale > 0.0 and not came:
             record_pair(cells, c, met)
             came = True
     due[count], due[count + 2] = past + path, next_one
@@ -149,7 +151,8 @@ def watch(margin, path, kick, drift, x, v, f, inverse, cells, data, due, chosen,
 def soon(x, v, cells, data):
     time = math.inf
     for c in range(cells.shape[0]):
-        if data[c, SCALE] > 0.0:
+        of = numbers_of(data, c)
+        if of.scale > 0.0:
             i, j, k, m = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3]
             p = v[i, 0] - v[k, 0], v[i, 1] - v[k, 1], v[i, 2] - v[k, 2]
             u = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
@@ -157,8 +160,8 @@ def soon(x, v, cells, data):
             speed = 2.0 * longest_of(p, u, w)
             if speed > 0.0:
                 geometry = place_of(x, cells, data, c)
-                left = distance(geometry.p, geometry.u, geometry.w, False) - data[c, TOUCH]
-                time = min(time, max(TRAVEL * data[c, TOUCH], 0.5 * left) / speed)
+                left = distance(geometry.p, geometry.u, geometry.w, False) - of.touch
+                time = min(time, max(TRAVEL * of.touch, 0.5 * left) / speed)
     return time
 
 
@@ -199,7 +202,7 @@ def neighbours(net, beside, touch):
     elements, first = pairs // 2, pairs % 2
     rows = np.stack([cells[elements, first], cells[elements, 1 - first]], axis=2).reshape(-1, 4)
     at = np.stack([positions[elements, first], positions[elements, 1 - first]], axis=2).reshape(-1, 4, 3)
-    data = np.zeros((len(pairs), WIDTH))
-    data[:, TOUCH], data[:, SCALE] = touch, 1.0
-    data[:, SHAPE : SHAPE + 9] = (at[:, 1:] - at[:, :1]).reshape(-1, 9)
+    data = np.zeros((len(pairs), width_of(PAIR)))
+    numbers = records_of(PAIR, data)
+    numbers["touch"], numbers["scale"], numbers["vectors"] = touch, 1.0, at[:, 1:] - at[:, :1]
     return np.ascontiguousarray(rows, dtype=np.int32), data, elements

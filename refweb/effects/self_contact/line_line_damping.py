@@ -18,9 +18,10 @@ import math
 
 import numpy as np
 
+from ...compiled.rows import record_at
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
 from .line_line_penalty import MOST, OF_REACH, add_all_second, add_forces, depth_ahead, pushed, steepest, stored
-from .pair import DAMPING, LENGTH, OTHER, SCALE, TOUCH
+from .pair import ELEMENT, PAIR, numbers_of
 from .search import near_pairs
 
 SHALLOW = 0.05
@@ -39,7 +40,7 @@ def loss(v, cells, data, c, forces):
     size = math.sqrt(square)
     if not size > 0.0:
         return 0.0, 0.0, 0.0
-    return max(-data[c, DAMPING] * power / size, -1.0), size, power
+    return max(-record_at(PAIR, data, c, 0).damping * power / size, -1.0), size, power
 
 
 @kernel(FORCE)
@@ -77,7 +78,7 @@ def stiffness(t, x, v, blocks, cells, data, definite):
             for j in range(12):
                 n, k = j // 3, j % 3
                 slope[i] += blocks[c, j, i] * (v[cells[c, n], k] - power * push[n][k] / size**2) / size
-        rate = data[c, DAMPING] if damped > -1.0 else 0.0
+        rate = record_at(PAIR, data, c, 0).damping if damped > -1.0 else 0.0
         for i in range(12):
             for j in range(12):
                 blocks[c, i, j] = damped * blocks[c, i, j] - rate * push[i // 3][i % 3] * slope[j]
@@ -91,9 +92,10 @@ def damping(t, x, v, blocks, cells, data, definite):
         damped, size, _ = loss(v, cells, data, c, push)
         if size == 0.0 or damped == -1.0:
             continue
+        rate = record_at(PAIR, data, c, 0).damping
         for i in range(12):
             for j in range(12):
-                blocks[c, i, j] = data[c, DAMPING] * push[i // 3][i % 3] * push[j // 3][j % 3] / size
+                blocks[c, i, j] = rate * push[i // 3][i % 3] * push[j // 3][j % 3] / size
 
 
 @kernel()
@@ -103,10 +105,11 @@ def add_bounds(reach, speed, x, mass, rates, cells, data, viscous):
     for c in range(cells.shape[0]):
         depth = depth_ahead(reach, speed, x, mass, cells, data, c)
         if depth > 0.0:
-            now = (1.875 * stored(x, cells, data, c) / data[c, SCALE]) ** 0.4
+            of = numbers_of(data, c)
+            now = (1.875 * stored(x, cells, data, c) / of.scale) ** 0.4
             depth = min(depth, max(2.0 * now, SHALLOW * depth))
-            value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], depth)
-            value *= data[c, DAMPING] * (0.5 * depth / data[c, TOUCH] if viscous else speed)
+            value = 2.0 * steepest(of, depth)
+            value *= record_at(PAIR, data, c, 0).damping * (0.5 * depth / of.touch if viscous else speed)
             for n in range(4):
                 rates_here[cells[c, n]] += value
                 largest[cells[c, n]] = max(largest[cells[c, n]], value)
@@ -121,7 +124,10 @@ def add_bounds_of_any(reach, speed, x, mass, rates, cells, data, viscous):
     if cells.shape[1] == 4:
         add_bounds(reach, speed, x, mass, rates, cells, data, viscous)
         return
-    _, rows, numbers = near_pairs(min(reach, data[:, LENGTH].max()), x, cells, data)
+    longest = -math.inf
+    for c in range(cells.shape[0]):
+        longest = max(longest, record_at(ELEMENT, data, c, 0).length)
+    _, rows, numbers = near_pairs(min(reach, longest), x, cells, data)
     add_bounds(reach, speed, x, mass, rates, rows, numbers, viscous)
 
 

@@ -38,13 +38,14 @@ import math
 
 import numpy as np
 
+from ...compiled.rows import record_at
 from ...kernels import BOUND, DETECT, FORCE, STIFFNESS, kernel
 from ..base import ImplicitContactKernels
 from ..contact_solver import friction_law, set_part
 from ..vectors import cross, dot
 from .line_line_penalty import bound as press_bound
 from .line_line_penalty import pushed
-from .pair import FRICTION, LENGTH, NAMES, OTHER, ROLLS, RUBBING, SLIP, TOUCH, place_of
+from .pair import ELEMENT, PAIR, place_of
 from .search import near_pairs
 
 ALIKE = 0.01
@@ -76,7 +77,7 @@ def slip_rows(x, cells, data, c, rows, shares):
 
     ``shares (2, 2)`` is what forces along both are along û and ŵ, or along the components of threads.
     """
-    _, push = pushed(x, cells, data, c)
+    (_, push), pair = pushed(x, cells, data, c), record_at(PAIR, data, c, 0)
     total = push[0][0] + push[1][0], push[0][1] + push[1][1], push[0][2] + push[1][2]
     p, u, w = place_of(x, cells, data, c)
     long, wide = math.sqrt(dot(u, u)), math.sqrt(dot(w, w))
@@ -84,7 +85,7 @@ def slip_rows(x, cells, data, c, rows, shares):
         return 0.0
     first_unit, second = (u[0] / long, u[1] / long, u[2] / long), (w[0] / wide, w[1] / wide, w[2] / wide)
     mixed = dot(first_unit, second)
-    apart = 1.0 + ALIKE * data[c, TOUCH] ** 2 / (data[c, LENGTH] * data[c, OTHER])
+    apart = 1.0 + ALIKE * pair.touch**2 / (pair.length * pair.second)
     both, differ = 1.0 / math.sqrt(2.0 * (apart + mixed)), 1.0 / math.sqrt(2.0 * (apart - mixed))
     shares[0, 0], shares[0, 1], shares[1, 0], shares[1, 1] = both, both, differ, -differ
     p0, p1, p2 = total
@@ -105,7 +106,7 @@ def slip_rows(x, cells, data, c, rows, shares):
     if not within > 0.0:
         return 0.0
     a, b = dot(push[1], n) / within, -dot(push[3], n) / within
-    if data[c, ROLLS] == 0.0:
+    if pair.rolls == 0.0:
         set_rows_of_threads(first_unit, n, a, b, rows, shares)
         return size
     d = p[0] + a * u[0] - b * w[0], p[1] + a * u[1] - b * w[1], p[2] + a * u[2] - b * w[2]
@@ -138,7 +139,8 @@ def rub(x, v, f, cells, data, c, rows, shares):
     if normal == 0.0:
         return 0.0
     first, second = slip_of(v, cells, c, rows, 0), slip_of(v, cells, c, rows, 1)
-    drag = data[c, FRICTION] * normal / math.sqrt(first * first + second * second + data[c, SLIP] ** 2)
+    pair = record_at(PAIR, data, c, 0)
+    drag = pair.friction * normal / math.sqrt(first * first + second * second + pair.slip_velocity**2)
     for n in range(4):
         for k in range(3):
             f[cells[c, n], k] -= drag * (first * rows[0, n, k] + second * rows[1, n, k])
@@ -169,7 +171,7 @@ def stiffness(t, x, v, blocks, cells, data, definite):
         blocks[c] = 0.0
         if definite or slip_rows(x, cells, data, c, rows, shares) == 0.0:
             continue
-        numbers, step = data[c : c + 1], STEP * data[c, TOUCH]
+        numbers, step = data[c : c + 1], STEP * record_at(PAIR, data, c, 0).touch
         for n in range(4):
             for k in range(3):
                 geometry[n, k], speed[n, k] = x[cells[c, n], k], v[cells[c, n], k]
@@ -194,9 +196,9 @@ def damping(t, x, v, blocks, cells, data, definite):
         normal = slip_rows(x, cells, data, c, rows, shares)
         if normal == 0.0:
             continue
-        u = slip_of(v, cells, c, rows, 0), slip_of(v, cells, c, rows, 1)
-        size = math.sqrt(u[0] * u[0] + u[1] * u[1] + data[c, SLIP] ** 2)
-        drag = data[c, FRICTION] * normal / size
+        u, pair = (slip_of(v, cells, c, rows, 0), slip_of(v, cells, c, rows, 1)), record_at(PAIR, data, c, 0)
+        size = math.sqrt(u[0] * u[0] + u[1] * u[1] + pair.slip_velocity**2)
+        drag = pair.friction * normal / size
         for i in range(2):
             for j in range(2):
                 value = drag * ((1.0 if i == j else 0.0) - u[i] * u[j] / (size * size))
@@ -210,7 +212,7 @@ def bound(reach, speed, x, mass, rates, cells, data):
     rates_here = np.zeros(rates.size)
     if cells.shape[0]:
         press_bound(reach, speed, x, mass, rates_here, cells, data)
-        friction = data[0, FRICTION if cells.shape[1] == 4 else RUBBING]
+        friction = record_at(ELEMENT, data, 0, 0).friction  # where pairs have it as well
         for r in range(rates.size):
             rates[r] += friction * rates_here[r]
 
@@ -224,10 +226,11 @@ def set_contact(contact, parts, cell, c, normal, cells, data, rows, shares):
 
     Its basis has the directions along û and ŵ, or along the components of threads, and a normal without force.
     """
-    contact.cell, contact.owner, contact.tag = cell, int(data[c, NAMES]), int(data[c, NAMES + 1])
+    pair = record_at(PAIR, data, c, 0)
+    contact.cell, contact.owner, contact.tag = cell, int(pair.elements[0]), int(pair.elements[1])
     contact.count, contact.group = 4, 1
     contact.normal_force, contact.damping, contact.wind[:] = normal, 0.0, 0.0
-    contact.friction, contact.slip_velocity = data[c, FRICTION], data[c, SLIP]
+    contact.friction, contact.slip_velocity = pair.friction, pair.slip_velocity
     for m in range(4):
         part = parts[contact.first + m]
         set_part(part, cells[c, m], 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

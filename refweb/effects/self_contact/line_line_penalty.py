@@ -27,10 +27,11 @@ import math
 
 import numpy as np
 
+from ...compiled.rows import record_at
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..vectors import cross, dot
 from .overlap_integrals import add_second, first
-from .pair import ENDS, LENGTH, OTHER, SCALE, TOUCH, angle_factor, apart, nearest, numbers_of, place_of
+from .pair import ELEMENT, Numbers, angle_factor, apart, nearest, numbers_of, place_of
 from .search import REACH, near_pairs
 
 MARGIN = 0.75
@@ -304,11 +305,11 @@ def stiffness(t, x, v, blocks, cells, data, definite):
 
 
 @kernel(forceinline=True)
-def steepest(touch, scale, first_length, other_length, depth):
+def steepest(of, depth):
     """Bound on the stiffness of a pair [N/m] whose c² − D is at most ``depth``: 8 c² κ f times the length in reach."""
-    eta = touch / math.sqrt(first_length * other_length)
-    shared = eta * (min(first_length, other_length) + 2.0 * touch)
-    return MARGIN * 8.0 * touch * touch * scale * math.sqrt(4.0 * depth + shared * shared)
+    touch = of.touch
+    shared = touch / math.sqrt(of.length * of.second) * (min(of.length, of.second) + 2.0 * touch)
+    return MARGIN * 8.0 * touch * touch * of.scale * math.sqrt(4.0 * depth + shared * shared)
 
 
 @kernel(forceinline=True)
@@ -323,8 +324,8 @@ def room_left(limit, touch, scale, stored_now, moving):
 @kernel(forceinline=True)
 def depth_ahead(reach, speed, x, mass, cells, data, c):
     """c² − D that pair c may come to within a reach at some speed, see `refweb.effects.contact.penalty.foresight`."""
-    geometry, touch = place_of(x, cells, data, c), data[c, TOUCH]
-    square = nearest(geometry.p, geometry.u, geometry.w)[2]
+    geometry, of = place_of(x, cells, data, c), numbers_of(data, c)
+    square, touch = nearest(geometry.p, geometry.u, geometry.w)[2], of.touch
     if not square < (REACH * touch + reach) ** 2:
         return 0.0
     first_mass, second_mass = mass[cells[c, 0]] + mass[cells[c, 1]], mass[cells[c, 2]] + mass[cells[c, 3]]
@@ -335,7 +336,7 @@ def depth_ahead(reach, speed, x, mass, cells, data, c):
     )
     moving = 0.5 * reduced * speed * speed if speed > 0.0 else math.inf
     left = max(math.sqrt(square) - reach, 0.0)
-    return room_left(2.0 * touch * touch - left * left, touch, data[c, SCALE], stored(x, cells, data, c), moving)
+    return room_left(2.0 * touch * touch - left * left, touch, of.scale, stored(x, cells, data, c), moving)
 
 
 @kernel()
@@ -344,7 +345,7 @@ def note_pairs(reach, speed, x, mass, cells, data, rates_here, largest):
     for c in range(cells.shape[0]):
         depth = depth_ahead(reach, speed, x, mass, cells, data, c)
         if depth > 0.0:
-            value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], depth)
+            value = 2.0 * steepest(numbers_of(data, c), depth)
             for n in range(4):
                 rates_here[cells[c, n]] += value
                 largest[cells[c, n]] = max(largest[cells[c, n]], value)
@@ -354,10 +355,10 @@ def note_pairs(reach, speed, x, mass, cells, data, rates_here, largest):
 def note_all(speed, mass, cells, data, rates_here, largest):
     """The same where any two elements may touch: each has its middle touched by another like it."""
     for c in range(cells.shape[0]):
-        touch, scale, length = data[c, TOUCH], data[c, SCALE], data[c, LENGTH]
+        element = record_at(ELEMENT, data, c, 0)
+        of = Numbers(element.touch, element.scale, element.length, element.length)
         moving = math.inf if speed == 0.0 else 0.25 * (mass[cells[c, 0]] + mass[cells[c, 1]]) * speed * speed
-        depth = room_left(math.inf, touch, scale, 0.0, moving)
-        value = steepest(touch, scale, length, length, depth)
+        value = steepest(of, room_left(math.inf, of.touch, of.scale, 0.0, moving))
         for n in range(2):
             largest[cells[c, n]] = rates_here[cells[c, n]] = max(largest[cells[c, n]], value)
 
@@ -367,9 +368,9 @@ def longest(x, cells, data):
     """Length of the longest element."""
     square = 0.0
     for c in range(cells.shape[0]):
-        i, j, longest_here = cells[c, 0], cells[c, 1], 0.0
+        i, j, longest_here, ends = cells[c, 0], cells[c, 1], 0.0, record_at(ELEMENT, data, c, 0).ends
         for k in range(3):
-            longest_here += (data[c, ENDS + 3 + k] - data[c, ENDS + k] + x[j, k] - x[i, k]) ** 2
+            longest_here += (ends[1, k] - ends[0, k] + x[j, k] - x[i, k]) ** 2
         square = max(square, longest_here)
     return math.sqrt(square)
 

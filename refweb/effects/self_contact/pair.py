@@ -9,18 +9,23 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
+from ...compiled.rows import record_at, width_of
 from ...kernels import kernel
 from ..vectors import cross, dot
 
-TOUCH, SCALE, LENGTH, OTHER, DAMPING, SHAPE, FRICTION, SLIP, ROLLS, NAMES, WIDTH = 0, 1, 2, 3, 4, 5, 14, 15, 16, 17, 19
-"""Columns of the data of a pair: distance of centre lines at which they touch [m], κ of `refweb.effects.self_contact.
-press` [N/m⁴], 0 where an element is broken, natural lengths of both [m], d [s/m], from the first node of the first
-element the vectors to the three others in the web's position, μ, v_s [m/s], whether lines roll, and the numbers of both
-elements; number of columns."""
-ENDS, RUBBING, APART = 5, 11, 14
-"""First columns of the data of an element, behind the same but `OTHER`: reference positions of its nodes, μ, v_s and
-whether lines roll, and numbers of the elements that it does not touch, being within the distance of touch along the
-net, −1 for none."""
+_common = [(name, float) for name in "touch scale length damping friction slip_velocity rolls".split()]
+ELEMENT = np.dtype([*_common, ("ends", float, (2, 3))])
+"""Data of an element: distance of centre lines at which they touch [m], κ of `refweb.effects.self_contact.
+line_line_penalty` [N/m⁴], 0 where it is broken, natural length [m], d [s/m], μ, v_s [m/s], whether lines roll, and
+reference positions of its nodes [m]. Behind these stand the numbers of the elements that it does not touch, being
+within the distance of touch along the net, −1 for none."""
+PAIR = np.dtype([*_common, ("second", float), ("vectors", float, (3, 3)), ("elements", float, (2,))])
+"""Data of a pair: the same, natural length of the second element [m], from the first node of the first element the
+vectors to the three others in the web's position [m], and the numbers of both."""
+APART = width_of(ELEMENT)
+"""First column of the data of an element behind these."""
 
 ROUNDING = 1e-15
 """Error of a cross product over the lengths of its factors, at most."""
@@ -46,27 +51,21 @@ class Numbers(NamedTuple):
 @kernel(forceinline=True)
 def numbers_of(data, c):
     """The `Numbers` of pair c."""
-    return Numbers(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER])
+    pair = record_at(PAIR, data, c, 0)
+    return Numbers(pair.touch, pair.scale, pair.length, pair.second)
 
 
 @kernel(forceinline=True)
 def place_of(x, cells, data, c):
     """The `Place` of pair c at displacements x."""
     i, j, k, m = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3]
-    u = (
-        data[c, SHAPE] + x[j, 0] - x[i, 0],
-        data[c, SHAPE + 1] + x[j, 1] - x[i, 1],
-        data[c, SHAPE + 2] + x[j, 2] - x[i, 2],
-    )
-    p = (
-        x[i, 0] - x[k, 0] - data[c, SHAPE + 3],
-        x[i, 1] - x[k, 1] - data[c, SHAPE + 4],
-        x[i, 2] - x[k, 2] - data[c, SHAPE + 5],
-    )
+    to = record_at(PAIR, data, c, 0).vectors
+    u = to[0, 0] + x[j, 0] - x[i, 0], to[0, 1] + x[j, 1] - x[i, 1], to[0, 2] + x[j, 2] - x[i, 2]
+    p = x[i, 0] - x[k, 0] - to[1, 0], x[i, 1] - x[k, 1] - to[1, 1], x[i, 2] - x[k, 2] - to[1, 2]
     w = (
-        data[c, SHAPE + 6] - data[c, SHAPE + 3] + x[m, 0] - x[k, 0],
-        data[c, SHAPE + 7] - data[c, SHAPE + 4] + x[m, 1] - x[k, 1],
-        data[c, SHAPE + 8] - data[c, SHAPE + 5] + x[m, 2] - x[k, 2],
+        to[2, 0] - to[1, 0] + x[m, 0] - x[k, 0],
+        to[2, 1] - to[1, 1] + x[m, 1] - x[k, 1],
+        to[2, 2] - to[1, 2] + x[m, 2] - x[k, 2],
     )
     return Place(p, u, w)
 

@@ -11,23 +11,12 @@ import math
 
 import numpy as np
 
+from ...compiled.rows import record_at, width_of
 from ...kernels import NEAR, kernel
-from .pair import (
-    APART,
-    DAMPING,
-    ENDS,
-    FRICTION,
-    LENGTH,
-    NAMES,
-    OTHER,
-    RUBBING,
-    SCALE,
-    SHAPE,
-    TOUCH,
-    WIDTH,
-    nearest,
-    place_of,
-)  # fmt: skip
+from .pair import APART, ELEMENT, PAIR, nearest, place_of
+
+WIDTH = width_of(PAIR)
+"""Number of columns of the data of pairs."""
 
 REACH = math.sqrt(2.0)
 """Distance of two segments up to which they may push each other, over that at which lines touch: an element ends
@@ -41,9 +30,9 @@ def middles(x, cells, data, buffer):
     """Write middle, half vector and half length of elements to ``buffer (elements, 7)``; the largest half length."""
     widest = 0.0
     for c in range(cells.shape[0]):
-        i, j, square = cells[c, 0], cells[c, 1], 0.0
+        i, j, square, ends = cells[c, 0], cells[c, 1], 0.0, record_at(ELEMENT, data, c, 0).ends
         for k in range(3):
-            a, b = data[c, ENDS + k] + x[i, k], data[c, ENDS + 3 + k] + x[j, k]
+            a, b = ends[0, k] + x[i, k], ends[1, k] + x[j, k]
             buffer[c, k], buffer[c, 3 + k] = 0.5 * (a + b), 0.5 * (b - a)
             square += (b - a) * (b - a)
         buffer[c, 6] = 0.5 * math.sqrt(square)
@@ -172,7 +161,7 @@ def pairs_within(skin, x, cells, data):
     pairs, buffer = np.empty((cells.shape[0] + 64, 2), dtype=np.int64), np.empty((cells.shape[0], 7))
     if cells.shape[0] < 2:
         return pairs[:0]
-    reach = REACH * data[0, TOUCH] + skin
+    reach = REACH * record_at(ELEMENT, data, 0, 0).touch + skin
     low, width, count = boxes_of(2.0 * middles(x, cells, data, buffer) + reach, buffer)
     if count[0] == 0:
         return pairs[:0]
@@ -192,16 +181,16 @@ def paired(chosen, cells, data):
         a, b = chosen[c, 0], chosen[c, 1]
         for n in range(2):
             rows[c, n], rows[c, 2 + n] = cells[a, n], cells[b, n]
-        numbers[c, TOUCH], numbers[c, DAMPING] = data[a, TOUCH], data[a, DAMPING]
-        numbers[c, SCALE] = min(data[a, SCALE], data[b, SCALE])
-        numbers[c, LENGTH], numbers[c, OTHER] = data[a, LENGTH], data[b, LENGTH]
-        numbers[c, NAMES], numbers[c, NAMES + 1] = a, b
+        pair, first = record_at(PAIR, numbers, c, 0), record_at(ELEMENT, data, a, 0)
+        second = record_at(ELEMENT, data, b, 0)
+        pair.touch, pair.damping, pair.scale = first.touch, first.damping, min(first.scale, second.scale)
+        pair.length, pair.second = first.length, second.length
+        pair.friction, pair.slip_velocity, pair.rolls = first.friction, first.slip_velocity, first.rolls
+        pair.elements[0], pair.elements[1] = a, b
         for k in range(3):
-            numbers[c, FRICTION + k] = data[a, RUBBING + k]
-            first = data[a, ENDS + k]
-            numbers[c, SHAPE + k] = data[a, ENDS + 3 + k] - first
-            numbers[c, SHAPE + 3 + k] = data[b, ENDS + k] - first
-            numbers[c, SHAPE + 6 + k] = data[b, ENDS + 3 + k] - first
+            pair.vectors[0, k] = first.ends[1, k] - first.ends[0, k]
+            pair.vectors[1, k] = second.ends[0, k] - first.ends[0, k]
+            pair.vectors[2, k] = second.ends[1, k] - first.ends[0, k]
     return rows, numbers
 
 
@@ -228,7 +217,7 @@ def near(skin, x, cells, data, chosen):
     count = 0
     for c in range(cells.shape[0]):
         p, u, w = place_of(x, cells, data, c)
-        reach = REACH * data[c, TOUCH] + skin
+        reach = REACH * record_at(PAIR, data, c, 0).touch + skin
         m = p[0] + 0.5 * (u[0] - w[0]), p[1] + 0.5 * (u[1] - w[1]), p[2] + 0.5 * (u[2] - w[2])
         square = m[0] * m[0] + m[1] * m[1] + m[2] * m[2]
         span = u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + w[0] * w[0] + w[1] * w[1] + w[2] * w[2]

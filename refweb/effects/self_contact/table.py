@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ... import memory
+from ...compiled.rows import column_of, records_of
 from ...errors import InputError
 from ...tables import Table, boolean, real, table
 from ..base import (
@@ -22,12 +23,13 @@ from ..base import (
     without,
 )
 from ..natural_lengths import shortest_of
-from .pair import APART, DAMPING, ENDS, RUBBING, SCALE, TOUCH
-from .pair import LENGTH as OWN_LENGTH
+from .pair import APART, ELEMENT
 from .search import distances, near, near_pairs, paired
 
 LISTED = 20_000
 """Largest number of pairs that are one list, which implicit methods need; above, pairs are found as they come near."""
+BROKEN = column_of(ELEMENT, "scale")
+"""Column of pairs and of elements that is 0 where one is broken."""
 ROUNDING = 1e-9
 """Share of the radius by which a distance may be wrong."""
 FAR, SOME = 4.0, 8
@@ -116,7 +118,7 @@ class SelfContact(Table):
         chosen = listed(cells, data) if len(cells) ** 2 < 4 * LISTED + 4 * len(cells) else None
         if chosen is not None and len(chosen) <= LISTED:
             rows, numbers = paired(chosen, cells, data)
-            common: dict = dict(cells=rows, data=numbers, elements=CellElements(chosen, without(SCALE)))
+            common: dict = dict(cells=rows, data=numbers, elements=CellElements(chosen, without(BROKEN)))
             search = ContactForce(near=near)
         else:
             if net.quasi_static:
@@ -124,7 +126,7 @@ class SelfContact(Table):
                     f"radius = {self.radius:g}: {len(cells)} elements make more than {LISTED} pairs, which statics "
                     'does not take: use [solve] kind = "dynamic" and a [damping], or a smaller web'
                 )
-            common = dict(cells=cells, data=data, elements=CellElements(np.arange(len(cells)), without(SCALE)))
+            common = dict(cells=cells, data=data, elements=CellElements(np.arange(len(cells)), without(BROKEN)))
             search = ContactForce(finder=near_pairs)
         beside = line_line_ccd.neighbours(net, data[:, APART:], 2.0 * self.radius)
         kernels = line_line_ccd.meets, line_line_ccd.watch, line_line_ccd.soon
@@ -161,12 +163,12 @@ class SelfContact(Table):
         """Nodes and numbers of all elements with those beside them, see `refweb.effects.self_contact.pair`."""
         touch = 2.0 * self.radius
         data = np.zeros((len(net.cells), APART + beside.shape[1]))
-        data[:, TOUCH], data[:, DAMPING] = touch, self.damping
-        data[:, SCALE] = self.stiffness_on(net) / (math.sqrt(12.0) * touch**3)
-        data[:, OWN_LENGTH] = net.natural_length
-        data[:, ENDS : ENDS + 3] = net.points[net.cells[:, 0]]
-        data[:, ENDS + 3 : ENDS + 6] = net.points[net.cells[:, 0]] + net.line_data.reference
-        data[:, RUBBING : RUBBING + 3] = self.friction, self.slip_velocity, self.rolling
+        numbers, first = records_of(ELEMENT, data), net.points[net.cells[:, 0]]
+        numbers["touch"], numbers["damping"], numbers["length"] = touch, self.damping, net.natural_length
+        numbers["scale"] = self.stiffness_on(net) / (math.sqrt(12.0) * touch**3)
+        numbers["ends"] = np.stack([first, first + net.line_data.reference], axis=1)
+        numbers["friction"], numbers["slip_velocity"] = self.friction, self.slip_velocity
+        numbers["rolls"] = self.rolling
         data[:, APART:] = beside
         return np.ascontiguousarray(net.cells, dtype=np.int32), data
 

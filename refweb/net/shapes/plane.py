@@ -66,9 +66,9 @@ class Plane(Shape):
 
     def skeleton(self):
         """No parts: it touches other bodies by theirs."""
-        from ..skeleton import COLUMNS
+        from ..skeleton import PART
 
-        return np.zeros((0, COLUMNS))
+        return np.zeros(0, PART)
 
     def volume(self):
         """None: it has no end."""

@@ -93,12 +93,12 @@ class Terrain(Filled):
 
     def skeleton(self):
         """Its edges that stand out, or none where there are too many: other bodies touch it by theirs."""
-        from ..skeleton import COLUMNS
+        from ..skeleton import PART
 
         try:
             return super().skeleton()
         except InputError:
-            return np.zeros((0, COLUMNS))
+            return np.zeros(0, PART)
 
     def settle(self):
         """Read the file."""

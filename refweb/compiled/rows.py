@@ -1,0 +1,51 @@
+"""Rows of matrices as records: Python and kernels read the numbers of a cell by the names of one dtype.
+
+All terms of the compiled loop take matrices, so that one loop serves every combination of them. A dtype says what the
+columns of one are called; its fields are all of one type, numbers or arrays of them, and in front of what a record
+names, or behind it, a row may have more.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+
+from .numba_internals import make_array
+
+_intrinsic: Any = intrinsic  # kernels give all but the first argument
+
+
+def width_of(kind):
+    """Number of columns of a dtype."""
+    return kind.itemsize // 8
+
+
+def column_of(kind, field):
+    """Number of the first column of a field."""
+    return kind.fields[field][1] // 8
+
+
+def records_of(kind, matrix):
+    """The rows of a C-contiguous matrix as records over the same memory, shape (rows,); of its first columns."""
+    return np.ndarray(len(matrix), kind, matrix, strides=matrix.strides[:1])
+
+
+def matrix_of(records):
+    """Numbers of records as a matrix over the same memory, shape (records, columns)."""
+    return records.view(float).reshape(len(records), width_of(records.dtype))
+
+
+@_intrinsic
+def record_at(typing, kind, matrix, row, column):
+    """The record of a row of a C-contiguous matrix from a column on, over the same memory, in kernels."""
+
+    def build(context, builder, signature, arguments):
+        _, array, row, column = arguments
+        array = make_array(signature.args[1])(context, builder, array)
+        first = builder.add(builder.mul(row, builder.extract_value(array.shape, 1)), column)
+        return builder.bitcast(builder.gep(array.data, [first]), context.get_value_type(signature.return_type))
+
+    return kind.dtype(kind, matrix, types.intp, types.intp), build
