@@ -1,4 +1,4 @@
-"""A system as statics sees it."""
+"""The system of statics: free bodies are fixed, and forces that need velocity are left out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..errors import InputError
 
 
 def at_rest(system):
-    """A copy in which free bodies are held and feel nothing, and what needs velocity is left out; or the system.
+    """A copy in which free bodies are fixed without forces, and terms that need velocity are left out; or the system.
 
     Raises
     ------
