@@ -1,8 +1,8 @@
 """Tables of names: what a scene or the command line may call for, and where it lives.
 
 A line is a name and the ``"module:name"`` that brings it, or the ``"module"`` that it is; it is imported when it is
-called for and not before. What is in a table is known to scene files, checks, messages and help; nothing else has to be
-told.
+called for and not before. Scene files, checks, messages and help know all lines of a table; nothing else needs to be
+changed.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ LISTS = {
 }
 """Those that may stand several times."""
 STUDY = "refweb.sweeps.study:Study"
-"""What a file for ``refweb sweep`` holds."""
+"""Class of a file for ``refweb sweep``."""
 OBSERVABLES = {
     "displacement": "refweb.results.observables.nodal:Displacement",
     "position": "refweb.results.observables.nodal:Position",
@@ -203,7 +203,7 @@ EXPORTS = (
     "refweb.errors:InputError",
     "refweb.errors:SolverError",
 )
-"""What ``refweb.NAME`` may be besides webs and effects."""
+"""Names that ``refweb.NAME`` offers besides webs and effects."""
 
 
 def exports():

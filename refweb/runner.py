@@ -58,7 +58,7 @@ def run(
     InputError
         For wrong input; nothing has been written.
     SolverError
-        Where there is no answer or none is found. What was computed is kept in ``out``, marked "failed".
+        Where there is no answer or none is found. The rows and frames computed so far stay in ``out``, marked "failed".
     """
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     if out is not None:

@@ -10,7 +10,7 @@ from .registry import FACTORIZATIONS, INTEGRATORS, STATICS
 from .tables import Several, Table, boolean, choice, components, integer, nodes, numbers_list, real, table, text
 
 START_STATES = ("web", "equilibrium")
-"""What ``start`` may be besides a result folder."""
+"""Values of ``start`` besides a result folder."""
 
 
 @table

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 class Solution(SolutionData):
     """A solved scene, as `refweb.run` returns it.
 
-    What the run fills in has the names of `refweb.results.solution.SolutionData`: ``results``, ``history``, ``steps``,
-    ``events``, ``status``, ``warnings`` and more. The arrays are read off its last state.
+    The run fills in the attributes of `refweb.results.solution.SolutionData`: ``results``, ``history``, ``steps``,
+    ``events``, ``status``, ``warnings`` and more. The arrays are read from the last state of the run.
 
     Attributes
     ----------
@@ -283,7 +283,7 @@ def load(folder) -> Solution:
     """The solution in a result folder, as `refweb.run` returned it.
 
     Its last state is that of the folder's last frame. The history is read when it is asked for, and a frame when it is
-    drawn. What it cost, its warnings and its status are those of the run: one that was killed has the status "running".
+    drawn. Its cost, warnings and status are those of the run: a run that was killed has the status "running".
 
     Parameters
     ----------

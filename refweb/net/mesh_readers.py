@@ -24,7 +24,7 @@ REMEDIES = {
     ".obj": "write rows l 1 2 of lines, or rows f 1 2 3 of faces",
     "": "extract the edges of solids, in ParaView by Extract Edges, in pyvista by mesh.extract_all_edges()",
 }
-"""What to do with a file that has other cells."""
+"""Remedies for a file with other cells, by the end of its name."""
 BY_VTK = """
 import sys
 import numpy as np
@@ -38,7 +38,8 @@ for kind, data in (("cell", mesh.cell_data), ("point", mesh.point_data)):
         found[f"{kind} {name}"] = np.asarray(data[name])
 np.savez(sys.argv[2], **found)
 """
-"""What reads a file by VTK, its path and that of an archive of arrays given."""
+"""Program that reads a file by VTK. Its arguments are the path of the file and that of the archive of arrays to
+write."""
 
 
 class Block(NamedTuple):

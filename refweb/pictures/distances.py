@@ -17,7 +17,7 @@ from .record import CLOCKS
 from .sheet import PALE, Panel, label, legend
 
 FIELDS = {"stress": "Pa", "tension": "N", "strain": "1"}
-"""What can be drawn, and its unit."""
+"""Fields that can be drawn, with their units."""
 MANY = 4000
 """Lines above which their points are an image in files that are made of strokes."""
 

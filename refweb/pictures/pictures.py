@@ -1,10 +1,9 @@
 """Pictures of a run: the web, its lines coloured by a field, drawn of a result folder or of a solution in memory.
 
-A web is seen twice: in perspective, and from the side with metres along the axes. What lies in a plane, such as a
+A web is seen twice: in perspective, and from the side with metres along the axes. A web that lies in a plane, such as a
 hanging cable, is seen once, along the normal of the plane. Colours have one range in all frames of a run, so that two
-pictures of it can be held against each other. Slack lines are grey where the field is a tension, stress or strain.
-Nothing needs a display: `refweb.pictures.render` renders by OpenGL off screen, and `refweb.pictures.polygons` where it
-cannot.
+pictures of it can be compared. Slack lines are grey where the field is a tension, stress or strain. Nothing needs a
+display: `refweb.pictures.render` renders by OpenGL off screen, and `refweb.pictures.polygons` where it cannot.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from .stage import DARK, PALE, Look, Seen, Stage, limits_of
 SIZE = (1600, 1000)
 """Of a picture [pixel]."""
 LABELS = ("lines",)
-"""What can be numbered."""
+"""Parts of a web that can be numbered."""
 MOST_SCALED = 1e6
 """Largest factor on displacements."""
 

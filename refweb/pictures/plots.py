@@ -23,9 +23,9 @@ from .sheet import Ink, sheet
 ENDINGS = ("png", "svg", "pdf")
 """Formats of plots."""
 LETTERS_STAY: dict[Any, Any] = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg.hashsalt": "refweb"}
-"""What keeps text as text in files that are made of strokes, and their names the same each time."""
+"""Settings that keep text as text in vector files, and give their elements the same names each time."""
 BESIDE: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-"""What is written of a file's making: nothing, so that equal plots are equal files."""
+"""Metadata of a file, by format: no dates, so that equal plots are equal files."""
 SPECTRUM, DISTANCE = "spectrum:", "-distance"
 
 

@@ -26,7 +26,7 @@ OTHERS = {
     "cost": "its diagram is cost.png there, by refweb cost",
     "sweep": "its plots are there already, by refweb sweep, one a result; refweb report writes its page",
 }
-"""What is said of folders that hold something else."""
+"""Remedies for folders that hold something else."""
 
 
 class Values(NamedTuple):

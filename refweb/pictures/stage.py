@@ -23,7 +23,7 @@ GREY_WHERE_SLACK = ("tension", "stress", "strain")
 UNITS = {"tension": "N", "reaction": "N", "stress": "Pa", "natural_length": "m", "displacement": "m"}
 UNITS |= {"velocity": "m/s", "mass": "kg"}
 LARGEST = "largest_"
-"""What the names of fields over all frames begin with."""
+"""Prefix of the names of fields over all frames."""
 MASSES, MASS_RADIUS, MASS_SIZES = (0.55, 0.16, 0.42), 5.0, 6
 """Colour of point masses, the radius of the largest over that of lines, and the number of their sizes."""
 MOST_UNDEFORMED = 20_000

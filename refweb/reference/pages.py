@@ -29,7 +29,7 @@ SUMMARIES = {
     "support": "Supports in addition to others.",
     "study": "Many runs of one scene: a file of its own, for `refweb sweep`.",
 }
-"""What tables are that share a class, or have one for each kind."""
+"""Summaries of tables that share a class, or that have a class for each kind."""
 
 
 class Key(NamedTuple):

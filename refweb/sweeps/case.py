@@ -1,7 +1,7 @@
 """A case where it is run: a `Job` comes in, and its `Outcome` goes out, and no disk is shared.
 
-The process may be anywhere. What it needs of files travels with the job, and what a run leaves travels back: as cells
-of a row, as its ``run.json``, or its result folder as one archive.
+The process may be anywhere. The files that it needs travel with the job. The outcome travels back: as cells of a row,
+as ``run.json``, or as one archive of the result folder.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ Where effects prescribe natural lengths, the numbers of the lines are a function
 force and energy asks for those of its own t, and `System.at` is the system as it stands at one time. The net is as
 built throughout. A loop of kernels, which cannot ask, keeps an array of its own and sets lengths in that.
 
-What is evaluated is written to arrays of the caller, by default new ones, so that threads may share a system.
+Values are written to arrays of the caller, by default new ones, so that threads may share a system.
 """
 
 from __future__ import annotations
@@ -298,7 +298,7 @@ class System:
     def balance(self, t, x, v):
         """`Forces` with those of links; on supports less those that consistent mass takes to move.
 
-        What supports give is its negative.
+        The reaction of supports is its negative.
         """
         force, per_cell = self.forces(t, x, v)
         if self.constraints:
