@@ -10,7 +10,7 @@ import time
 from ..compiled import watched
 
 DELAY = 2.0
-"""Time after which it is shown [s]."""
+"""Time after which progress is shown [s]."""
 APART = 0.5
 """Least time between two texts in a notebook [s]."""
 LOADING = "loading"
@@ -18,15 +18,15 @@ LOADING = "loading"
 
 @contextlib.contextmanager
 def followed(progress, text=LOADING):
-    """Show the progress of a run in a terminal or notebook, for as long as the block lasts.
+    """Show the progress of a run in a terminal or notebook while the block runs.
 
     Parameters
     ----------
     progress : bool, None or callable
-        A callable is called itself, with a line of text and the share that is done, 0 to 1. True shows it in a terminal
-        and in a notebook, and nowhere else; False and None show nothing.
+        A callable is called with a line of text and the finished share, 0 to 1. True shows the progress in a terminal
+        or a notebook, and nowhere else. False and None show nothing.
     text : str
-        What is told before anything else is.
+        First text.
 
     Yields
     ------
@@ -46,7 +46,7 @@ def followed(progress, text=LOADING):
 
 
 def _compiling(tell):
-    """Tell of kernels that are compiled."""
+    """Show the number of kernels that are compiled."""
     return watched(lambda done, count: tell(f"compiling {done + 1} of {count}, the first time", done / count))
 
 
@@ -82,7 +82,7 @@ def _bar(text):
 
 @contextlib.contextmanager
 def _line():
-    """A line that is written over itself, and empty in the end."""
+    """A line that is overwritten, and empty at the end."""
     last = time.perf_counter() + DELAY - APART
     width = 0
 

@@ -1,11 +1,11 @@
-"""VTU files: arrays compressed by zlib behind a short head of XML, each of which can be read by itself.
+"""VTU files: a short XML header, then arrays compressed by zlib, each of which can be read alone.
 
-The arrays stand as raw bytes at the end of the file (``appended``, encoding ``raw``), in blocks of `BLOCK` bytes that
-VTK decompresses one by one. Of a web of 978 600 lines just thrown, 102 MB, the file has 18 MB; base64 within the XML,
-as meshio writes it, is a third longer, takes 1.5 times the CPU time and is read in 2.5 times. At its own default level
-zlib takes twice the time of `LEVEL`, for 3 % less. Where all digits are their own, as those of tensions in motion,
-bytes are stored as they are: to look for runs would take three quarters of the time of a frame, for 5 to 12 % of such
-arrays.
+The arrays are raw bytes at the end of the file (``appended``, encoding ``raw``), in blocks of `BLOCK` bytes that VTK
+decompresses one by one. For a web of 978 600 lines at the start of a throw, 102 MB of arrays give a file of 18 MB.
+Base64 within the XML, as meshio writes it, gives a file that is a third longer; it takes 1.5 times the CPU time to
+write and 2.5 times to read. The default level of zlib takes twice the time of `LEVEL` and saves 3 % of the bytes. Bytes
+without repetition, such as those of tensions in motion, are stored without compression: this would take three quarters
+of the time of a frame, and save 5 to 12 % of such arrays.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 BLOCK, LEVEL = 1 << 18, 1
-"""Bytes that are compressed at a time, and how hard zlib tries, 1 to 9."""
+"""Bytes of a block, and level of zlib, 1 to 9."""
 SAMPLE, REPEATS = 1 << 11, 0.8
-"""Bytes from the middle of a block by which it is told whether anything repeats in it, and their share, compressed, at
-which it does."""
+"""Bytes from the middle of a block that are compressed as a test, and their compressed share below which the block is
+compressed."""
 AGAIN = 64
-"""Number of arrays of a block at most whose last compression is kept: cells, masses and lengths are those of the frame
-before."""
+"""Largest number of arrays of one block whose compressed bytes are kept: cells, masses and lengths are the same in the
+next frame."""
 TYPES = {"Float64": "<f8", "Int64": "<i8", "Int32": "<i4", "UInt8": "u1"}
 CELLS = {"line": 3, "line3": 21, "line4": 35, "triangle": 5}
-"""VTK's numbers of cells."""
+"""VTK's numbers of types of cells."""
 LINES = (3, 21, 35)
 HEAD, MARK = "<VTKFile ", b'<AppendedData encoding="raw">_'
 
@@ -41,7 +41,7 @@ class Block(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """A mesh, which ``meshio.Mesh(*mesh)`` takes as it is.
+    """A mesh with the arguments of ``meshio.Mesh(*mesh)``.
 
     Attributes
     ----------
@@ -112,10 +112,11 @@ def write(path, mesh):
 
 
 def _packed(values, offset):
-    """An array as VTK has it compressed: number of blocks, their bytes, those of a last short one, sizes; blocks.
+    """An array in VTK's format: number of blocks, bytes of one, bytes of a short last one, sizes; then the blocks.
 
-    meshio 5.3 replaces offsets one by one by those in base64, multiples of 4, and looks each up among both kinds. So
-    none but the first is a multiple of 4 here: the last block of an array is compressed otherwise until its end is not.
+    meshio 5.3 replaces offsets one by one by those in base64, which are multiples of 4, and looks up each among both
+    kinds. Therefore only the first offset is a multiple of 4 here: if an array ends at such a multiple, its last block
+    is compressed in another way.
     """
     data = memoryview(values.reshape(-1)).cast("B") if values.size else b""
     if len(data) > BLOCK:
@@ -131,7 +132,7 @@ def _packed(values, offset):
 
 
 def _compressed(data, cut=None):
-    """A block compressed, or stored where nothing repeats; in two parts, if ``cut`` is given."""
+    """A block, compressed or, without repetition, stored; in two parts, if ``cut`` is given."""
     middle = len(data) // 2
     sample = data[middle : middle + SAMPLE]
     repeats = len(zlib.compress(sample, LEVEL)) <= REPEATS * len(sample)
@@ -154,9 +155,9 @@ class Reader:
     Raises
     ------
     ValueError
-        For a file that is otherwise; from `array` and `mesh` also where it is spoilt.
+        For a file that `write` did not write; from `array` and `mesh` also for a damaged file.
     OSError
-        Where it cannot be read.
+        If the file cannot be read.
     """
 
     def __init__(self, path):
@@ -191,7 +192,7 @@ class Reader:
             raise ValueError(f"{section} {name}: {error}") from None
 
     def mesh(self):
-        """The whole as a `Mesh`."""
+        """The content of the file as a `Mesh`."""
         types, corners = self.array("Cells", "types"), self.array("Cells", "connectivity")
         ends = np.concatenate([[0], self.array("Cells", "offsets")])
         cuts = [0, *(np.flatnonzero(np.diff(types)) + 1), len(types)] if len(types) else [0]
@@ -210,7 +211,7 @@ class Reader:
 
 
 def cell_arrays(path, names):
-    """Cell data of one number a line, without the rest of the file.
+    """Cell data with one number for each line, without reading the rest of the file.
 
     Parameters
     ----------
@@ -221,7 +222,7 @@ def cell_arrays(path, names):
     Returns
     -------
     dict of str to ndarray, shape (lines,), or None
-        None of a file that `write` did not write, that has no such data, or has other cells than lines.
+        None if `write` did not write the file, or if it has no such data or has cells that are no lines.
     """
     try:
         file = Reader(path)

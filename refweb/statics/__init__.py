@@ -1,1 +1,1 @@
-"""Equilibria and their bounds; no module here knows time or events."""
+"""Equilibria and their bounds; it knows no time and no events."""

@@ -45,8 +45,7 @@ class Bars:
         return np.maximum(self.stiffness * (self.natural * self._strain + along), 0.0)
 
     def lent(self, share):
-        """Fictitious stiffness of slack bars [N/m]: that of a smooth law with η = ``share`` of the mean strain of taut
-        bars."""
+        """Fictitious stiffness of slack bars [N/m], by a smooth law: η is ``share`` of the mean strain of taut bars."""
         slack, taut = self._strain < 0.0, self._strain > 0.0
         width = share * self._strain[taut].mean() if taut.any() else 0.0
         if not (width > 0.0 and slack.any()):

@@ -172,8 +172,7 @@ class NullSpace:
         return p
 
     def solve(self, force):
-        """Displacement under a force, without moves that have no stiffness; None where the factorization breaks
-        down."""
+        """Displacement under a force, without moves of no stiffness; None where the factorization breaks down."""
         p = self._factor.solve(force)
         for _ in range(2):
             if p is None or (none := self.part(p)) is None:

@@ -70,8 +70,7 @@ class Interval:
         self._turns = coo_array((np.concatenate(signs), (np.concatenate(rows), np.concatenate(columns))), shape).tocsc()
 
     def limits(self, now):
-        """Least and largest position [m] of a row of the part that is ``now`` at a position; None if rounding hides
-        them."""
+        """Least and largest position [m] of a row that is at ``now``; None if rounding hides them."""
         if not self.bounded:
             return -np.inf, np.inf
         ends = now - self._farthest(-1.0), now + self._farthest(1.0)

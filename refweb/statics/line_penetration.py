@@ -38,8 +38,7 @@ class LinePassage:
         self.deepest, self.why = Passage(system, UNFOLLOWED, chosen), UNFOLLOWED
 
     def record(self, state):
-        """Take the next equilibrium, a `refweb.results.state.State`, and check its overlaps and the path that leads
-        there.
+        """Take the next equilibrium, a `refweb.results.state.State`; check its overlaps and the path to it.
 
         Raises
         ------

@@ -72,8 +72,7 @@ def lowest(newton, state):
 
 
 def _without_smoothing(newton, state):
-    """The equilibrium of the same net at η = 0, by the interior-point method where Newton's method does not
-    converge."""
+    """The equilibrium of the same net at η = 0, by Newton's method, else by the interior-point method."""
     numbers = newton.system.net.line_data.copy()
     numbers.smoothing[:] = numbers.g0[:] = 0.0
     numbers.r0[:] = np.abs(numbers.slackness)

@@ -244,8 +244,7 @@ class Newton:
         raise NotFound(f"singular tangent at step {t:g}: no shift up to {shift:.3g} N makes it definite", stats)
 
     def _step_by_factor_at_hand(self, t, iterate, r, shift, error, stats, ahead):
-        """The same step with the factorization of an earlier tangent; None where that takes too long or leads
-        uphill."""
+        """The same step by the factorization of an earlier tangent; None if that takes long or leads uphill."""
         if not self._can_use_again(iterate.tension):
             return None
         stats["njev"] += 1

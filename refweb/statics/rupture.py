@@ -60,8 +60,7 @@ def refuse_break(system, solve, equilibrium, before):
 
 
 def _first(system, solve, equilibrium, before):
-    """(Load step, element) of the first break; those of the given equilibrium where no equilibrium before it is
-    found."""
+    """(Load step, element) of the first break, or those of ``equilibrium`` if none before it is found."""
     known = [equilibrium]
 
     def over(step):

@@ -90,8 +90,7 @@ class Simulation:
             yield Finding("lines-in-doubt", f"lines may have passed through lines: {self._lines.why}", "self_contact")
 
     def _smoothing(self):
-        """The `refweb.statics.smoothing_error.Smoothing` of the scene, None where errors of smoothing are not
-        needed."""
+        """The `refweb.statics.smoothing_error.Smoothing` of the scene, None if it is not needed."""
         scene = self.scene
         smooth = (self.system.net.laws == SMOOTH).any()
         if not smooth or scene.solve.method != "newton" or scene.accuracy.error == "none":

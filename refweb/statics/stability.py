@@ -89,8 +89,7 @@ def ask(system, rest, state, solver=None):
 
 
 def _ask_of_kinks(system, rest, state):
-    """Set the stability to None if lines between slack and taut, which count as taut, would not stabilise when
-    slack."""
+    """Leave the stability undecided if it depends on lines between slack and taut, which count as taut."""
     rest = rest.at(state.step)
     net, numbers = rest.net, rest.net.line_data.copy()
     strain = np.linalg.norm(net.bar_vectors(state.x), axis=1) / net.bar_lengths - 1.0
@@ -189,8 +188,7 @@ class Question:
         return self.system.pattern.matrix(values)[of][:, of].tocsc()
 
     def _reduced(self):
-        """Dense K and C of the unknowns with mass, scaled by square roots of mass; True if unknowns without mass are
-        stable."""
+        """Dense K and C of unknowns with mass, scaled by roots of mass; True if unknowns without mass are stable."""
         import scipy.linalg
 
         heavy, K, C = self._massive(), self.rest.pattern.matrix(self._parts[0]).toarray(), self._velocity()

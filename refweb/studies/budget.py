@@ -60,8 +60,7 @@ def climb(ladders, runner, deadline, budget, tell):
 
 
 def _expected(ladder, rung, runner):
-    """Expected CPU time of a setting [s]: it grows as for the settings before, or as for explicit steps and
-    tolerances."""
+    """Expected CPU time of a setting [s], by its growth over the settings before, else by a power law."""
     trial = ladder[rung]
     spent = [(t.value, t.cpu_s) for t in ladder[:rung] if t.status == "solved"]
     if not spent:

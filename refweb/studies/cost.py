@@ -81,8 +81,7 @@ class Cost:
         return " ".join(_sentence(self))
 
     def price(self, digits, method=None):
-        """The cheapest `Trial` with so many correct digits, which all finer trials of its method have as well; else
-        None.
+        """The cheapest `Trial` with so many digits, which finer trials of its method have as well; else None.
 
         It is that of one method, or of all methods but DOP853, which no scene can ask for. The result is None if the
         references do not agree to so many digits. Runs with other smoothings than the scene's do not count, since they

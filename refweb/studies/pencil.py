@@ -93,8 +93,7 @@ class Pencil:
         return self._factor.negative_pivots()
 
     def beside(self, low, sign):
-        """A shift of the given sign with at most ``low`` eigenvalues below it; the next is within 1.5 times the
-        shift."""
+        """A shift of a sign with at most ``low`` eigenvalues below; the next is within 1.5 times the shift."""
         near, far = 1e-24 * self._top, self._top
         while far > 1.5 * near:
             middle = np.sqrt(near * far)

@@ -165,8 +165,9 @@ def unpacked(content, folder):
 def cells_of(summary):
     """Cells of a row from the content of a ``run.json``: results and, where none has their names, those of a throw.
 
-    What is inside or closed is 1 or 0 as this run has it, and anything from 0 to 1 where ± leaves it undecided. What
-    the twin tells nothing of is one draw of many, as are results behind the horizon.
+    A statement of a throw, such as "inside", is 1 or 0 as in this run; it may be anything from 0 to 1 where ± leaves it
+    undecided. Results after the horizon are one draw of many. So are numbers of a throw for which the step-refinement
+    run shows no ±.
     """
     cells = {"status": summary["status"], "message": summary["message"]}
     horizon = summary.get("horizon") or {}

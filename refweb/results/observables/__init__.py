@@ -2,8 +2,9 @@
 
 How to write an observable
 --------------------------
-An observable has two faces that say the same: ``of(state)``, its value in a `refweb.results.state.State`, and
-``probe(system)``, a kernel that dynamics calls in every step. A whole file, ``moment_of_inertia.py`` in this folder::
+An observable has two methods that give the same value: ``of(state)`` computes it in a `refweb.results.state.State`, and
+``probe(system)`` returns a kernel that dynamics calls in every step. A whole file, ``moment_of_inertia.py`` in this
+folder::
 
     '''Moment of inertia of a net's nodes about the axis ``component`` through the origin; without one, about it.'''
 
@@ -46,11 +47,11 @@ A scene asks for it in ``[[observe]]``, with the keys it takes::
 
     observe = [{ name = "inertia", quantity = "moment_of_inertia", component = "z", reduce = "max" }]
 
-`refweb.results.observables.observable` says what it may have besides, `refweb.results.probes` what a kernel sees, and
-`refweb.net.net.Net` what there is: element c joins the rows ``net.cells[c, :2]``, ends first, and belongs to the line
-``net.line[c]``. What stands at a node or a line gives its ``Value`` that place, as those in ``nodal.py`` and
-``line.py`` do; in dynamics its probe writes a row or an element to ``where[0]`` where ``where[1]`` is ``PLACE``, and
-``place(system, at)`` makes a node or a line of it. ``on(system)`` refuses a node or a line that the net does not have.
-A sum of energies has weights in place of a probe, as in ``book.py``.
-``tests/results/test_observable_contract.py`` holds the two faces of each against each other.
+`refweb.results.observables.observable` describes further attributes and methods, `refweb.results.probes` the arguments
+of a kernel, and `refweb.net.net.Net` the data of the net. Element c joins the rows ``net.cells[c, :2]``, ends first,
+and belongs to the line ``net.line[c]``. The ``Value`` of an observable may have the number of a node or a line, as in
+``nodal.py`` and ``line.py``. In dynamics its probe writes a row or an element to ``where[0]`` if ``where[1]`` is
+``PLACE``, and ``position(system, at)`` converts it to a node or a line. ``on(system)`` refuses a node or a line that
+the net does not have. A sum of energies has weights in place of a probe, as in ``balances.py``.
+``tests/results/test_observable_contract.py`` compares the two methods of each observable.
 """

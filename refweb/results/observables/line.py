@@ -1,4 +1,4 @@
-"""Tension, stress and strain: of a line its largest, of several lines the largest of all of these."""
+"""Tension, stress and strain: the largest value of a line, or of several lines."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .observable import ANY, NOT_NEGATIVE, Observable, Value
 class Line(Observable):
     """A number of each line.
 
-    Subclasses have `values`, `bound` and `scale`, by which ``column`` of tension and strain of each element is
-    multiplied.
+    Subclasses have `values`, `bound` and `scale`. The latter is a factor on the ``column`` of tension or strain of each
+    element.
 
     Attributes
     ----------
     pull : bool
-        Whether it has the sign of the tension.
+        True if the value has the sign of the tension.
     """
 
     keys, at = ("line",), "line"
@@ -29,7 +29,7 @@ class Line(Observable):
         raise NotImplementedError
 
     def bound(self, tension, net):
-        """Error of each element that a proven one of tensions [N] makes, shape (cells,)."""
+        """Error of each element by a proven error of its tension [N], shape (cells,)."""
         raise NotImplementedError
 
     def on(self, system):
@@ -37,7 +37,7 @@ class Line(Observable):
         self.lines(system.net)
 
     def lines(self, net):
-        """Numbers of the lines that are looked at, increasing; None for all."""
+        """Numbers of the observed lines, increasing; None for all."""
         line = self.observe.line
         return None if line is None else net.web.find_lines(line, "line")
 
@@ -47,13 +47,13 @@ class Line(Observable):
         return np.arange(len(net.line)) if lines is None else np.flatnonzero(np.isin(net.line, lines))
 
     def of(self, state):
-        """The largest of its lines, or of all."""
+        """The largest value of the observed lines."""
         values, lines = self.values(state), self.lines(state.system.net)
         at = int(np.argmax(values) if lines is None else lines[np.argmax(values[lines])])
         return Value(float(values[at]), at)
 
     def probe(self, system):
-        """Make the probe of the elements of its lines, or of all."""
+        """Make the probe of the elements of the observed lines."""
         from ..probes import Probe, line, line_of
 
         elements, scale = self.elements(system.net), self.scale(system.net)[:, None]
@@ -67,20 +67,20 @@ class Line(Observable):
         return int(system.net.line[at])
 
     def bounds(self, system):
-        """Lines that can only pull have tensions that are not negative, damping apart, and the largest has none."""
+        """Bounds of the value: the tension of lines that only pull is not negative if they are not damped."""
         pulls = (system.net.laws[self.elements(system.net)] == TENSION_ONLY).any()
         alone = sum(term.over_lines for term in system.terms) == 1
         return NOT_NEGATIVE if self.pull and pulls and alone else ANY
 
     def bounds_by_tables(self, tables):
-        """The same where the law of all lines is known without the net: one law, of the cable and of its groups."""
+        """Bounds of the value by the tables of a scene: those of `bounds` if cable and groups have one law."""
         cable = tables.get("cable", {})
         laws = {table["law"] for table in (cable, *cable.get("groups", {}).values()) if "law" in table}
         damped = tables.get("damping", {}).get("time", 0.0) > 0.0
         return NOT_NEGATIVE if self.pull and laws == {"tension-only"} and not damped else ANY
 
     def column(self, system):
-        """Column of tension of what the lines observe."""
+        """Column of tension in the output of lines."""
         return system.tension_column
 
     def scale(self, net):
@@ -88,7 +88,7 @@ class Line(Observable):
         return np.ones(len(net.cells))
 
     def error(self, state, equilibrium):
-        """The proven bound of duality, where there is one, and the rounding of lines that both ends hold."""
+        """The proven bound of duality, if there is one, plus the rounding of lines whose ends are both fixed."""
         if equilibrium.duality_bound is None:
             return super().error(state, equilibrium)
         net = state.system.net
@@ -96,7 +96,7 @@ class Line(Observable):
         return float(bound.max()) + self.of_held_lines(state)
 
     def proven(self, equilibrium):
-        """True where there is a bound from duality."""
+        """True if there is a bound from duality."""
         return equilibrium.duality_bound is not None
 
 
@@ -110,7 +110,7 @@ class Tension(Line):
         return state.tension
 
     def bound(self, tension, net):
-        """Its own [N], shape (cells,)."""
+        """The error bound of tension itself [N], shape (cells,)."""
         return tension
 
 
@@ -133,7 +133,7 @@ class Stress(Line):
 
 
 class StressShare(Line):
-    """Stress over a limit of it, largest of all lines: what the margin of safety and the utilisation are made of.
+    """Stress over its limit, the largest of all lines, for the margin of safety and the utilisation.
 
     Parameters
     ----------
@@ -154,11 +154,11 @@ class StressShare(Line):
         return Value(float(shares[at]), int(state.system.net.line[at]))
 
     def scale(self, net):
-        """Inverse of the tension at the limit [1/N], 0 where there is no limit, shape (cells,)."""
+        """Inverse of the tension at the limit [1/N], 0 without a limit, shape (cells,)."""
         return 1.0 / (net.area * getattr(net, self._over))
 
     def bound(self, tension, net):
-        """Error bound of tension over that at the limit [1], shape (cells,)."""
+        """Error bound of tension over the tension at the limit [1], shape (cells,)."""
         return tension * self.scale(net)
 
 
@@ -180,7 +180,7 @@ class Strain(Line):
         return tension / net.line_data.ea
 
     def error(self, state, equilibrium):
-        """None where duality leaves it open whether the line is slack: then its strain is not unique."""
+        """± of the value; None if the line may be slack within its bound, since its strain is then not unique."""
         error = super().error(state, equilibrium)
         if error is None or equilibrium.duality_bound is None:
             return error

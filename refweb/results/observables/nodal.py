@@ -1,4 +1,4 @@
-"""Displacement, position and velocity: of several nodes that with the largest value counts."""
+"""Displacement, position and velocity; of several nodes the one with the largest value counts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Nodal(Observable):
         self.rows(system)
 
     def rows(self, system):
-        """Rows it is looked at, shape (k,)."""
+        """Observed rows, shape (k,)."""
         net, body = system.net, self.observe.body
         if body is not None:
             names = [body.name for body in net.bodies]
@@ -37,23 +37,23 @@ class Nodal(Observable):
         return np.arange(net.nodes) if self.observe.node is None else net.find(self.observe.node)
 
     def sizes(self, vectors):
-        """The component of vectors that is asked for, or their magnitude, shape (k,)."""
+        """The requested component of vectors, or their magnitude, shape (k,)."""
         component = self.observe.component
         return np.linalg.norm(vectors, axis=1) if component is None else vectors[:, component]
 
     def of(self, state):
-        """The largest over its rows."""
+        """The largest value of the observed rows."""
         rows = self.rows(state.system)
         sizes = self.sizes(self.vectors(state)[rows])
         at = int(np.argmax(sizes))
         return Value(float(sizes[at]), self.position(state.system, int(rows[at])))
 
     def position(self, system, at):
-        """The node; none of a body."""
+        """The node; None for a body."""
         return at if self.observe.body is None else None
 
     def numbers(self, rows):
-        """Component and rows, as `refweb.results.probes.largest_of` takes them."""
+        """Component and rows in the form of `refweb.results.probes.largest_of`."""
         from ..probes import MAGNITUDE
 
         component = MAGNITUDE if self.observe.component is None else self.observe.component
@@ -62,10 +62,10 @@ class Nodal(Observable):
 
 
 class Place(Nodal):
-    """A vector of each row that its position makes: open where the row floats."""
+    """A vector of each row that follows from its position; it is open if the row floats."""
 
     def floats(self, state, equilibrium):
-        """Tell if the row with the largest value may move at no cost, or another one pass it."""
+        """Tell if the row with the largest value floats, or a floating row may have a larger value."""
         floating = equilibrium.floating
         if floating is None:
             return bool(np.isin(self.rows(state.system), state.slack_nodes).any())
@@ -116,7 +116,7 @@ class Displacement(Place):
 
 
 class Position(Place):
-    """Place in space."""
+    """Position in space."""
 
     unit = "m"
 

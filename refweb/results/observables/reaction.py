@@ -1,7 +1,7 @@
-"""Reactions: the force of supports on nodes, of several nodes their sum, and the force of contact on a body.
+"""Reactions: the force of supports on a node or on several nodes, and the contact force on a body.
 
-A kernel has the whole force f on each row, and what supports add to it is −f. What contact adds to a body is the
-sum over its contacts, see `refweb.system.contact_forces`: where nothing touches it that is zero, whatever else acts.
+A kernel gets the total force f on each row; the force of a support is −f. The contact force on a body is the sum over
+its contacts, see `refweb.system.contact_forces`: it is zero without contact, whatever else acts.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ class Reaction(Nodal):
     unit = "N"
 
     def of(self, state):
-        """The sum over its rows."""
+        """The sum over the observed rows."""
         rows = self.rows(state.system)
         total = state.reaction[rows] if len(rows) == 1 else state.reaction[rows].sum(axis=0, keepdims=True)
         return Value(float(self.sizes(total)[0]), self.position(state.system, int(rows[0])))
 
     def position(self, system, at):
-        """The node, where it is one; a sum stands nowhere."""
+        """The node if there is one; a sum has no position."""
         return super().position(system, at) if len(self.rows(system)) == 1 else None
 
     def probe(self, system):
