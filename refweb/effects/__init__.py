@@ -2,8 +2,9 @@
 
 How to write an effect
 ----------------------
-An effect is a table of the scene, a frozen value whose ``on(net)`` says which rows it couples, and the kernels that add
-its forces; `refweb.effects.base` has what else it may be. A whole file, ``refweb/effects/current.py``::
+An effect consists of a table of the scene and of kernels that add its forces. The table is a frozen value whose
+``on(net)`` says which rows it couples. `refweb.effects.base` describes further methods. A whole file,
+``refweb/effects/current.py``::
 
     '''The magnetic force on lines that carry a current, I dl × B.'''
 
@@ -69,36 +70,36 @@ A line in `refweb.registry.EFFECTS` makes it known to scenes, messages and all m
 
     "current": "refweb.effects.current:Current",
 
-A scene then has as many of it as it likes, ``several``, as tables of a list; without that line there is one,
-``[current]``::
+A scene may have several of it, as tables of a list; without the line ``several`` it has one, ``[current]``::
 
     [[current]]
     lines = "all"
     current = 20.0
     field = [0.0, 0.0, 0.5]
 
-Kernels of forces work with numbers and tuples: an array that is made in a loop takes fifty times as long as what is
-computed with it. ``x`` in a kernel is the displacement of all rows and ``net.points`` their reference; ``cells`` are
-the rows that each cell couples, ``data`` its numbers. A kernel adds to ``f`` and to ``rates``, and writes ``blocks``
-and ``out``, both of which hold what was there before; signatures are in `refweb.kernels`.
+Kernels of forces work with numbers and tuples: an array that is made in a loop takes fifty times as long as the
+computation with it. ``x`` in a kernel is the displacement of all rows, and ``net.points`` are their reference
+positions. ``cells`` are the rows that each cell couples, and ``data`` its numbers. A kernel adds to ``f`` and to
+``rates``. It must write all of ``blocks`` and ``out``, which contain old values before. Signatures are in
+`refweb.kernels`.
 
-Nodes are found by ``net.web.find(self.node)``, lines by ``net.web.find_lines(self.lines)``; ``net.find`` has the nodes
-that order and subdivision add in "all" as well. `refweb.effects.base.column` makes cells of one row each. A field reads
-and checks its value: ``real(above=0.0, unit="N/m")``; the others are in `refweb.tables`.
+``net.web.find(self.node)`` finds nodes, and ``net.web.find_lines(self.lines)`` finds lines. For "all", ``net.find``
+also finds the nodes that order and subdivision add. `refweb.effects.base.column` makes cells of one row each. A field
+reads and checks its value, as ``real(above=0.0, unit="N/m")`` does; the others are in `refweb.tables`.
 
-A force with a potential has ``energy=energy`` and ``Balance("spring_energy")`` instead of a power: that name heads a
-column of ``history.csv`` and counts in the total energy. It is observed once it has a
+A force with a potential has ``energy=energy`` and ``Balance("spring_energy")`` instead of a power. This name is a
+column of ``history.csv``, which counts in the total energy. A scene can observe it if it has a
 `refweb.results.observables.balances.Booked` and a line in `refweb.registry.OBSERVABLES`. Bounds keep explicit steps
-stable, not accurate: something stiff may need a smaller ``safety``. ``definite`` asks for a part of the stiffness that
-is positive semidefinite, such as none.
+stable, not accurate: a stiff force may need a smaller ``safety``. ``definite`` asks for a part of the stiffness that is
+positive semidefinite, such as zero.
 
-The balance of momentum integrates the force of an effect along the steps, which only tells whether a method gives what
-it has. It sees what steps miss where ``impulse=impulse`` of `Balance` brings ∫F dt as a kernel, and nothing of what is
-``internal``.
+The momentum balance integrates the force of an effect along the steps, which only checks that a method applies its
+forces. With ``impulse=impulse`` of `Balance`, a kernel of ∫F dt, it also finds impulses that steps miss. Forces that
+are ``internal`` do not count.
 
-A load with a factor over time is made by `refweb.effects.outer_load`; what changes natural lengths, by
-`refweb.effects.natural_lengths`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which
-returns another net. ``tests/test_contract.py`` holds forces against energies and stiffness against forces for every
-effect, and asks for numbers of one that refweb ships; ``tests/test_readme.py`` asks for its row in the README, and
-``tests/reference`` for an ``Examples`` section of its docstring, which is its page in ``refweb help``.
+`refweb.effects.outer_load` makes loads with a factor over time. `refweb.effects.natural_lengths` makes effects that
+change natural lengths. ``extend(net)`` adds rows, mass or columns of line data, and returns another net.
+``tests/test_contract.py`` compares forces with energies, and stiffness with forces, for every effect; an effect of
+refweb needs numbers there. ``tests/test_readme.py`` asks for its row in the README. ``tests/reference`` asks for an
+``Examples`` section of its docstring, which is its page in ``refweb help``.
 """

@@ -1,18 +1,18 @@
-"""Damping of the lines: Kelvin–Voigt on the tangent of their law, and a drag in proportion to mass.
+"""Damping of the lines: Kelvin–Voigt damping on the tangent of their law, and forces proportional to mass.
 
-A line that is strained at the rate ε̇ = t·v'/L, v' = dv/dξ, has the stress
+At the rate of strain ε̇ = t·v'/L, v' = dv/dξ, a line has the stress
 
     max(σ + τ σ'(ε) ε̇, −αE),        −αE the floor of its law,
 
-so that a slack line is not damped, and none pushes more than its law does. The part N beside A σ is what is added here:
-with p = dx/dξ, l = |p| and t = p/l a quadrature point has
+so that a slack line is not damped, and no line pushes more than by its law. Damping adds the part N to A σ. With p =
+dx/dξ, l = |p| and t = p/l, a quadrature point has
 
     force on node a        −w N dN_a/dξ t
     damping of (a, b)       w dN_a/dξ dN_b/dξ (∂N/∂ε̇)/L t⊗t
     stiffness of (a, b)     w dN_a/dξ dN_b/dξ [(∂N/∂ε)/L t⊗t + (N/l)(I − t⊗t) + (∂N/∂ε̇)/(L l) t⊗(v' − (t·v') t)]
 
-and the power −w L N ε̇ ≤ 0. Natural lengths that change add nothing to ε̇. Where a line of a law without smoothing snaps
-taut, its force jumps, and central differences are of order 1 across it.
+and the power −w L N ε̇ ≤ 0. Changes of natural lengths do not count in ε̇. The force of a line without smoothing jumps
+when it snaps taut, and central differences are of order 1 across this jump.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .line_kernels import gradient, law_of, line_at, pull_together, strain
 
 @kernel()
 def viscous(law, e, rate, time, line):
-    """N [N]."""
+    """The damping force N [N]."""
     pull = time * rate * tangent(law, e, line.ea, line.slackness, line.smoothing)
     smallest = -above_floor(law, e, line.ea, line.slackness, line.smoothing)
     return max(pull, smallest)
@@ -53,7 +53,7 @@ def kernels(law, tau, gradients, weights):
     Parameters
     ----------
     law : int
-        Number of the law, `refweb.net.tension_laws.MIXED` for that of each line.
+        Number of the law, `refweb.net.tension_laws.MIXED` if each line has its law.
     tau : int
         Column of τ in the numbers of the lines.
     gradients : tuple of tuple of float
@@ -173,26 +173,26 @@ def drag_bound(reach, speed, x, mass, rates, cells, data):
 
 @table
 class Damping(Table):
-    """Damping of the web; bodies are not damped, and statics does not feel it.
+    """Damping of the web; bodies are not damped, and damping has no effect in statics.
 
     Parameters
     ----------
     time : float
-        τ of the material [s], ≥ 0; a vibration of taut lines along themselves, of period T, has the damping ratio πτ/T.
-        What resists is how fast the ends of a line go apart. Natural lengths L that reels and heat change add nothing:
-        −(l/L²) dL/dt, which a material that stays in the line has as a rate of strain as well, is left out.
+        τ of the material [s], ≥ 0; an axial vibration of taut lines, of period T, has the damping ratio πτ/T. The force
+        is proportional to the velocity at which the ends of a line separate. Changes of natural length L by reels and
+        heat do not count: the part −(l/L²) dL/dt of the rate of strain is left out.
     rate : float
-        Rate at which velocities fade [1/s], ≥ 0: a force −rate m v on every node, m its lumped mass, with consistent
-        mass as well.
+        Rate at which velocities decrease [1/s], ≥ 0: a force −rate m v on every node with its lumped mass m, also if
+        the mass is consistent.
 
     Raises
     ------
     InputError
-        For a time or a rate that is not finite or < 0, and where both are 0.
+        For a time or a rate that is not finite or < 0, and if both are 0.
 
     References
     ----------
-    The material is that of Kelvin and Voigt, on the tangent of the law and without its push: W. Thomson, "On the
+    The material is that of Kelvin and Voigt, with the tangent of the law and without a push: W. Thomson, "On the
     elasticity and viscosity of metals", Proc. R. Soc. Lond. 14 (1865) 289–297; W. Voigt, "Ueber innere Reibung fester
     Körper, insbesondere der Metalle", Ann. Phys. 283 (1892) 671–693.
 
@@ -207,16 +207,16 @@ class Damping(Table):
     rate: float = real(default=0.0, at_least=0, unit="1/s")
 
     def check(self):
-        """Refuse a damping that damps nothing."""
+        """Refuse damping with time and rate 0."""
         if not (self.time or self.rate):
             raise InputError("time = 0 [s] and rate = 0 [1/s]: one of them must be > 0, or leave the table out")
 
     def extend(self, net):
-        """The net with τ in one more column of the numbers of its lines."""
+        """The net with τ in one more column of line data."""
         return net.with_column("damping_time", self.time) if self.time else net
 
     def on(self, net):
-        """The terms of all lines, whose tension is that with damping, and of all nodes with mass."""
+        """The terms of all lines, with the tension including damping, and of all nodes with mass."""
         terms = []
         if self.time:
             element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())

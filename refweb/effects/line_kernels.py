@@ -17,7 +17,7 @@ from ..net.line_data import FIELDS
 from ..net.tension_laws import MIXED
 
 NATURAL_LENGTH, LAW = 0, int(np.dtype(FIELDS).itemsize // 8)
-"""Column of natural lengths, and that of the number of each element's law, where these differ."""
+"""Column of natural lengths, and column of the number of each element's law, if lines have several laws."""
 
 
 class Line(NamedTuple):
@@ -51,9 +51,9 @@ def gradient(v, cells, c, q, nodes, gradients):
 
 @kernel(forceinline=True)
 def direction(x, cells, data, c, nodes, along, slopes):
-    """(dx/dξ over its length |d|, 1/|d|), or zeros, of the cell c of so many ``nodes``.
+    """(dx/dξ over its length |d|, 1/|d|), or zeros, of a cell c with so many ``nodes``.
 
-    From column ``along`` on data have d in the web's position, and from ``slopes`` on ∂d/∂x of each node.
+    Columns of data from ``along`` on are d in the initial web, and columns from ``slopes`` on are ∂d/∂x of each node.
     """
     d0, d1, d2 = data[c, along], data[c, along + 1], data[c, along + 2]
     for b in range(nodes):
@@ -68,7 +68,7 @@ def direction(x, cells, data, c, nodes, along, slopes):
 
 @kernel(forceinline=True)
 def law_of(law, data, c):
-    """Number of the law of cell c, where ``law`` is that of all cells or `MIXED`."""
+    """Number of the law of cell c; ``law`` is that of all cells, or `MIXED`."""
     return np.int64(data[c, LAW]) if law == MIXED else law
 
 
@@ -86,7 +86,7 @@ def strain(x, cells, data, c, q, nodes, gradients):
 
 @kernel(forceinline=True)
 def pull_together(f, cells, c, q, nodes, gradients, scale, p0, p1, p2):
-    """Add to the forces on the nodes of cell c those of a tension at quadrature point q: −``scale`` dN/dξ dx/dξ."""
+    """Add the forces −``scale`` dN/dξ dx/dξ of a tension at quadrature point q to the nodes of cell c."""
     for a in range(nodes):
         row, d = np.uint64(cells[c, a]), scale * gradients[q * nodes + a]
         f[row, 0] -= d * p0

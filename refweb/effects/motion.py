@@ -26,7 +26,8 @@ class Motion(Table):
     node : int, str or list
         Nodes, by number or name.
     displacement : sequence of (t, x, y, z)
-        Displacement from the web's position [m]; linear in between, end values held. In statics t is the load step.
+        Displacement from the position in the web [m]: linear between the times, constant before and after them. In
+        statics t is the load step.
 
     Raises
     ------

@@ -1,15 +1,16 @@
-"""Forces in axes that turn steadily about the origin: linear in the place of a mass, and Coriolis forces.
+"""Forces in axes that rotate steadily about the origin: forces linear in position, and Coriolis forces.
 
-With the angular velocity Ω of the axes, a symmetric matrix G [1/s²] and consistent or lumped masses M every row feels
+With the angular velocity Ω of the axes, a symmetric matrix G [1/s²] and consistent or lumped masses M, each row has the
+force
 
     M G r − 2 M Ω × v,      with the potential −½ r·M G r of the first part.
 
-Coriolis forces do no work: kinetic energy and potentials, this one among them, keep their sum, the Jacobi integral. The
-moment of inertia I of a sphere whose rotation is followed feels −I Ω × ω, ω its angular velocity in these axes; a ring
-keeps its plane in these axes and turns about its normal, which that does not change. Moments on bodies that turn in
-space are in `refweb.effects.turning_bodies`.
+Coriolis forces do no work: the sum of kinetic energy and all potentials is constant, the Jacobi integral. A sphere
+whose rotation is followed has the moment −I Ω × ω, with its moment of inertia I and its angular velocity ω in these
+axes. A ring keeps its plane in these axes, and this moment does not act about its normal.
+`refweb.effects.turning_bodies` has the moments on bodies that rotate in space.
 
-Consistent mass couples the nodes of an element here as it does in M v': the force is that of the position between them.
+Consistent mass couples the nodes of an element here as in M v'.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from .base import ForceTerm, Tangent, Timing, VelocityForce, column
 
 STIFFEST, MASS = 9, 10
-"""Columns of data of the first part, behind G: the largest eigenvalue of −G, at least 0; the mass matrix of the cell,
-behind which stand the positions of its nodes in the web."""
+"""Columns of data of the first part, after G: the largest eigenvalue of −G, at least 0; the mass matrix of the cell,
+after which follow the positions of its nodes in the web."""
 TURNED = 3
-"""First column of a cell's mass matrix behind Ω, of the Coriolis force."""
+"""First column of a cell's mass matrix, after Ω, for the Coriolis force."""
 
 
 @functools.cache
@@ -95,7 +96,7 @@ def turned(data, c, a0, a1, a2):
 
 @functools.cache
 def kernels_of_velocity(nodes):
-    """Force, damping and its bound of the Coriolis force, of cells of so many nodes."""
+    """Force, damping and bound kernels of the Coriolis force, for cells with so many nodes."""
 
     @kernel(FORCE)
     def coriolis(t, x, v, f, cells, data, out):
@@ -133,14 +134,14 @@ def kernels_of_velocity(nodes):
 
 
 def force_terms(net, frame, pull, **arguments):
-    """The terms of all rows with mass; where mass is consistent those of the lines as well.
+    """The terms of all rows with mass; with consistent mass also those of the lines.
 
     Parameters
     ----------
     net : refweb.net.net.Net
-        What they act on.
+        The net.
     frame : refweb.effects.base.MovingFrame
-        With Ω [rad/s].
+        Frame with Ω [rad/s].
     pull : array_like, shape (3, 3)
         G [1/s²].
     **arguments
@@ -165,7 +166,7 @@ def force_terms(net, frame, pull, **arguments):
 
 
 def _numbers(head, *parts):
-    """Rows that begin with the same numbers, each part flat behind them."""
+    """Rows that begin with the same numbers, followed by each part as a flat array."""
     flat = [np.reshape(part, (len(part), int(np.prod(np.shape(part)[1:])))) for part in parts]
     return np.ascontiguousarray(np.hstack([np.tile(head, (len(parts[0]), 1)), *flat]))
 

@@ -11,7 +11,7 @@ from ..errors import InputError
 
 
 def at_rest(system):
-    """A copy in which free bodies are fixed without forces, and terms that need velocity are left out; or the system.
+    """A copy with free bodies fixed, without forces on them and terms that need velocity; or the system.
 
     Raises
     ------

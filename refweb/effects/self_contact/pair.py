@@ -1,4 +1,4 @@
-"""Numbers of elements, and of pairs of elements, as the kernels of lines against lines read them.
+"""Data of elements, and of pairs of elements, for the kernels of lines against lines.
 
 Cells of a term are pairs, of the nodes of one element and of another, or elements of which any two may touch: then
 `refweb.effects.self_contact.search` makes pairs of them.
@@ -15,7 +15,7 @@ from ..vectors import cross, dot
 TOUCH, SCALE, LENGTH, OTHER, DAMPING, SHAPE, FRICTION, SLIP, ROLLS, NAMES, WIDTH = 0, 1, 2, 3, 4, 5, 14, 15, 16, 17, 19
 """Columns of the data of a pair: distance of centre lines at which they touch [m], κ of `refweb.effects.self_contact.
 press` [N/m⁴], 0 where an element is broken, natural lengths of both [m], d [s/m], from the first node of the first
-element the vectors to the three others in the web's position, μ, v_s [m/s], whether lines roll, and the numbers of both
+element the vectors to the three others in the web's position, μ, v_s [m/s], 1 if lines roll, and the numbers of both
 elements; number of columns."""
 ENDS, RUBBING, APART = 5, 11, 14
 """First columns of the data of an element, behind the same but `OTHER`: reference positions of its nodes, μ, v_s and
