@@ -20,7 +20,7 @@ def remarks_on_corners(scene, system):
     scene : refweb.Scene
         Scene with a method that is not "auto".
     system : refweb.system.system.System
-        What acts.
+        The system.
     """
     end = scene.solve.duration
     corners = system.corners

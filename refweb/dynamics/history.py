@@ -112,7 +112,7 @@ class Watch:
     scene : refweb.Scene
         Scene with observables and events.
     system : refweb.system.system.System
-        What acts.
+        The system.
 
     Attributes
     ----------

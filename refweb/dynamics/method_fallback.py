@@ -36,7 +36,7 @@ class MethodFallback:
     scene : refweb.Scene
         The scene as given.
     system : refweb.system.system.System
-        What acts.
+        The system.
     kept : dict of str to ndarray, optional
         Checkpoint of a run that continues, with its method.
 

@@ -48,7 +48,7 @@ class Simulation:
     scene : refweb.Scene
         Scene with observables, output and method.
     system : refweb.system.system.System
-        What acts.
+        The system.
     solution : refweb.Solution
         Solution that is filled in.
     kept : dict of str to ndarray, optional

@@ -50,11 +50,11 @@ class CentralDifference(Integrator):
     system : refweb.system.system.System
         Of order 1, with lumped mass.
     probes : sequence of refweb.results.probes.Probe
-        What to look at, in every row and, with a sign, in every step.
+        Probes to evaluate in every row and, with a sign, in every step.
     sums : sequence of refweb.dynamics.integrators.integrator.Sum
         Energies to look at, likewise.
     events : sequence of refweb.dynamics.integrators.events.Event
-        What to report the time of, to the step.
+        Events whose time is found to the size of a step.
     safety : float
         Share of the step bound, 0 < safety ≤ 1.
     step_size : float, optional
@@ -143,8 +143,8 @@ class CentralDifference(Integrator):
     def spent(self, course):
         """Statistics of a course, for ``run.json``.
 
-        The evaluations are those of forces that follow from displacement: others are evaluated more often in a step.
-        What the first step is looked at inside with is not counted.
+        Only evaluations of forces that depend on displacement count: other forces are evaluated more often in a step.
+        The evaluations inside of the first step do not count.
         """
         looks = self._observed.followed, self._observed.sums, self._observed.windows.slots
         follows = any(len(rows) for rows in looks)  # and evaluates forces where it looks

@@ -21,7 +21,7 @@ def source_of(system, places):
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        The system.
     places : list of (float, ndarray of shape (rows, 3))
         Time [s] and displacement [m] at the ends of steps in turn.
     """

@@ -1,9 +1,9 @@
 """The compiled loop of explicit dynamics: steps of kicks and drifts, and history rows.
 
-Its pieces stand beside their equations: `refweb.dynamics.integrators.step` moves, ``energy_book`` books work,
-``extremes`` and ``events`` look, ``step_bound`` says how long a step may be. What every step and every row of a plain
-scene goes through counts no references to arrays, see `refweb.kernels.kernel`: else these would take a third of the
-time of a cable of 100 elements. The loop asks once what a scene has none of.
+Its parts are beside their equations: `refweb.dynamics.integrators.step` moves rows, ``energy_balance`` sums work,
+``extremes`` and ``events`` monitor, and ``step_bound`` finds the critical time step. Kernels that every step and every
+row of a plain scene calls count no references to arrays, see `refweb.kernels.kernel`: counting would take a third of
+the time of a cable of 100 elements.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from .records import Model, Running, Scheme
 
 HELD = -2
-"""What the loop returns where lines would pass whatever the step."""
+"""Return value of the loop if lines would pass with any step."""
 BREATH = 10_000_000
 """Steps times cells after which a compiled loop returns, some tenths of a second."""
 

@@ -227,9 +227,9 @@ def set_reference(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
 
 @kernel(leaf=True, apart=("near",))
 def show_near(nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Write what the chosen cells show where it is looked for, among that of all cells.
+    """Copy the output of the chosen cells to the output of all cells.
 
-    What an element shows is the largest value of its pairs, or the smallest where these are below 0.
+    The output of an element is the value of largest size among its pairs.
     """
     if not nearby.skin[0].depth < math.inf:
         return
