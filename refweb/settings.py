@@ -208,8 +208,8 @@ class Event(Table):
     body : str, optional
         Body of a contact, by default any.
     with : str, optional
-        What the body touches: "web", which is the default, or the name of another body, with ``between_bodies = true``
-        in ``[contact]``. They touch where they overlap, at t = 0 if they do so at once.
+        Other side of a contact: "web", which is the default, or the name of another body, with ``between_bodies =
+        true`` in ``[contact]``. A contact begins with an overlap, at t = 0 if there is one at the start.
     line : int, str or list, optional
         Lines, by number or group, see `refweb.net.groups`, of which the first to become taut counts.
     observe : str, optional
@@ -217,7 +217,7 @@ class Event(Table):
     value : float, optional
         Its threshold, in the observable's unit.
     stop : bool
-        Whether the run ends there.
+        True if the event ends the run.
 
     Raises
     ------
@@ -305,7 +305,7 @@ class Accuracy(Table):
         before, which is made again where it has been given up, is the result, with a warning that says what the digits
         would cost.
     refine : bool
-        Whether to find the error of the elements, by two more runs with two and four times as many.
+        True to find the discretisation error, by two more runs with two and four times the elements.
     horizon : bool
         Of dynamics: whether to find the horizon, the time until which the motion is determined. Later than that the
         smallest difference at the start leaves no digit of it, see `refweb.studies.predictability`.

@@ -189,15 +189,16 @@ class Solution(SolutionData):
         return table
 
     def plot(self, quantity: str | Sequence[str] | None = None, out: str | PathLike | None = None) -> Figure:
-        """Draw histories with ±, books, spectra, stress over distance; a notebook shows the figure.
+        """Draw histories with ±, balances, spectra, stress over distance; a notebook shows the figure.
 
         Parameters
         ----------
         quantity : str or sequence of str, optional
-            What is drawn, a panel each: an observable or another column of the history; ``energy`` or ``momentum``, the
-            books; ``spectrum`` of the first observable or ``spectrum:NAME``; ``stress``, ``tension`` or ``strain`` of
-            lines, over distance from the place that was hit or loaded; ``frequencies`` of modes. By default the
-            observables and the energy balance, in statics the results over load steps, of one stress over distance.
+            Quantities to draw, one panel each: an observable or another column of the history; ``energy`` or
+            ``momentum``, the balances; ``spectrum`` of the first observable or ``spectrum:NAME``; ``stress``,
+            ``tension`` or ``strain`` of lines over the distance from the point of impact or load; ``frequencies`` of
+            modes. By default the observables and the energy balance; in statics the results over load steps, or stress
+            over distance for one load step.
         out : path-like, optional
             A ``.png``, ``.svg`` or ``.pdf`` to write.
 
@@ -231,7 +232,7 @@ class Solution(SolutionData):
         frames : int, optional
             Number of frames to turn and play; by default as many as leave the page small.
         sheet : bool
-            Whether only the sheet is written: sizes, largest tension, margin of safety and the worth of each result.
+            True to write only the sheet: sizes, largest tension, margin of safety and the verdict on each result.
 
         Returns
         -------

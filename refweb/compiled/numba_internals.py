@@ -91,7 +91,7 @@ class Cache:
     key : callable
         Text of all that the machine code depends on besides the types of its arguments.
     linked : bool
-        Whether other kernels may be optimized with it; else what that takes, most of a file, is left out.
+        True if other kernels may be optimized with it. Else the data for that, most of a file, is left out.
     """
 
     def __init__(self, name, key, linked):

@@ -176,9 +176,9 @@ def build(web, cable, quasi_static=False, consistent=False):
     cable : refweb.net.cable.Cable
         Material, order and subdivision.
     quasi_static : bool
-        Whether time is the load step of statics.
+        True if time is the load step of statics.
     consistent : bool
-        Whether mass is consistent, ∫ρA N_a N_b ds, and not lumped to ∫ρA N_a ds.
+        True for consistent mass, ∫ρA N_a N_b ds; False for lumped mass, ∫ρA N_a ds.
     """
     given, pieces, element = cable.properties(web), cable.subdivide, line_element(cable.order)
     laws = np.unique(given["law"])

@@ -64,9 +64,9 @@ class Mesh(NamedTuple):
     blocks : list of Block
         All cells, in the order of the file.
     point_data : dict of str to ndarray
-        What is known of nodes.
+        Data of nodes by name.
     remedy : str
-        What to do where there are cells that a web does not have.
+        Remedy for cells that a web cannot have.
     groups : dict of str to list of int, optional
         Cells of Gmsh that are lines, by physical group; None for other files.
     names : dict of str to list of int

@@ -124,7 +124,7 @@ class RigidRotations(Record):
     ahead : ndarray, shape (carried, 3)
         Their displacements at the start [m], 0 where the body takes them where the web has them.
     scales : ndarray, shape (carried, 3)
-        What makes rates of the nodes those of the body, see `carry_rates`.
+        Factors from rates of the nodes to those of the body, see `carry_rates`.
     """
 
     rows: IntegerMatrix

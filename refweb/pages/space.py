@@ -33,7 +33,7 @@ class Space(NamedTuple):
     Attributes
     ----------
     head : dict
-        What the page is told of them, plain values for JSON; its key ``arrays`` says what is where in `text`.
+        Data for the page, plain values for JSON; its key ``arrays`` lists the arrays in `text`.
     text : str
         Arrays in the form of `refweb.pages.packed.pack`.
     error : float
@@ -58,7 +58,7 @@ def space_of(record, peak=None, limit=None, progress=None):
     Parameters
     ----------
     record : refweb.pictures.record.Record
-        What is shown.
+        Record of the run.
     peak : int, optional
         Number of a frame that is shown in any case, as are the first and the last.
     limit : int, optional

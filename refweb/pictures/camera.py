@@ -130,7 +130,7 @@ def choose(origin, points, solid, moved, tree, aspect, named=None):
     moved : float
         Largest component of a displacement [m].
     tree : bool
-        Whether the lines close no loop, as those of a cable.
+        True if the lines form no closed loop, as in a cable.
     aspect : float
         Width/height of the page.
     named : str or array of 3, optional

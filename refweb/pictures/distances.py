@@ -38,7 +38,7 @@ class Spread(NamedTuple):
     origin : str
         The place in words.
     remark : str
-        Which instant it is, where the largest value is that of another one; empty where it is of this.
+        Text of the instant, if the largest value belongs to another instant; else empty.
     """
 
     frame: Frame

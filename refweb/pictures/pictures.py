@@ -52,16 +52,16 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
         ``stress``, of modes ``shape``, or the first there is. ``utilisation`` is that of lines that have a strength,
         and ``largest_NAME`` of each line the largest NAME over the frames that were written.
     range : (low, high) or "auto", optional
-        What the colours span [SI]; ``"auto"`` the values of this frame. Default the values of all frames.
+        Range of the colours [SI]; ``"auto"`` for the values of this frame. Default the values of all frames.
     scale : float
-        What displacements, of modes their shape, are drawn times, > 0.
+        Factor on displacements, or on the shape of a mode, > 0.
     view : str or sequence of 3 floats, optional
         The only view: ``"oblique"``, ``"side"``, ``"front"``, ``"top"``, along the web's normal, or a direction from
         the web to the viewer. Default an oblique view and one from the side.
     out : path-like, optional
         File to write, in any format that matplotlib writes.
     labels : {"lines"}, optional
-        What is numbered. Of lines whose numbers would cover each other, that with the largest value has its own.
+        Parts to number. If numbers of lines would overlap, the line with the largest value keeps its number.
 
     Returns
     -------

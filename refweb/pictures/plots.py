@@ -75,7 +75,7 @@ def draw(records, what=None, title=None):
         results over load steps, of one load step stress over distance, of modes their frequencies. A spectrum alone is
         that of the first observable, a field of lines alone that over distance.
     title : str, optional
-        What stands above; by default the titles of the scenes, and how a run ended that is not solved.
+        Title above the plot; by default the titles of the scenes, with the status of runs that are not solved.
 
     Returns
     -------

@@ -42,9 +42,9 @@ class Record(NamedTuple):
     Attributes
     ----------
     name : str
-        What tells it from others: the name of its folder, in memory the title of its scene.
+        Name that distinguishes it from others: that of its folder, in memory the title of its scene.
     kind : {"static", "dynamic", "modes"}
-        What was solved.
+        Kind of the run.
     summary : dict
         The content of ``run.json``; empty where a folder has none.
     scene : dict
@@ -155,7 +155,7 @@ def of_folder(folder, with_frames=True):
     folder : path-like
         The folder.
     with_frames : bool
-        Whether there have to be frames: a run that failed at once has none, and may have a history.
+        True if frames are required: a run that failed at once has none, but may have a history.
 
     Raises
     ------

@@ -22,7 +22,7 @@ class LinePassage:
     system : refweb.system.system.System
         System with a force term of lines against lines.
     chosen : bool
-        Whether the stiffness is refweb's choice.
+        True if refweb chose the stiffness.
 
     Attributes
     ----------

@@ -111,8 +111,8 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
     force : bool
         Replace the results of an earlier run in ``out``.
     progress : bool or callable
-        True to show the progress in a terminal or a notebook. A callable is called with a line of text and the share
-        that is done, 0 to 1.
+        True to show the progress in a terminal or a notebook. A callable is called with a line of text and the finished
+        share, 0 to 1.
     announce : callable, optional
         Called with the scene and its system when the input has been accepted.
 

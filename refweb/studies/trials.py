@@ -182,7 +182,7 @@ class Dynamics:
     scene : refweb.Scene
         Scene of the trials, with its duration.
     system : refweb.system.system.System
-        What acts.
+        The system.
     observable : refweb.Observe
         Observable that is compared at the history rows.
     """

@@ -31,13 +31,13 @@ class Job(NamedTuple):
     Attributes
     ----------
     key : str
-        What the case is known by.
+        Key of the case.
     given : dict
         Its scene as a file would have it.
     folder, file : str
         Where paths in it start, and what it is called in messages.
     keeps : {"none", "json", "all"}
-        What is to come back besides cells.
+        Data to return besides cells.
     home : tuple
         Machine and process that sent it.
     files : dict

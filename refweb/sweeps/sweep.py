@@ -50,7 +50,7 @@ def sweep(
         A scene, a scene file or the name of a scene shipped with refweb. Without parameters the file of a study, the
         name of one shipped with refweb, or a `refweb.Study`.
     parameters : dict, optional
-        What varies by path, as in a study: ``{"body.0.velocity": [[0, 0, 1], [0, 0, 2]]}``.
+        Values that vary by path, as in a study: ``{"body.0.velocity": [[0, 0, 1], [0, 0, 2]]}``.
     out : path-like, optional
         Folder of the study; one that holds rows of a study goes on with what is missing. Without it nothing touches the
         disk.

@@ -184,7 +184,7 @@ def through(jobs, workers):
     Parameters
     ----------
     jobs : iterable of Job
-        What is to be run.
+        Jobs to run.
     workers : Processes or Given
         Who runs it; told to stop in the end, also where that comes early.
 

@@ -19,7 +19,7 @@ class Breaks(NamedTuple):
     times : ndarray
         When each broke [s].
     energies : ndarray
-        What each held, and what ended with it [J].
+        Energy that each had stored, with the energy of forces that ended with it [J].
     places : ndarray, shape (breaks, 3)
         Where its middle was [m].
     widths : ndarray
@@ -47,7 +47,7 @@ def torn(system, elements, energies):
     elements : ndarray of int
         Elements.
     energies : ndarray
-        What each held [J].
+        Rupture energy of each [J].
 
     Raises
     ------

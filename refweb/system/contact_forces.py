@@ -29,7 +29,7 @@ class ContactForces:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        The system.
 
     Attributes
     ----------

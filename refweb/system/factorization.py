@@ -36,7 +36,7 @@ class Library:
     Parameters
     ----------
     asked : {"auto", "qdldl", "superlu", "rslab"}
-        What the scene asks for.
+        Library that the scene asks for.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ class System:
     supported : ndarray of bool, shape (nodes, 3)
         Components of nodes that do not move, or move as prescribed.
     factorization : {"auto", "qdldl", "superlu", "rslab"}
-        What factorizes its symmetric matrices.
+        Library that factorizes its symmetric matrices.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class System:
     constraints : list of refweb.effects.base.Constraint
         One per effect that keeps distances; no force of the system holds them.
     weakness : refweb.effects.base.Weakness or None
-        Which elements break; None where none does.
+        Limits of elements that may break; None if no element breaks.
     carried : ndarray of bool, shape (rows,)
         Nodes that free bodies carry: those move with these.
     free : ndarray of int
