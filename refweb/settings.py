@@ -222,10 +222,10 @@ class Event(Table):
     Raises
     ------
     InputError
-        Where the line of "taut", or the observable or value of "threshold", is missing, and for a key of another kind;
-        from `Scene.build`, for a body, line or observable that the scene does not have, lines of different slackness,
-        "contact" without a contact, with a body that does not touch bodies or none but itself, and two events of one
-        name.
+        If the line of "taut", or the observable or value of "threshold", is missing, and for a key of another kind.
+        From `Scene.build`, for a body, line or observable that the scene does not have, for lines of different
+        slackness, for "contact" without a contact or with a body that does not touch this one, and for two events of
+        one name.
 
     Examples
     --------
@@ -319,9 +319,9 @@ class Accuracy(Table):
     Raises
     ------
     InputError
-        For digits that are not 1 … 12, an ensemble that is not 2 … 10 000 or without horizon, a budget that is not
-        above 0 or without digits and level = "full", digits and level = "full" without a twin; from `Scene`, for digits
-        and horizon in statics.
+        For digits that are not 1 … 12, and an ensemble that is not 2 … 10 000 or without horizon. For a budget that is
+        not above 0, or without digits and level = "full". For digits and level = "full" without step refinement. From
+        `Scene`, for digits and horizon in statics.
 
     Examples
     --------

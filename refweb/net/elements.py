@@ -1,7 +1,7 @@
 """Reference line elements on [0, 1] and their quadrature.
 
-The functions of a straight element are 1 − ξ and ξ and its nodes are the ends of the line, so that nothing is left to
-ask scikit-fem for, whose import with that of scipy takes as long as that of numba. Elements of higher order are in
+The shape functions of a straight element are 1 − ξ and ξ, and its nodes are the ends of the line. It does not need
+scikit-fem, whose import with that of scipy takes as long as that of numba. Elements of higher order are in
 `refweb.net.curved`.
 """
 

@@ -212,8 +212,9 @@ class Study(Table):
     Raises
     ------
     InputError
-        For wrong parameters, samples without a count or without anything to sample, distributions on a grid, lists of
-        different lengths in a zip, and indices of other samples than "sobol", or of a count that is no power of 2.
+        For wrong parameters, samples without a count or without a distribution or range, and distributions on a grid.
+        For lists of different lengths in a zip. For indices with other samples than "sobol", or with a count that is no
+        power of 2.
 
     Examples
     --------
