@@ -48,9 +48,9 @@ class Fold(Table):
     Raises
     ------
     InputError
-        For numbers out of bounds, a key of the other kind, and an axis that is zero. From ``lay``, in statics, for a
-        hub that is not one node, for a file that cannot be read or has other nodes, for a supported node that would
-        move, for a line that would be taut, and for lines nearer than the gap.
+        For numbers out of bounds, a key of the other kind, and an axis that is zero. From ``lay``: in statics, for a
+        hub that is not one node, and for a file that cannot be read or has other nodes. Also for a supported node that
+        would move, for a line that would be taut, and for lines nearer than the gap.
 
     Notes
     -----

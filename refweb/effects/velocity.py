@@ -26,7 +26,7 @@ class Velocity(Table):
     Raises
     ------
     InputError
-        For vectors that are not three finite numbers, and if neither ``value`` nor ``spin`` is given. From ``start``,
+        For vectors that are not three finite numbers, and if neither ``value`` nor ``spin`` is given. From ``start``:
         in statics, for a node that the web does not have, and for a named node that is attached to a body, or supported
         along a component that is not 0.
 

@@ -95,9 +95,10 @@ def space_of(record, peak=None, limit=None, progress=None):
 
 
 def chosen_of(numbers, count, peak=None):
-    """The first, the last, the frame ``peak`` and, evenly between them, others; ``count`` in all where there are so
-    many, and not fewer than these three unless fewer are asked for: then the peak comes before the first, and the first
-    before the last."""
+    """Numbers of the frames to show: the first, the last, the frame ``peak``, and others evenly between them.
+
+    There are ``count`` in all, if there are so many. If ``count`` is 1 or 2, the peak precedes the first and the last.
+    """
     if count >= len(numbers):
         return list(numbers)
     if count < 3:

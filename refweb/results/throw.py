@@ -21,8 +21,9 @@ class Throw(Table):
     The definitions are refweb's own. Four numbers follow from the area of the mouth over the rows of the history, with
     a parabola through the three rows around the largest. ``largest_area`` is the largest area, and ``deployment_time``
     its time. ``travelled`` is the change of another observable until then. ``effective_period`` is the time around it
-    in which the area is at least ``share`` of the largest. A number is a lower bound, and marked as such, if its
-    maximum or period reaches the start or the end of the run. The number less its ± is then the least possible value.
+    in which the area is at least ``share`` of the largest. A number is a lower bound, and marked as such, if the
+    largest area is at the end of the run, or if the period reaches the start or the end. The number less its ± is then
+    the least possible value.
 
     Three results describe the capture of a ``target`` at the end of the run. ``inside`` is true if its centre is in the
     convex hull of the web's nodes. ``closed`` is true if the area of the mouth is at most ``closed`` of the largest.
