@@ -36,15 +36,15 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     cable : refweb.Cable
         Material and section.
     effects : sequence
-        What acts.
+        Effects of the scene.
     supports : refweb.Supports or None
-        What is held; None for the web's own supports.
+        Supported nodes; None for the web's own supports.
     support : sequence of refweb.Supports
-        What is held in addition.
+        Additional supports.
     solve : refweb.Static or refweb.Dynamic
-        What to solve and how.
+        Kind of solution and method.
     output : refweb.Output
-        What a result folder holds.
+        Output interval and frames of the result folder.
     accuracy : refweb.Accuracy
         How errors are found.
     observables : sequence of refweb.Observe

@@ -67,11 +67,11 @@ class Finding(NamedTuple):
     code : str
         One of `CODES`.
     text : str
-        What a reader has to know.
+        Text for the reader.
     table : str
         Name of the table of the scene that it is about; empty for none.
     severity : {"warning", "note", "refusal"}
-        What it is.
+        Severity.
     """
 
     code: str

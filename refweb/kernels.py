@@ -33,7 +33,7 @@ all its digits, which it loses when positions are the unknowns.
 
 `STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
 
-What a kernel is, where its machine code is kept and how records reach it, says `refweb.compiled`.
+`refweb.compiled` says what a kernel is, where its machine code is kept and how records reach it.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def needed(elements, order, explicit, bodies):
     elements, order : int
         Number of elements and their order.
     explicit : bool
-        Whether no matrices are made.
+        True for explicit methods, which need no matrices.
     bodies : int
         Number of bodies that the web may touch.
     """
@@ -68,7 +68,7 @@ def of_states(count, rows, elements, read):
     count, rows, elements : int
         Number of states, and of the rows and elements of each.
     read : bool
-        Whether results have been read off each, which it then keeps: positions, forces, and of elements tension, stress
-        and strain; else it is displacements and velocities alone.
+        True if results of each state were evaluated, which it then keeps: positions, forces, and tension, stress and
+        strain of elements. Else it has displacements and velocities alone.
     """
     return count * (48.0 * rows + (48.0 * rows + 40.0 * elements if read else 0.0))

@@ -68,7 +68,7 @@ LISTS = {
 }
 """Those that may stand several times."""
 STUDY = "refweb.sweeps.study:Study"
-"""What a file for ``refweb sweep`` holds."""
+"""Class of a file for ``refweb sweep``."""
 OBSERVABLES = {
     "displacement": "refweb.results.observables.nodal:Displacement",
     "position": "refweb.results.observables.nodal:Position",
@@ -214,7 +214,7 @@ EXPORTS = (
     "refweb.errors:SolverError",
     "refweb.registry:register",
 )
-"""What ``refweb.NAME`` may be besides webs and effects."""
+"""Names that ``refweb.NAME`` offers besides webs and effects."""
 
 
 def exports():

@@ -42,8 +42,8 @@ def run(
     force : bool
         Replace the results of an earlier run in ``out``.
     progress : bool or callable
-        Whether a terminal or a notebook shows how far it is, or what is called with a line of text and the share that
-        is done, 0 to 1.
+        True to show the progress in a terminal or a notebook. A callable is called with a line of text and the finished
+        share, 0 to 1.
     announce : callable, optional
         Called with the scene and its system when the input has been accepted.
     checkpoint : tuple, optional
@@ -58,7 +58,7 @@ def run(
     InputError
         For wrong input; nothing has been written.
     SolverError
-        Where there is no answer or none is found. What was computed is kept in ``out``, marked "failed".
+        Where there is no answer or none is found. The rows and frames computed so far stay in ``out``, marked "failed".
     """
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     if out is not None:

@@ -79,9 +79,9 @@ class Scene:
     support : sequence of Supports
         Supports in addition.
     solve : Static or Dynamic
-        What to solve and how.
+        Kind of solution and method.
     output : Output
-        What a result folder holds.
+        Output interval and frames of the result folder.
     accuracy : Accuracy, optional
         How errors are found.
     throw : refweb.Throw, optional

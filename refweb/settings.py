@@ -10,7 +10,7 @@ from .registry import FACTORIZATIONS, INTEGRATORS, STATICS
 from .tables import Several, Table, boolean, choice, components, integer, nodes, numbers_list, real, table, text
 
 START_STATES = ("web", "equilibrium")
-"""What ``start`` may be besides a result folder."""
+"""Values of ``start`` besides a result folder."""
 
 
 @table
@@ -210,8 +210,8 @@ class Event(Table):
     body : str, optional
         Body of a contact, by default any.
     with : str, optional
-        What the body touches: "web", which is the default, or the name of another body, with ``between_bodies = true``
-        in ``[contact]``. They touch where they overlap, at t = 0 if they do so at once.
+        Other side of a contact: "web", which is the default, or the name of another body, with ``between_bodies =
+        true`` in ``[contact]``. A contact begins with an overlap, at t = 0 if there is one at the start.
     line : int, str or list, optional
         Lines, by number or group, see `refweb.net.groups`, of which the first to become taut counts.
     observe : str, optional
@@ -224,15 +224,15 @@ class Event(Table):
         How long the energy is to stay there [s], by default a hundredth of the duration: a pendulum is not at rest
         where it turns back. The time of the event is the end of that.
     stop : bool
-        Whether the run ends there.
+        True if the event ends the run.
 
     Raises
     ------
     InputError
-        Where the line of "taut", or the observable or value of "threshold", is missing, and for a key of another kind;
-        from `Scene.build`, for a body, line or observable that the scene does not have, lines of different slackness,
-        "contact" without a contact, with a body that does not touch bodies or none but itself, and two events of one
-        name.
+        If the line of "taut", or the observable or value of "threshold", is missing, and for a key of another kind.
+        From `Scene.build`, for a body, line or observable that the scene does not have, for lines of different
+        slackness, for "contact" without a contact or with a body that does not touch this one, and for two events of
+        one name.
 
     Examples
     --------
@@ -314,7 +314,7 @@ class Accuracy(Table):
         before, which is made again where it has been given up, is the result, with a warning that says what the digits
         would cost.
     refine : bool
-        Whether to find the error of the elements, by two more runs with two and four times as many.
+        True to find the discretisation error, by two more runs with two and four times the elements.
     horizon : bool
         Of dynamics: whether to find the horizon, the time until which the motion is determined. Later than that the
         smallest difference at the start leaves no digit of it, see `refweb.studies.predictability`.
@@ -328,9 +328,9 @@ class Accuracy(Table):
     Raises
     ------
     InputError
-        For digits that are not 1 … 12, an ensemble that is not 2 … 10 000 or without horizon, a budget that is not
-        above 0 or without digits and level = "full", digits and level = "full" without a twin; from `Scene`, for digits
-        and horizon in statics.
+        For digits that are not 1 … 12, and an ensemble that is not 2 … 10 000 or without horizon. For a budget that is
+        not above 0, or without digits and level = "full". For digits and level = "full" without step refinement. From
+        `Scene`, for digits and horizon in statics.
 
     Examples
     --------

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 class Solution(SolutionData):
     """A solved scene, as `refweb.run` returns it.
 
-    What the run fills in has the names of `refweb.results.solution.SolutionData`: ``results``, ``history``, ``steps``,
-    ``events``, ``status``, ``warnings`` and more. The arrays are read off its last state.
+    The run fills in the attributes of `refweb.results.solution.SolutionData`: ``results``, ``history``, ``steps``,
+    ``events``, ``status``, ``warnings`` and more. The arrays are read from the last state of the run.
 
     Attributes
     ----------
@@ -188,15 +188,16 @@ class Solution(SolutionData):
         return table
 
     def plot(self, quantity: str | Sequence[str] | None = None, out: str | PathLike | None = None) -> Figure:
-        """Draw histories with ±, books, spectra, stress over distance; a notebook shows the figure.
+        """Draw histories with ±, balances, spectra, stress over distance; a notebook shows the figure.
 
         Parameters
         ----------
         quantity : str or sequence of str, optional
-            What is drawn, a panel each: an observable or another column of the history; ``energy`` or ``momentum``, the
-            books; ``spectrum`` of the first observable or ``spectrum:NAME``; ``stress``, ``tension`` or ``strain`` of
-            lines, over distance from the place that was hit or loaded; ``frequencies`` of modes. By default the
-            observables and the energy balance, in statics the results over load steps, of one stress over distance.
+            Quantities to draw, one panel each: an observable or another column of the history; ``energy`` or
+            ``momentum``, the balances; ``spectrum`` of the first observable or ``spectrum:NAME``; ``stress``,
+            ``tension`` or ``strain`` of lines over the distance from the point of impact or load; ``frequencies`` of
+            modes. By default the observables and the energy balance; in statics the results over load steps, or stress
+            over distance for one load step.
         out : path-like, optional
             A ``.png``, ``.svg`` or ``.pdf`` to write.
 
@@ -230,7 +231,7 @@ class Solution(SolutionData):
         frames : int, optional
             Number of frames to turn and play; by default as many as leave the page small.
         sheet : bool
-            Whether only the sheet is written: sizes, largest tension, margin of safety and the worth of each result.
+            True to write only the sheet: sizes, largest tension, margin of safety and the verdict on each result.
 
         Returns
         -------
@@ -282,7 +283,7 @@ def load(folder) -> Solution:
     """The solution in a result folder, as `refweb.run` returned it.
 
     Its last state is that of the folder's last frame. The history is read when it is asked for, and a frame when it is
-    drawn. What it cost, its warnings and its status are those of the run: one that was killed has the status "running".
+    drawn. Its cost, warnings and status are those of the run: a run that was killed has the status "running".
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ SMALLEST = 1e-100
 """Smallest value of a number that must not be negative, unless it is 0."""
 _WHOLE = 2**63 - 1
 Several = Any
-"""What a field that is read as a tuple may be given, to editors: a list, a tuple or an array."""
+"""Type, for editors, of a field that is read as a tuple: a list, a tuple or an array may be given."""
 
 
 def _refuse(name, value, limit):

@@ -4,6 +4,9 @@ The glossary of the reference has the words; here is what no name and no first l
 """
 
 import ast
+import inspect
+import itertools
+import re
 
 import pytest
 from import_graph import MODULES
@@ -17,6 +20,8 @@ CONTRACT = {"sweeps.study": {"keep"}}
 """Keys of files that are read, whose names stay."""
 VAGUE = {"What", "Whether", "Of", "That", "How", "Where", "Which", "Who", "Why", "As", "One", "When", "If", "By"}
 """Words that begin no docstring: it begins with a verb, or with the quantity."""
+SENTENCE = re.compile(r"(?:^|[.:;?!]\s+)((?:What|Whether)\s.*?)(?=[.:;?!]\s|$)")
+"""Sentence that begins with a what-clause, in a passage on one line."""
 
 
 def defined(tree):
@@ -40,3 +45,28 @@ def test_names_and_docstrings_say_what_they_are(name):
     parts = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module))
     vague = [text for node in parts if (text := ast.get_docstring(node)) and text.split()[0].rstrip(",") in VAGUE]
     assert not vague, vague[0].splitlines()[0]
+
+
+def passages(text):
+    """Passages of a docstring, each on one line: paragraphs and descriptions, without examples."""
+    literal, kept = None, []
+    for line in inspect.cleandoc(text).splitlines():
+        indent = len(line) - len(line.lstrip())
+        if literal is not None and line and indent <= literal:
+            literal = None
+        kept.append("" if literal is not None or line.lstrip().startswith(">>>") else line)
+        if literal is None and line.endswith("::"):
+            literal = indent
+    groups = itertools.groupby(kept, key=lambda line: len(line) - len(line.lstrip()) if line else None)
+    return [" ".join(" ".join(group).split()) for indent, group in groups if indent is not None]
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_no_sentence_begins_with_a_what_clause(name):
+    texts = (
+        node.value.value
+        for node in ast.walk(MODULES[name])
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+    )
+    clauses = [found for text in texts for passage in passages(text) for found in SENTENCE.findall(passage)]
+    assert not clauses, clauses[0]

@@ -21,13 +21,13 @@ A verb is a module that an entry point names. A whole file, ``my_webs/weigh.py``
         net = Scene.load(arguments.scene).build().net
         print(f"{net.cable_mass / arguments.per:.6g}")
 
-The first sentence of its docstring is its line in ``refweb --help``. ``add_arguments`` gets its
-`argparse.ArgumentParser`, and ``run`` what that parses. Results go to standard output. What ``run`` returns is the exit
-status, 0 where that is None. What the user did wrong is an `refweb.InputError` of one line with the value, the limit
-and the remedy, and leaves with status 2; a `refweb.SolverError`, an answer that is not found, with 1; an interruption,
-also that of a batch queue, with 130. The message goes to the error stream; a verb catches none of them.
+The first sentence of its docstring is its line in ``refweb --help``. ``add_arguments`` gets the
+`argparse.ArgumentParser` of the verb, and ``run`` the parsed arguments. Results go to standard output. ``run`` returns
+the exit status; None means 0. A mistake of the user is an `refweb.InputError`: one line with the value, the limit and
+the remedy, and exit status 2. A `refweb.SolverError`, an answer that is not found, has exit status 1. An interruption,
+also by a batch queue, has exit status 130. The message goes to the error stream; a verb catches none of these errors.
 
-Help loads all verbs, so whatever is heavy, scenes and numpy among them, is imported inside functions.
+Help loads all verbs. Therefore heavy modules, such as scenes and numpy, are imported inside functions.
 
 ``Scene.build()`` is what a scene comes to: ``net.cable_mass`` is that of the lines, ``net.mass`` that of each row, of
 the ``net.nodes`` nodes with point masses first, then of bodies.

@@ -52,9 +52,9 @@ class Kernel:
     Attributes
     ----------
     py_func : function
-        What is compiled.
+        The Python function.
     prepared : bool
-        Whether there is machine code of all that it may reach, whatever the features of a run.
+        True if there is machine code of all kernels that it may reach, for any features of a run.
     apart : frozenset of str, optional
         Features of a run that reaches it, for one that is called by its address; else None.
     """
@@ -205,9 +205,9 @@ def needed(kernels, features=None):
     Parameters
     ----------
     kernels : sequence of Kernel
-        What is called, or stands in tables.
+        Kernels that are called directly or are in tables.
     features : set of str, optional
-        What the run has; by default all that there is.
+        Features of the run; by default all.
 
     Returns
     -------
@@ -263,8 +263,8 @@ def kernel(signature=None, *, leaf=False, apart=None, **options) -> Any:
     signature : numba signature, optional
         The only one that it has; by default callers give it any, or where it is ``apart`` its annotations say.
     leaf : bool
-        Whether it counts no references to arrays, which takes 10 ns an array and call where loops hide that each is
-        given back. It neither makes nor returns arrays, nor calls what returns any.
+        True if it counts no references to arrays, which takes 10 ns for each array and call. Such a kernel neither
+        makes nor returns arrays, nor calls kernels that return any.
     apart : sequence of str, optional
         Features of a run that reaches it: it is called by its address, see the module.
     **options

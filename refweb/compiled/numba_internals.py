@@ -48,7 +48,7 @@ from . import keys, store
 __all__ = ["AbstractTemplate", "AttributeTemplate", "infer_global", "lower_builtin", "make_array", "populate_array"]
 
 PLAIN = os.environ.get("REFWEB_PLAIN") == "1"
-"""Whether kernels do with the public parts of numba."""
+"""True if kernels use the public parts of numba alone."""
 BARE = {} if PLAIN else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of a kernel without an entry from Python."""
 ENTRY = {} if PLAIN else {"no_cfunc_wrapper": True}
@@ -91,7 +91,7 @@ class Cache:
     key : callable
         Text of all that the machine code depends on besides the types of its arguments.
     linked : bool
-        Whether other kernels may be optimized with it; else what that takes, most of a file, is left out.
+        True if other kernels may be optimized with it. Else the data for that, most of a file, is left out.
     """
 
     def __init__(self, name, key, linked):

@@ -4,7 +4,7 @@ numba hands a named tuple over field by field: the explicit loop would take some
 what a kernel has to be compiled for. Its structrefs count references, which kernels of the loop do not, and its
 structured arrays have no arrays in them. A `Record` here is a frozen dataclass. Python writes it once to a block of
 memory that lives as long as it does, one word a number, a pointer and the sizes of an array, or the pointer to another
-record or table; kernels read the fields that they name from there. What a field is says its annotation:
+record or table; kernels read the fields that they name from there. The annotation of a field says how kernels see it:
 
 =====================  =======================================================================================
 float, int             a number, which stays what it was when the block was written

@@ -25,7 +25,7 @@ V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 CHECK = 16
 """Bytes of the checksum that a file begins with."""
 SHIPPED = pathlib.Path(__file__).parent / "machine_code"
-"""What a wheel brings."""
+"""Folder of the machine code that a wheel contains."""
 
 
 @functools.cache

@@ -1,6 +1,7 @@
-"""A scene run as often as its results need: until the book of energies closes, and until digits asked for are there.
+"""Repeated runs of a scene: until the energy balance closes, and until results have the requested digits.
 
-The knob of an integrator, ``safety`` or ``rtol``, trades accuracy for time; each run has a value of it.
+The accuracy parameter of an integrator, ``safety`` or ``rtol``, trades accuracy for time; the code calls it the knob.
+Each run has a value of it.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from ..findings import NOTE, Finding
 from .budget import Spent
 
 ATTEMPTS, MOST_ATTEMPTS, PAYS = 3, 8, 0.5
-"""Number of runs in which the book of energies has to close; a larger one where it pays; and that is where the drift of
-each run is at most this share of that before."""
+"""Number of runs after which the energy balance must close; a larger number that is used while the energy drift of each
+run is at most a share of that of the run before; this share."""
 CLIMBS = 8
-"""Number of times that accuracy is raised for digits that are missing."""
+"""Largest number of times that accuracy is raised for missing digits."""
 STAYS = "higher accuracy changes it by as much: it is zero, or not determined, or a peak that needs a shorter interval"
 STUCK = 1.5
-"""Factor by which an error has to fall where half the step, or a tenth of rtol, is meant to quarter it."""
+"""Least factor by which an error must fall with half the step, or a tenth of rtol, which should quarter it."""
 
 
 @dataclass
@@ -32,15 +33,15 @@ class AccuracyState:
     Attributes
     ----------
     first : float
-        Value of the integrator's knob that the scene begins with.
+        First value of the knob.
     knob : float
-        Its value in the run.
+        Present value of the knob.
     repeated : int
-        How often a run was repeated since digits were last looked at, as its book stayed open.
+        Number of repeated runs, whose energy balance did not close, since digits were checked.
     drift : float
-        Energy drift at which the last of these ended [1], infinite where there is none.
+        Energy drift at the end of the last of these [1], infinite if there is none.
     missing : dict of str to float
-        ± over what digits allow, by result, when they were last looked at.
+        ± over the ± that the digits allow, by result, at the last check.
     """
 
     first: float
@@ -51,30 +52,30 @@ class AccuracyState:
 
     @classmethod
     def of(cls, first, kept=None):
-        """At the beginning, or as a checkpoint has it."""
+        """The state at the beginning, or of a checkpoint."""
         if kept is None:
             return cls(first, first)
         missing = dict(zip(kept["missing"].tolist(), kept["shares"].tolist(), strict=True))
         return cls(first, float(kept["accuracy"]), int(kept["repeated"]), float(kept["drift"]), missing)
 
     def arrays(self):
-        """Arrays that a checkpoint keeps of it."""
+        """Arrays for a checkpoint."""
         names, shares = np.array(list(self.missing), dtype=str), np.array(list(self.missing.values()))
         counted = {"accuracy": self.knob, "repeated": self.repeated, "drift": self.drift}
         return {**counted, "missing": names, "shares": shares}
 
 
 def run_within_drift(simulation, folder, tell):
-    """Run with errors; one whose energy book stays open is repeated with a smaller knob, see `ATTEMPTS`.
+    """Run with errors; repeat a run whose energy balance does not close with a smaller knob, see `ATTEMPTS`.
 
     Parameters
     ----------
     simulation : refweb.dynamics.simulation.Simulation
-        What is run; its solution is filled in.
+        Simulation to run; its solution is filled in.
     folder : refweb.results.folder.Folder or None
-        Where rows and frames are written.
+        Folder for rows and frames.
     tell : callable
-        Called with a text and the share that is done.
+        Called with a text and the finished share.
     """
     scene, solution, standing = simulation.scene, simulation.solution, simulation.standing
     while True:
@@ -138,7 +139,7 @@ def _throw(simulation, run, ended, rows, known):
 
 
 def _twin_of(simulation):
-    """A twin beside the run, where the scene wants one."""
+    """Step refinement beside the run, if the scene asks for it."""
     if simulation.scene.accuracy.error == "none":
         return contextlib.nullcontext()
     from .twin_error import Twin
@@ -147,16 +148,16 @@ def _twin_of(simulation):
 
 
 def missing_digits(results, digits):
-    """±, over what so many significant digits allow, of each result that has not got them."""
+    """± over the ± that so many significant digits allow, of each result without these digits."""
     allowed = {name: 0.5 * 10.0**-digits * abs(result.value) for name, result in results.items()}
     shares = {n: np.inf if r.error is None else r.error / max(allowed[n], 5e-324) for n, r in results.items()}
     return {name: share for name, share in shares.items() if share > 1.0}
 
 
 def reach_digits(simulation, digits, folder, tell):
-    """Raise accuracy until every result has its digits, or has shown that it cannot have them; say which have not.
+    """Raise accuracy until every result has its digits or cannot get them; report results without them.
 
-    That ends where the budget does, see `refweb.dynamics.budget`; then the last run that came to its end stays.
+    It also ends with the budget, see `refweb.dynamics.budget`; then the last complete run counts.
     """
     solution, standing, budget = simulation.solution, simulation.standing, simulation.budget
     before = standing.missing

@@ -1,4 +1,4 @@
-"""± of the times at which lines break, and how far their order is known."""
+"""± of the times of breaks, and the time until which their order is known."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from ..findings import Finding
 
 
 def add_errors_of_breaks(solution, run, refined, share):
-    """Add ± to the times of breaks, as far as a run and its twin break the same lines in the same order.
+    """Add ± to the times of breaks, while run and step refinement break the same lines in the same order.
 
-    Behind the first break at which they differ nothing is known of either run by the other: what is found there has no
-    ±, and a warning says so. Another tells of the first two breaks that are nearer to each other than their ±.
+    After the first break at which they differ, their difference shows no error. Later results have no ±, and a warning
+    reports it. Another warning names the first two breaks that are nearer to each other than their ±.
 
     Parameters
     ----------
     solution : refweb.Solution
-        At the end of the run, with its breaks and results.
+        Solution at the end of the run, with its breaks and results.
     run, refined : refweb.system.broken_lines.Breaks
-        Of the run and of its twin.
+        Breaks of the run and of its step refinement.
     share : float
-        ± over the difference of the two.
+        ± over the difference of both runs.
 
     Returns
     -------
     float
-        Time from which on nothing is known [s].
+        Time after which no ± is known [s].
     """
     for n, record in enumerate(solution.breaks):
         alike = n < len(refined.elements) and run.elements[n] == refined.elements[n]
@@ -43,7 +43,7 @@ def add_errors_of_breaks(solution, run, refined, share):
 
 
 def _warn_of_near(solution, count):
-    """Warn of the first of so many breaks that the next may come before."""
+    """Warn of the first of so many breaks that the next break may precede."""
     for first, later in zip(solution.breaks[:count], solution.breaks[1:count], strict=False):
         if 0.0 < later["time"] - first["time"] < first["error"] + later["error"]:
             text = (
@@ -55,7 +55,7 @@ def _warn_of_near(solution, count):
 
 
 def _end_of_knowledge(solution, run, refined, n):
-    """Take back the ± of what comes from break ``n`` on, and say so; the time of that [s]."""
+    """Remove ± of results from break ``n`` on, with a warning; return the time of that break [s]."""
     times = [breaks.times[n] for breaks in (run, refined) if n < len(breaks.times)]
     since = float(min(times))
     net = solution.state.system.net

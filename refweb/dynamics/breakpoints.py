@@ -9,7 +9,7 @@ from ..registry import INTEGRATORS
 from .schedule import FEW_CORNERS, row_times
 
 TOLD = 1.5
-"""Factor on the number of steps from which it is told."""
+"""Least factor on the number of steps that a finding reports."""
 
 
 def remarks_on_corners(scene, system):
@@ -18,9 +18,9 @@ def remarks_on_corners(scene, system):
     Parameters
     ----------
     scene : refweb.Scene
-        Of a method, not "auto".
+        Scene with a method that is not "auto".
     system : refweb.system.system.System
-        What acts.
+        The system.
     """
     end = scene.solve.duration
     corners = system.corners

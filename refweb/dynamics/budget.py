@@ -1,7 +1,7 @@
-"""Budget of CPU time for raising the accuracy of a run, and the part of it that is spent.
+"""Budget of CPU time for runs of higher accuracy.
 
-The first run goes to its end whatever it costs, as there is no result before. One that follows it is not begun where it
-is expected to cost more than what is left, and is ended where it is seen to.
+The first run is always completed, since there is no result before. A further run is not begun if it is expected to
+exceed the remaining budget, and it is ended if it will exceed it.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from typing import NamedTuple
 clock = time.process_time
 """CPU time of this process [s]."""
 LEAST, RUNS = 600.0, 20.0
-"""Budget where none is given: this time [s], or so many times the cost of the first run, whichever is larger."""
+"""Default budget: this time [s], or so many times the cost of the first run, whichever is larger."""
 SEEN, SURE = 0.25, 2.0
-"""Share of what is left that a run has spent before it is judged by its progress, and how many times what is left it
-has to be on its way to: runs do not progress evenly."""
+"""Share of the remaining budget that a run may use before its cost is extrapolated; factor of the extrapolated cost
+over the remaining budget at which it is ended. The factor is above 1 since runs do not progress evenly."""
 SLOWEST = 0.2
-"""Least power of 1/rtol that the number of steps is expected to grow with."""
+"""Least expected power of 1/rtol in the number of steps."""
 
 
 class Spent(Exception):
-    """A run was ended because it would have cost more than what is left of a budget."""
+    """A run was ended because it would have exceeded the remaining budget."""
 
 
 class Run(NamedTuple):
-    """A run with its twin: the knob of its integrator, its steps, and its cost [s]."""
+    """A run with its step refinement: the knob of its integrator, its steps, and the cost of both [s]."""
 
     knob: float
     steps: int
@@ -34,7 +34,7 @@ class Run(NamedTuple):
 
 
 def budget_of(given, first):
-    """The budget that is given [s], else that of a first run of a cost [s], see `LEAST`."""
+    """The given budget [s], else the default for the cost of the first run [s], see `LEAST`."""
     return max(LEAST, RUNS * first) if given is None else given
 
 
@@ -49,9 +49,9 @@ class Budget:
     Attributes
     ----------
     runs : list of Run
-        Those that came to their end.
+        Complete runs.
     kept : bool
-        Whether runs are ended that would exceed it.
+        True if runs that would exceed the budget are ended.
     """
 
     def __init__(self, given):
@@ -62,25 +62,25 @@ class Budget:
 
     @property
     def total(self):
-        """All of it [s]."""
+        """The whole budget [s]."""
         first = self.runs[0].price if self.runs else 0.0
         return budget_of(self._given, first)
 
     @property
     def spent(self):
-        """CPU time that is spent [s]."""
+        """Spent CPU time [s]."""
         return clock() - self._began
 
     def begin(self):
-        """Note that a run begins."""
+        """Record the start of a run."""
         self._begun = clock(), self.total - self.spent
 
     def end(self, knob, steps):
-        """Note that it has come to its end, with a knob and so many steps."""
+        """Record the end of a run with a knob and a number of steps."""
         self.runs.append(Run(knob, steps, clock() - self._begun[0]))
 
     def expected(self, integrator, knob):
-        """Cost of a run with another value of the knob [s]: as steps have grown before, else by the method's order."""
+        """Expected cost of a run with another knob [s], by the growth of steps so far, else by the order."""
         last = self.runs[-1]
         power = 1.0 if integrator.knob == "safety" else max(1.0 / (integrator.order + 1.0), SLOWEST)
         if len(self.runs) > 1 and (before := self.runs[-2]).knob != last.knob:
@@ -88,9 +88,9 @@ class Budget:
         return last.price * (last.knob / knob) ** power
 
     def price_of(self, integrator, share, limit):
-        """Cost of all runs, ``limit`` at most, until errors that are ``share`` times what they may be are small enough.
+        """Cost of all runs, at most ``limit``, until errors have fallen by the factor ``share``.
 
-        Errors go with the step to the power of the order, or with the tolerance to the power 2/3, see
+        Errors are proportional to the step to the power of the order, or to the tolerance to the power 2/3, see
         `refweb.dynamics.twin_error.with_errors`.
         """
         total, knob, order = 0.0, self.runs[-1].knob, integrator.order if integrator.knob == "safety" else 2.0 / 3.0
@@ -103,7 +103,7 @@ class Budget:
         return total
 
     def watch(self, share):
-        """End a run, of which a share is done, by `Spent` where it costs more than what was left at its beginning."""
+        """Raise `Spent` if a run, of which a share is finished, exceeds the budget that remained at its start."""
         if not (self.runs and self.kept):
             return
         began, left = self._begun
@@ -113,12 +113,12 @@ class Budget:
 
 
 def steps_with_twin(scene):
-    """Steps of a scene's run and its twin over those of the run: of order 2, half the error is √2 times the steps."""
+    """Steps of a run and its step refinement, over those of the run; at order 2, √2 times the steps halve the error."""
     return 1.0 + math.sqrt(2.0) if scene.accuracy.error == "twin" else 1.0
 
 
 def check_budget(simulation, share, twin=False):
-    """End a run of which a share is done, or its twin, where both would cost too much; `Spent`."""
+    """Raise `Spent` if a run, of which a share is finished, and its step refinement would cost too much."""
     if not simulation.integrator.beside:  # the twin comes after the run
         both = steps_with_twin(simulation.scene)
         share = (1.0 + (both - 1.0) * share if twin else share) / both

@@ -1,7 +1,7 @@
-"""Exponential growth of what two runs of one scene differ by: a sign of chaos that costs nothing.
+"""Exponential growth of the difference of two runs of one scene: a sign of chaos without further runs.
 
-Errors of steps grow with a low power of time. Where the motion is chaotic any difference grows by the same factor in
-equal times, until nothing of the motion is left. The run and its twin of smaller errors are two such motions.
+Errors of time steps grow with a low power of time. In a chaotic motion any difference grows by the same factor in equal
+times, until no digit is left. The run and its step-refinement run are two such motions.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 WINDOWS, ROWS = 16, 3
 """Number of parts of the time, and least number of rows in each."""
 IN_TURN, FACTOR = 5, 2.5
-"""Number of parts one after another in each of which differences grow by at least this factor.
+"""Number of successive parts in each of which differences must grow by at least this factor.
 
-A touch in a smooth motion starts from nothing, and then differences grow with the square of the time since: by 9, 2.8,
-2.0 from part to part, which is no longer in turn."""
+After a contact in a smooth motion differences grow with the square of time: by 9, 2.8, 2.0 from part to part, which is
+not enough for so many successive parts."""
 LOST = 0.1
-"""Difference over the size of the motion at which no digit of it is left."""
+"""Difference over the size of the motion at which no digit is left."""
 SEEN = 1e-3
 """Least difference over the size of the motion that matters."""
 
@@ -29,9 +29,9 @@ class Divergence(NamedTuple):
     Attributes
     ----------
     growth : float
-        Number of e-folds per time [1/s].
+        Lyapunov exponent [1/s].
     lost : float
-        Time at which no digit is left [s], infinite where some is.
+        Time at which no digit is left [s], infinite if there is none.
     """
 
     growth: float
@@ -49,7 +49,7 @@ def divergence(rows, refined):
     Returns
     -------
     Divergence or None
-        None where differences do not grow so, or there are too few rows to tell.
+        None if differences do not grow exponentially, or if there are too few rows.
     """
     count = min(len(rows), len(refined))
     if count < WINDOWS * ROWS:

@@ -15,21 +15,21 @@ from .method_choice import step_price
 from .schedule import Counts
 
 TELLING = 0.95
-"""Share of a step below which that where all is touched is told as well."""
+"""Share of the step below which the step with all contacts is reported as well."""
 
 
 class Rule(NamedTuple):
-    """A step [s], and what sets it."""
+    """A step [s], and its cause."""
 
     step: float
     by: str
 
 
 def ruling(integrator, system, reach, speed):
-    """The `Rule` of the bound of stability at the web's position, for what bodies touch within ``reach`` [m].
+    """The `Rule` of the critical time step in the initial web, with contacts of bodies within ``reach`` [m].
 
-    The row whose bound is the smallest says it, by the term with the largest part in that: of stiffness, or where
-    that alone would let steps be over √2 times as long, of damping.
+    The cause is the term with the largest part in the row with the smallest step. It is that of stiffness, or of
+    damping if steps without damping would be over √2 times as long.
     """
     net = system.net
     moving = np.flatnonzero(~system.supported.all(axis=1) & (net.mass > 0.0))
@@ -77,7 +77,7 @@ def _seconds(value):
 
 
 def expected_cost(scene, system):
-    """In words, for a method whose steps have a bound; None for others."""
+    """Text of the expected cost for a method whose steps have a bound; None for others."""
     method, solve = INTEGRATORS[scene.solve.method], scene.solve
     if method.knob != "safety":
         return None

@@ -1,7 +1,7 @@
-"""Monitors of a scene, and the way from their `History` to rows of ``history.csv`` and results.
+"""Monitors of a scene, and the conversion of their `History` to rows of ``history.csv`` and results.
 
-Observables of a state are probes, those of energies, work and step size weighted sums of the integrator's books. Behind
-the scene's own probes stand those of what refweb warns of, and those of events that no observable tells.
+Observables of a state are probes. Those of energies, work and step size are weighted sums of the integrator's balances.
+After the probes of observables follow those for warnings, and those for events without an observable.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ SPREAD = 3.0
 
 
 def _probes_of_warnings(system, followed, step_size):
-    """Probes of what refweb warns of and refuses, by name, of which the largest value counts.
+    """Probes for warnings and refusals by name; their largest values count.
 
-    That is a scale of each element times its tension or its strain, and how deep lines are in each body. ``followed``
-    are probes that are looked at in any case: where one of them is of tensions, the largest of which is that of the
-    largest strain, strains need no look of their own. How fast bodies are counts where the ``step_size`` is given [s].
+    They follow a scale of each element times its tension or its strain, and the depth of lines in each body.
+    ``followed`` are probes that exist in any case: if one of them is the largest tension, which belongs to the largest
+    strain, strains need no further probe. The speed of bodies is followed if the ``step_size`` is given [s].
     """
     net, tension, scales = system.net, system.tension_column, {}
     if (net.laws == SMOOTH).any():
@@ -72,18 +72,18 @@ def _correction(extremes, at, relative):
 
 
 def _shares_differ(net):
-    """Tell if the line of the smallest margin of safety may be another one than that of the largest utilisation."""
+    """Tell if the smallest margin of safety and the largest utilisation may be those of different lines."""
     return net.allowed_share is not None and np.ptp(net.allowed_share[np.isfinite(net.strength)]) > 0.0
 
 
 def _of_tension(probe):
-    """Tell if a probe follows the largest of all tensions, each times a scale, and no mean of it."""
+    """Tell if a probe follows the largest of all tensions, each times a scale, and not a mean."""
     every = probe.kernel is probes.line and list(probe.rows[1:]) == [0, len(probe.data)]
     return every and probe.rows[0] != STRAIN and probe.sign > 0.0 and not probe.average
 
 
 def _tells_strain(system, scale):
-    """Tell if the largest tension times a scale is that of the most strained element in any case."""
+    """Tell if the largest tension times a scale is always that of the element with the largest strain."""
     net, lines = system.net, [term for term in system.terms if term.over_lines]
     if net.law is None or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
         return False
@@ -113,23 +113,23 @@ def _event_of(event, system, duration):
 
 
 class Watch:
-    """Monitors of a scene, and the results that are made of them.
+    """Monitors of a scene, and the results that follow from them.
 
     Parameters
     ----------
     scene : refweb.Scene
-        Its observables and events.
+        Scene with observables and events.
     system : refweb.system.system.System
-        What acts.
+        The system.
 
     Attributes
     ----------
     probes : list of refweb.results.probes.Probe
-        Of observables, of warnings and of events, in this order.
+        Probes of observables, of warnings and of events, in this order.
     sums : list of refweb.dynamics.integrators.integrator.Sum
-        Of the observables that are followed in every step.
+        Sums of observables that are followed in every step.
     events : list of refweb.dynamics.integrators.events.Event
-        In the order of the scene, and last that a line breaks, where stress breaks lines.
+        Events in the order of the scene; the last is the break of a line, if lines break by stress.
     columns : list of str
         Names of the columns of ``history.csv``, with units.
     """
@@ -192,15 +192,15 @@ class Watch:
     def table(self, history):
         """Rows of a `History` as rows of ``history.csv``, shape (rows, columns).
 
-        Each row is summed in one order, however many rows there are; a product of matrices is not.
+        Each row is summed in the same order for any number of rows, unlike in a product of matrices.
         """
         return (history.values[:, :, None] * self._weights).sum(axis=1)
 
     def compared(self, table):
         """Columns of ``history.csv`` by which a run and its step refinement are compared.
 
-        Time, observables in their order, and energy less work [J]: that stays what it is at the start, so that its
-        error is known in either run.
+        These are time, observables in their order, and energy less work [J]. The latter is constant, so that its error
+        is known in each run.
         """
         observed = table[:, : 1 + len(self._observables)]
         return np.column_stack([observed, (table[:, self._booked] * self._signs).sum(axis=1)])
@@ -239,7 +239,7 @@ class Watch:
         return [f"{first.name} {readable(tables[-1][-1, 1], None, first.unit)}"] if tables else []
 
     def state(self, course):
-        """The `refweb.results.state.State` that a course is in."""
+        """The `refweb.results.state.State` of a course."""
         system, breaks = self.system, course.breaks
         if breaks is not None and len(breaks.elements):
             from ..system.broken_lines import torn
@@ -268,7 +268,7 @@ class Watch:
         return None if at is None else float(course.extremes.values[at]) / self.system.orbit_radius
 
     def unfilled(self, course):
-        """Names of the observables whose largest or smallest mean is that of no full window: the run ended before."""
+        """Names of observables without a largest or smallest mean, since the run ended before a window was full."""
         values = course.extremes.values
         extreme = [o for o in self._probed if o.average is not None and o.reduce != "final"]
         return [o.name for o in extreme if np.isinf(values[self._slot(o)])]
@@ -276,10 +276,10 @@ class Watch:
     def corrections(self, course, relative=0.0, absolute=None):
         """Lower limits of ± of results, by name of the observable.
 
-        That is what extremes exceed the values at steps by, and what the integral of a mean leaves open. A method that
-        keeps a ``relative`` tolerance may find an extreme of an instant no better than that, and one with ``absolute``
-        tolerances, by unit, a displacement or a velocity: run and twin that agree more closely do so by chance. What a
-        web at rest moves by is such a result.
+        They are the differences of extremes from the values at steps, and the errors of the integrals of means. A
+        method with a ``relative`` tolerance finds an extreme at an instant no better than that. A method with
+        ``absolute`` tolerances, by unit, finds displacements and velocities no better than these, such as the small
+        motions of a web at rest. A closer agreement of run and step refinement is chance.
         """
         absolute = absolute or {}
         limits = {o.name: SPREAD * absolute.get(o.unit, 0.0) for o in self._observables}
@@ -291,10 +291,10 @@ class Watch:
         return limits
 
     def drifts(self, course, twin, time):
-        """Distance that bodies with different velocities in a run and its refinement gain in half a time [s], by
-        observable.
+        """Difference of positions of bodies, by observable, from different velocities in a run and its refinement.
 
-        Only of places of bodies: nodes swing, and what their velocities differ by is turned around in less time.
+        It is the difference of velocities times half of ``time`` [s]. Only positions of bodies count: nodes vibrate,
+        and differences of their velocities change sign in less time.
         """
         rows = {body.name: body.row for body in self.system.net.bodies}
         placed = {o.name: o for o in self._observables if o.body is not None and o.unit == "m"}
@@ -307,13 +307,13 @@ class Watch:
         return distances
 
     def _slot(self, observable):
-        """Number of the probe or, behind the probes, of the sum of an observable; None where none is looked at."""
+        """Number of the probe or, after all probes, of the sum of an observable; None if it is not followed."""
         if observable in self._probed:
             return self._probed.index(observable)
         return len(self.probes) + self._followed.index(observable) if observable in self._followed else None
 
     def largest_stress(self, course):
-        """Largest stress of all steps [Pa], None where nothing is warned of by it."""
+        """Largest stress of all steps [Pa], None if no warning needs it."""
         at = self._of_warning("stress")
         return None if at is None else float(course.extremes.values[at])
 
@@ -335,13 +335,13 @@ class Watch:
 
     @property
     def _shares(self):
-        """Names of what is followed of stress over its limits, with the numbers of the probes."""
+        """Names of the followed ratios of stress over its limits, with the numbers of the probes."""
         return {name: at for name in ("utilisation", "margin") if (at := self._of_warning(name)) is not None}
 
     def shares(self, course):
-        """Largest stress over strength and, where its line may be another, over the allowed stress: results by name.
+        """Largest stress over strength and, if its line may differ, over the allowed stress: results by name.
 
-        They have no errors; none where no line has a strength.
+        They have no errors. The dict is empty if no line has a strength.
         """
         values, times, places = course.extremes.values, course.extremes.times, course.extremes.places
         lines = self.system.net.line
@@ -378,7 +378,7 @@ class Watch:
         return float(extremes.values[at]), float(extremes.times[at]), int(extremes.places[at])
 
     def note_overlaps(self, course, overlaps):
-        """Note the deepest contact of each body in `refweb.effects.contact.overlap.Overlaps`."""
+        """Record the deepest contact of each body in `refweb.effects.contact.overlap.Overlaps`."""
         extremes = course.extremes
         for i, body in enumerate(self.system.net.bodies):
             at = self._of_warning(("overlap", body.name))
@@ -392,7 +392,7 @@ class Watch:
                 overlaps.pairs.record(i, float(extremes.values[at]), float(extremes.times[at]))
 
     def note_way(self, course, pairs, integrator):
-        """Note what has met in `refweb.effects.contact.pair_overlap.PairOverlaps`, or what bounds the way in a step."""
+        """Record crossings, or bounds of the approach in a step, in ``pairs``, a `PairOverlaps`."""
         if integrator.knob != "safety":
             pairs.note_met(course.crossings[PAIRS])
         elif integrator.step_size is None:
@@ -402,5 +402,5 @@ class Watch:
             pairs.note_way(step=integrator.step_size, speed=speed)
 
     def _of_warning(self, name):
-        """Number of the probe of a warning, None where there is none."""
+        """Number of the probe of a warning, None if there is none."""
         return len(self._probed) + list(self._warned).index(name) if name in self._warned else None

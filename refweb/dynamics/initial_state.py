@@ -1,4 +1,4 @@
-"""States that dynamics starts from: the web as it is, its equilibrium, or the last state of another run."""
+"""Initial states of dynamics: the initial web, its equilibrium, or the last state of another run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..net.rigid_body import matrix_of, row_names
 from ..net.rotation import quaternion_of
 
 OFF = 1e-9
-"""Distance from its place at which a support is told of, over the size of the web."""
+"""Distance of a support from its position in the web, over the size of the web, that a finding reports."""
 
 
 class Start(NamedTuple):
@@ -22,11 +22,11 @@ class Start(NamedTuple):
     Attributes
     ----------
     x : ndarray, shape (rows, 3), optional
-        Displacement [m], None for the web as it is.
+        Displacement [m], None for the initial web.
     v : ndarray, shape (rows, 3), optional
         Velocity [m/s], None for those of the scene.
     broken : ndarray of int, optional
-        Elements that are broken, None where none are.
+        Broken elements, None if there are none.
     """
 
     x: np.ndarray | None = None
@@ -35,11 +35,11 @@ class Start(NamedTuple):
 
     @property
     def motion(self):
-        """(x, v), from which an integrator starts."""
+        """(x, v) at the start of an integrator."""
         return self.x, self.v
 
     def torn(self, system):
-        """The system as it is there: with what is broken."""
+        """The system with the broken elements of this state."""
         if self.broken is None:
             return system
         from ..system.broken_lines import torn
@@ -84,7 +84,7 @@ def remarks_on(start, system):
 def equilibrium(system, progress=None):
     """The `refweb.statics.equilibrium.Equilibrium` at t = 0 under gravity, loads, motion and fixed bodies.
 
-    Free bodies wait.
+    Free bodies do not act.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def equilibrium(system, progress=None):
 
 
 def checkpoint(folder, name, remedy=""):
-    """The arrays of the checkpoint in a result folder, by name; ``name`` begins the message that refuses it."""
+    """The arrays of the checkpoint in a result folder, by name; error messages begin with ``name``."""
     try:
         with np.load(folder / "checkpoint.npz") as archive:
             return {key: archive[key] for key in archive}
@@ -113,7 +113,7 @@ def checkpoint(folder, name, remedy=""):
 
 
 def record_of(arrays):
-    """Arrays by name as one array, a record with a field for each: a file takes some 0.05 ms for an array."""
+    """Arrays by name as one array, a record with a field for each, since a file takes some 0.05 ms for each array."""
     record = np.zeros((), [(name, array.dtype, array.shape) for name, array in arrays.items()])
     for name, array in arrays.items():
         record[name] = array
@@ -121,7 +121,7 @@ def record_of(arrays):
 
 
 def fields_of(record):
-    """The arrays that `record_of` was given; numbers as arrays of no dimension."""
+    """The arrays of a record of `record_of`; numbers are arrays without dimension."""
     return {name: np.array(record[name]) for name in record.dtype.names}
 
 
@@ -129,10 +129,10 @@ _STATE = ("positions", "displacements", "velocities", "bodies")
 
 
 def stored(system, folder):
-    """The `Start` that the checkpoint in a result folder holds, and that of its twin, None where there was none.
+    """The `Start` of the checkpoint in a result folder, and that of its step refinement (None if there was none).
 
-    Nodes are matched by number, bodies by name; a body that the folder does not have stays as its table says. Bodies
-    stand and turn as they did there, whatever axes their tables give them to begin with.
+    Nodes are matched by number, bodies by name; a body that is not in the folder starts as in its table. Orientations
+    and rotations of bodies are those of the checkpoint, for any axes in their tables.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def stored(system, folder):
 
 
 def _bearings(system, given, bodies, name):
-    """(axes, inertia, offset) that bodies which turn in space, here or there, began with in a checkpoint, by name."""
+    """(Axes, inertia, offset) of rotating bodies at the start of the run of a checkpoint, by name."""
     known, bearings = [str(body) for body in bodies], {}
     for body in system.net.bodies:
         spins = body.spin is not None and f"{body.name}.spin" in known
@@ -185,9 +185,10 @@ def _bearings(system, given, bodies, name):
 
 
 def _turn(body, bearing, rows, x, v):
-    """Write how a body stands and turns: its axes, the centre of its shape and their motion are those of another start.
+    """Write orientation and rotation of a body: axes, centre of the shape and their motion in another start.
 
-    ``rows`` has (displacement, velocity) of that one's rows of rotation; x and v of its own rows are those of its row.
+    ``rows`` has (displacement, velocity) of the rows of rotation of that start; x and v of the row of the body are set
+    already.
     """
     axes, inertia, offset = bearing
     (vector, spin), *last = rows
@@ -208,7 +209,7 @@ def _turn(body, bearing, rows, x, v):
 
 
 def _start_at(system, positions, displacements, velocities, bodies, bearings):
-    """The `Start` of a system at what a checkpoint has of nodes and, behind them, of bodies with their names."""
+    """The `Start` of a system from the nodes of a checkpoint and, after them, from the bodies with their names."""
     net, nodes = system.net, len(positions) - len(bodies)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     row = {str(body): nodes + i for i, body in enumerate(bodies)}

@@ -1,11 +1,11 @@
-"""``method = "auto"``: which dynamic method a scene is given to, and why.
+"""``method = "auto"``: choice of the dynamic method of a scene, with the reason.
 
-Links and nodes without mass leave IDA alone, curved elements and a consistent mass CVODE. For all else the question is
-whether anything asks for the short steps of an explicit method. Waves do, and contact, initial velocities and starts
-out of equilibrium make waves; then a compiled step, of 1e-6 s and 12e-9 s per element, is about a hundred times cheaper
-than one of CVODE. Where tables alone move a web from its equilibrium, BDF takes steps as long as the motion allows; so
-do Adams methods where damping ends the waves, and shortens explicit steps. CPU times for three digits of the
-displacement of the centre, from ``validation/methods/work_precision.py``:
+Links and nodes without mass need IDA; curved elements and a consistent mass need CVODE. All other scenes use an
+explicit method if the motion needs short steps. Waves need them; contact, initial velocities and starts out of
+equilibrium cause waves. A compiled step, of 1e-6 s and 12e-9 s per element, is then about a hundred times cheaper than
+a step of CVODE. If only tables move a web from its equilibrium, BDF takes steps as long as the motion allows. Adams
+methods do so if damping ends the waves and shortens explicit steps. CPU times for three digits of the displacement of
+the centre, from ``validation/methods/work_precision.py``:
 
 =========================================  ===================  =========  ===========  ========
 scene                                      central differences  CVODE BDF  CVODE Adams  IDA
@@ -30,26 +30,27 @@ from ..registry import INTEGRATORS, load
 from ..settings import Dynamic
 
 USUAL_DIGITS = 3
-"""Digits that are aimed at where a scene does not say."""
+"""Default number of digits."""
 DIGITS_OF_ORDER_6 = 5
 """Digits from which order 6 is cheaper than order 2."""
 DIGITS_OF_ADAMS = 8
-"""Digits from which Adams methods are cheaper than order 2, where order 6 does not take the forces: central differences
-take √10 times the steps for each, on webs whose load has a factor 0.01 s for 6 where Adams methods take 0.3 s for 9."""
+"""Digits from which Adams methods are cheaper than order 2, if order 6 does not take the forces. Central differences
+take √10 times the steps for each digit. On webs with a load that has a factor, they take 0.01 s for 6 digits; Adams
+methods take 0.3 s for 9 digits."""
 PER_STEP, PER_ELEMENT, PER_CELL = 1e-6, 12e-9, 8e-9
-"""CPU time of a compiled explicit step, of each element in it, and of each cell of what acts besides [s]."""
+"""CPU time of a compiled explicit step, of each element in it, and of each cell of other force terms [s]."""
 PER_TOUCH, PER_RUB = 5e-8, 3e-7
-"""CPU time of an element that touches a body in a step, and of one that rubs on it as well [s]."""
+"""CPU time of an element in contact with a body in a step, without and with friction [s]."""
 STEP_OF_CVODE = 100.0
-"""Explicit steps that cost as much as one of CVODE, which takes one at least to each corner of a table."""
+"""Explicit steps that cost as much as one step of CVODE, which takes at least one step to each corner of a table."""
 QUICK_RUN = 0.5
-"""CPU time of an explicit run [s] below which nothing is to be gained."""
+"""CPU time of an explicit run [s] below which no other method is tried."""
 DAMPED_BY = 5.0
-"""Factor by which damping makes explicit steps shorter, above which they are given up."""
+"""Factor by which damping shortens explicit steps, above which another method is used."""
 
 
 class Choice(NamedTuple):
-    """The `refweb.Dynamic` that stands for ``method = "auto"``, and the reason for it in words."""
+    """The `refweb.Dynamic` in place of ``method = "auto"``, and the reason as text."""
 
     solve: Dynamic
     reason: str
@@ -102,9 +103,9 @@ def _undamped(system):
 
 
 def step_price(system, touched=False):
-    """Estimate of the CPU time of an explicit step of one evaluation of forces [s]; ``touched``, where all is.
+    """Expected CPU time of an explicit step of one evaluation of forces [s]; ``touched`` if all elements have contact.
 
-    Where forces depend on velocity their step is iterated, the longer the more of its bound damping takes away.
+    If forces depend on velocity, a step is iterated; it takes more iterations if damping reduces the bound more.
     """
     others = sum(len(term.cells) for term in system.terms if not term.over_lines)
     price = PER_STEP + PER_ELEMENT * len(system.net.cells) + PER_CELL * others
@@ -121,12 +122,12 @@ def step_price(system, touched=False):
 
 
 def _damped(system, bound):
-    """Factor by which damping makes the bound of stability smaller."""
+    """Factor by which damping reduces the critical time step."""
     return _bound(_undamped(system)) / bound
 
 
 def given_to(scene, method, **keys):
-    """The `refweb.Dynamic` that gives a scene to a method, at a tolerance for its digits."""
+    """The `refweb.Dynamic` of a scene with a method, at a tolerance for its digits."""
     solve, keys = scene.solve, {"method": method, **keys}
     if INTEGRATORS[method].knob == "rtol":
         keys["rtol"] = max(10.0 ** -(_digits(scene) + 1), 1e-12)
@@ -142,5 +143,5 @@ def _bound(system):
 
 
 def _quiet(scene, system):
-    """Tell if no body, velocity or lack of equilibrium makes waves."""
+    """Tell if no body, velocity or lack of equilibrium causes waves."""
     return scene.solve.start == "equilibrium" and not system.contact and not system.initial_velocity().any()

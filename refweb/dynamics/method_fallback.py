@@ -1,4 +1,4 @@
-"""``method = "auto"`` tries other methods where the one that it chose cannot finish, before it gives up."""
+"""Fallback of ``method = "auto"``: other methods, if the chosen one cannot finish."""
 
 from __future__ import annotations
 
@@ -17,34 +17,35 @@ OTHERS = (
     {"method": "cvode", "family": "adams"},
     {"method": "ida"},
 )
-"""What is tried in turn: the cheapest steps, then methods that choose steps by their error, the most robust first."""
+"""Methods that are tried in turn: the cheapest steps first, then methods that control their error, the most robust
+first."""
 
 
 class Refusal(NamedTuple):
-    """A method that could not finish a scene, and why."""
+    """A method that could not finish a scene, and the reason."""
 
     method: str
     why: str
 
 
 class MethodFallback:
-    """The methods that a scene of ``method = "auto"`` is given to, one after another.
+    """The methods that solve a scene of ``method = "auto"``, one after another.
 
     Parameters
     ----------
     scene : refweb.Scene
-        As it is asked for.
+        The scene as given.
     system : refweb.system.system.System
-        What acts.
+        The system.
     kept : dict of str to ndarray, optional
-        Checkpoint of a run that goes on, by the method that it had come to.
+        Checkpoint of a run that continues, with its method.
 
     Attributes
     ----------
     refused : list of Refusal
-        Methods that could not finish it.
+        Methods that could not finish the scene.
     choice : refweb.dynamics.method_choice.Choice
-        The one it is given to.
+        The present method.
     """
 
     def __init__(self, scene, system, kept=None):
@@ -58,7 +59,7 @@ class MethodFallback:
 
     @property
     def scene(self):
-        """The scene with the method it is given to."""
+        """The scene with the present method."""
         return self._scene.replace(solve=self.choice.solve)
 
     def record(self):
@@ -67,22 +68,22 @@ class MethodFallback:
         return {"choice": self.choice.reason, **refused}
 
     def arrays(self):
-        """Arrays that a checkpoint keeps."""
+        """Arrays for a checkpoint."""
         methods, why = ([refusal[i] for refusal in self.refused] for i in range(2))
         return {"refused_methods": np.array(methods, dtype=str), "refused_why": np.array(why, dtype=str)}
 
     def give_over(self, error):
-        """Give the scene to the next method that takes it, where one could not finish; in words.
+        """Change to the next method that takes the scene, after an error; return a text on it.
 
         Parameters
         ----------
         error : refweb.errors.IntegrationError
-            Why it did not.
+            Error of the method that could not finish.
 
         Raises
         ------
         SolverError
-            Where there is none: with the reasons of all.
+            If there is no further method, with the reasons of all.
         """
         self.refused.append(Refusal(name_of(self.choice.solve), str(error)))
         choice = self._next()
@@ -96,7 +97,7 @@ class MethodFallback:
         return f'method = "auto": {last.method} cannot finish, {name_of(choice.solve)} takes over; {last.why}'
 
     def _next(self):
-        """The `Choice` of the first of `OTHERS` that is untried and takes the scene; None where there is none."""
+        """The `Choice` of the first untried method of `OTHERS` that takes the scene; None if there is none."""
         tried = [refusal.method for refusal in self.refused]
         for keys in OTHERS:
             solve = given_to(self._scene, **keys)
@@ -114,5 +115,5 @@ class MethodFallback:
 
 
 def name_of(solve):
-    """Name of a method, with that of its family where it has several: ``cvode adams``."""
+    """Name of a method, with that of its family if it has several: ``cvode adams``."""
     return f"{solve.method} {solve.family}" if solve.family else solve.method

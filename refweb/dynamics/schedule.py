@@ -12,14 +12,16 @@ if TYPE_CHECKING:
     from .integrators.integrator import History
 
 BLOCK = 0.1
-"""Time that a block of rows is meant to take [s]: between two of them a run can be interrupted, and tells where it is.
+"""Time that a block of rows should take [s]: between two blocks a run can be interrupted and reports its progress.
 """
 FEW_CORNERS = 20
-"""Corners of tables of which nothing is told: they cost next to nothing."""
+"""Number of corners of tables up to which nothing is reported, since they cost little."""
 FEW, COMPARED = 10, 20
-"""Number of rows below which a run and its twin are compared between rows as well, and at about how many times then."""
+"""Number of rows below which run and step refinement are compared between rows as well; approximate number of times for
+this comparison."""
 ROW, ROW_CELL, FRAME, FRAME_CELL = 1e-5, 1e-8, 2e-3, 1e-6
-"""CPU time of a row and of a frame, and of each with every element [s], measured on nets of 1 and 5165 elements."""
+"""CPU time of a row, of a row per element, of a frame, and of a frame per element [s], by nets of 1 and 5165
+elements."""
 MOST_ROWS = 10_000
 """Largest number of rows of a block."""
 
@@ -32,10 +34,10 @@ class Schedule(NamedTuple):
     times : ndarray, shape (rows,)
         Times of the history rows [s].
     frames : ndarray of int
-        Numbers of the rows that frames are written at, the last row at least.
+        Numbers of the rows with frames; at least the last row.
     between : ndarray
-        Times between rows at which a run is compared with its twin [s]; none where rows are many. Steps end there
-        whether there is a twin or not: errors do not change the run.
+        Times between rows at which a run is compared with its step refinement [s]; empty if there are many rows. Steps
+        end there in any case, so that the comparison does not change the run.
     """
 
     times: np.ndarray
@@ -51,7 +53,7 @@ class Schedule(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Numbers of what a run writes and computes at rows."""
+    """Numbers of rows and frames of a run."""
 
     rows: int
     frames: int
@@ -59,7 +61,7 @@ class Counts(NamedTuple):
 
     @classmethod
     def of(cls, scene):
-        """Count history rows, frames, and rows of the step-refinement run, which has as many or none."""
+        """Count history rows, frames, and rows of the step-refinement run, which has equally many or none."""
         interval, duration = scene.output.interval, scene.solve.duration
         whole_rows = int(math.floor(duration / interval * (1.0 + 1e-12)))
         rows = whole_rows + 1 + (duration - whole_rows * interval > 1e-9 * interval)
@@ -67,7 +69,7 @@ class Counts(NamedTuple):
         return cls(rows, frames, rows if scene.accuracy.error == "twin" else 0)
 
     def text(self, scene):
-        """The counts in words, with the time between."""
+        """The counts as text, with the output interval."""
         interval, every = scene.output.interval, scene.output.frames
         text = f"{self.rows} rows, one each {interval:.6g} s; {self.frames} frames, one each {every * interval:.6g} s"
         return text + (f"; {self.refined_rows} rows of the step-refinement run" if self.refined_rows else "")
@@ -95,23 +97,23 @@ def time_of(t, end):
 
 
 def times_between(times):
-    """Times that cut rows which are fewer than `FEW` into about `COMPARED` parts [s], equal in each row."""
+    """Times that divide the intervals of fewer than `FEW` rows into about `COMPARED` equal parts [s]."""
     parts = -(-COMPARED // max(len(times) - 1, 1)) if len(times) <= FEW else 1
     shares = np.arange(1, parts) / parts
     return (times[:-1, None] + shares * np.diff(times)[:, None]).ravel()
 
 
 class Block(NamedTuple):
-    """Rows that an integrator has come through at once.
+    """Rows of one call of an integrator.
 
     Attributes
     ----------
     first : int
         Number of the first row.
     history : refweb.dynamics.integrators.integrator.History
-        All of them.
+        All rows of the block.
     compared : refweb.dynamics.integrators.integrator.History
-        The same and, where rows are few, what lies between them.
+        The same rows and, if rows are few, the times between them.
     """
 
     first: int
@@ -120,18 +122,18 @@ class Block(NamedTuple):
 
 
 def blocks(integrator, course, schedule, first=0):
-    """Advance through the times of a schedule in blocks that last about `BLOCK` and end at each of its frames.
+    """Advance through the times of a schedule in blocks of about `BLOCK` seconds, which end at each frame.
 
     Parameters
     ----------
     integrator : refweb.dynamics.integrators.integrator.Integrator
-        What advances.
+        The integrator.
     course : refweb.dynamics.integrators.integrator.IntegratorState
         The state of its run.
     schedule : Schedule
-        Where to.
+        Times of rows and frames.
     first : int
-        Number of the first row ahead.
+        Number of the next row.
 
     Yields
     ------
@@ -141,7 +143,7 @@ def blocks(integrator, course, schedule, first=0):
     Raises
     ------
     OpenBook
-        At the end, for a run whose energy drift exceeds its limit.
+        At the end, if the energy drift of the run exceeds its limit.
     """
     times, size = schedule.times, 1
     while first < len(times):

@@ -1,4 +1,4 @@
-"""A scene through time: from its start through rows and frames to results, with checkpoints to go on from."""
+"""Dynamic run of a scene: from its start through rows and frames to results, with checkpoints."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ NO_TWIN = (
 
 
 class RunResult(NamedTuple):
-    """A run at its end: results by name, without errors, what they owe to looks between steps, and the course.
+    """A complete run: results by name, without errors, corrections between steps, and the course.
 
-    Stress over its limits has the same, ``shares`` and ``share_corrections``, see `refweb.dynamics.history.Watch`.
+    ``shares`` and ``share_corrections`` are those of stress over its limits, see `refweb.dynamics.history.Watch`.
     """
 
     results: dict[str, Result]
@@ -41,40 +41,40 @@ class RunResult(NamedTuple):
 
 
 class Simulation:
-    """Takes a dynamic scene through time: history rows, peaks, frames, errors.
+    """Runs a dynamic scene: history rows, peaks, frames, errors.
 
     Parameters
     ----------
     scene : refweb.Scene
-        What is observed, how often, and how it is solved.
+        Scene with observables, output and method.
     system : refweb.system.system.System
-        What acts.
+        The system.
     solution : refweb.Solution
-        What is filled in.
+        Solution that is filled in.
     kept : dict of str to ndarray, optional
-        Checkpoint of a run that goes on.
+        Checkpoint of a run that continues.
 
     Attributes
     ----------
     watch : refweb.dynamics.history.Watch
-        What the integrator looks at.
+        Monitors of the integrator.
     schedule : refweb.dynamics.schedule.Schedule
-        When.
+        Times of rows and frames.
     integrator : refweb.dynamics.integrators.integrator.Integrator
-        What takes the system through time.
+        Integrator of the run.
     begin : refweb.dynamics.initial_state.Start
-        Where from; that of an equilibrium is known when the run has begun.
+        Initial state; an equilibrium is known after the start of the run.
     begin_of_twin : refweb.dynamics.initial_state.Start, optional
-        Where its twin begins, if that is elsewhere: where the twin of the run ended that this one starts from.
+        Initial state of the step refinement, if it differs: the end of the step refinement of an earlier run.
     standing : refweb.dynamics.accuracy_loop.Standing
-        How accurate runs are, and how often they were repeated.
+        Present accuracy, and number of repeated runs.
     budget : refweb.dynamics.budget.Budget
-        What they may cost.
+        Budget of all runs.
 
     Raises
     ------
     InputError
-        For what the method cannot take.
+        If the method cannot solve the scene.
     """
 
     def __init__(self, scene, system, solution, kept=None):
@@ -117,33 +117,33 @@ class Simulation:
 
     @property
     def done(self):
-        """Text that says how far the run came."""
+        """Text of the time that the run has reached."""
         return f"t = {self._tables[-1][-1, 0] if self._tables else 0.0:.6g} s"
 
     def price(self, share):
-        """CPU time that errors take which are to fall by a factor ``share`` [s], see `refweb.dynamics.budget`."""
+        """Expected CPU time for errors that are smaller by a factor ``share`` [s], see `refweb.dynamics.budget`."""
         return self.budget.price_of(self.integrator, share, CLIMBS)
 
     @property
     def rows(self):
-        """Rows of ``history.csv``, shape (rows, columns); where a folder has them the last one alone."""
+        """Rows of ``history.csv``, shape (rows, columns); only the last one if a folder has them."""
         return np.concatenate(self._tables) if self._tables else np.zeros((0, len(self.columns)))
 
     def integrator_at(self, knob):
-        """The integrator that the scene asks for, at a value of its knob."""
+        """The integrator of the scene, at a value of its knob."""
         method, solve, watch = INTEGRATORS[self.scene.solve.method], self.scene.solve, self.watch
         looked_at = watch.probes, watch.sums, watch.events
         return method.integrator_of(solve, self.system, *looked_at, **{method.knob: knob})
 
     def follow(self, folder, tell):
-        """Run from start to end, as often as it takes.
+        """Run from start to end, as often as needed.
 
         Parameters
         ----------
         folder : refweb.results.folder.Folder or None
-            Where rows and frames are written as they come.
+            Folder to which rows and frames are written during the run.
         tell : callable
-            Called with a text and the share that is done.
+            Called with a text and the finished share.
         """
         if self.scene.solve.start == "equilibrium" and self._kept is None:
             self._settle(tell)
@@ -160,20 +160,20 @@ class Simulation:
                 break
 
     def _stand(self, kept=None):
-        """Stand at the beginning of a method, or where a checkpoint has it."""
+        """Set the state at the start of a method, or at a checkpoint."""
         solve = self.scene.solve
         self.standing = AccuracyState.of(getattr(solve, INTEGRATORS[solve.method].knob), kept)
         self.budget = Budget(self.scene.accuracy.budget)
 
     def _fall_back(self, ways, error, folder):
-        """Forget what was computed, and begin with another method; `SolverError` where there is none."""
+        """Discard the run and start with another method; raise a `SolverError` if there is none."""
         self.solution.findings.append(Finding("method-changed", ways.give_over(error), "solve", NOTE))
         self.scene, self.solution.reduced, self.solution.solver = ways.scene, {}, dict(SOLVER)
         self._stand()
         self.again(folder)
 
     def _settle(self, tell):
-        """Begin at the equilibrium."""
+        """Set the equilibrium as initial state."""
         from ..statics.remarks import on_stability, remark_on_open
         from ..system.static_system import waiting
 
@@ -237,7 +237,7 @@ class Simulation:
         return RunResult(self.watch.results(course, self._tables[-1][-1]), corrections, course, *shares)
 
     def compared(self, folder):
-        """Rows that are compared with those of a twin, see `refweb.dynamics.history.Watch.compared`."""
+        """Rows for the comparison with a step refinement, see `refweb.dynamics.history.Watch.compared`."""
         if len(self.schedule.between):
             return np.array(self._compared)
         return self.watch.compared(self.rows if folder is None else folder.rows())
@@ -248,7 +248,7 @@ class Simulation:
         return np.concatenate(self._share_rows)
 
     def again(self, folder):
-        """Forget what was computed, for a run at another value of the knob, that of ``standing``."""
+        """Discard the run, for a run with the knob of ``standing``."""
         self.integrator, self._tables, self._compared = self.integrator_at(self.standing.knob), [], []
         self._share_rows = []
         self.overlaps, self._lines = _overlaps_of(self.scene, self.system), None
@@ -259,7 +259,7 @@ class Simulation:
             folder.restart(self.solution.summary())
 
     def _set_off(self, folder):
-        """The course at its start, or where its checkpoint has it, and the number of the row ahead."""
+        """The course at its start, or at its checkpoint, and the number of the next row."""
         if self._kept is None:
             return self.integrator.start(*self.begin.motion), 0
         course, row = self.integrator.load(fields_of(self._kept["run"])), int(self._kept["row"])
@@ -273,7 +273,7 @@ class Simulation:
         return course, len(times) if course.stopped else row + 1
 
     def _refuse_overlap(self, course):
-        """Refuse lines that are deeper in bodies than they may be, see `refweb.effects.contact.overlap.Deepest`."""
+        """Refuse lines that are too deep in bodies, see `refweb.effects.contact.overlap.Deepest`."""
         if self.overlaps is not None:
             self.watch.note_overlaps(course, self.overlaps)
             self.overlaps.refuse()
@@ -288,7 +288,7 @@ class Simulation:
             self._lines.refuse(overlap, f"t = {time:.6g} s", cell, course.v)
 
     def _unfollowed(self):
-        """Reason why contacts of lines with lines are not followed, None where they are."""
+        """Reason why lines are not checked against lines, None if they are checked."""
         method = self.scene.solve.method
         if not getattr(self.integrator, "follows_lines", False):
             return f"{method} does not follow lines in its steps"
@@ -297,7 +297,7 @@ class Simulation:
         return None
 
     def _record(self, course):
-        """Take the state of a run over into the solution."""
+        """Record the state of a run in the solution."""
         solution, watch = self.solution, self.watch
         self._largest_stress, self._unfilled = watch.largest_stress(course), watch.unfilled(course)
         if (used := watch.utilisation(course)) is not None:
@@ -330,12 +330,12 @@ class Simulation:
         solution.solver["slack_nodes"] = len(solution.state.slack_nodes) if solution.state else None
 
     def _state(self, course):
-        """The state of a course, which stays as it is."""
+        """The state of a course, as a copy."""
         state = self.watch.state(course)
         return State(state.system, state.time, state.x.copy(), state.v.copy())
 
     def _frame(self, number, folder, course):
-        """Keep a state, in the folder with a checkpoint."""
+        """Keep a state; in a folder, with a checkpoint."""
         state = self._state(course)
         if folder is None:
             self.solution.frames.append((number, state))
@@ -374,7 +374,7 @@ class Simulation:
         yield from self._unseen()
 
     def _unseen(self):
-        """Remarks on thresholds that no step ends behind, though the extreme of their observable lies there."""
+        """Findings on thresholds that the extreme of an observable has passed between steps only."""
         names = [o.name for o in self.scene.observables]
         for event, entry in zip(self.scene.event, self.solution.events, strict=True):
             if entry["time"] is None and (result := self.solution.reduced.get(event.observe)) is not None:
@@ -421,7 +421,7 @@ def _silent_of(system):
 
 
 def _check_step(scene):
-    """Refuse a fixed step of which a row takes too many."""
+    """Refuse a fixed step with too many steps in a row."""
     step, row = scene.solve.step_size, min(scene.output.interval, scene.solve.duration)
     if step is not None and row > MAX_STEPS_PER_ROW * step:
         shortest = row / MAX_STEPS_PER_ROW

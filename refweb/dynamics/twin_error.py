@@ -1,7 +1,7 @@
-"""± of dynamic results from a twin: a second run of a smaller error, beside the first or after it.
+"""± of dynamic results from a step-refinement run, or twin: a second run with a smaller error.
 
-What differs between the two, times what the order of the method makes of that and `SPREAD`, is the error of results and
-of the times of events.
+The error of results and of the times of events is the difference of both runs, times a factor by the order of the
+method, times `SPREAD`. The second run takes place beside the first or after it.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ PAUSE = 0.2
 """Time between two looks at a twin that is waited for [s]."""
 
 MOST_CHANCE, TELLING = 10.0, 0.3
-"""Most that differences which agree by chance are multiplied by, and the error of energy in a part of the time, over
-that of the largest part, at which that part tells of chance."""
+"""Largest factor on differences that are small by chance; least error of energy in a part of the time, over that of the
+largest part, at which this part counts for the factor."""
 ROUNDING = 1e-12
 """Error of energy that rounding may leave, over the largest energy of a run."""
 
 
 class TwinRun(NamedTuple):
-    """Outcome of a step refinement.
+    """Outcome of a step-refinement run.
 
     Attributes
     ----------
     results : dict of str to refweb.results.solution.Result
-        By name, without errors.
+        Results by name, without errors.
     course : refweb.dynamics.integrators.integrator.IntegratorState
-        Its end.
+        State at the end.
     rows : ndarray, shape (rows, columns)
         See `refweb.dynamics.history.Watch.compared`.
     shares : dict of str to refweb.results.solution.Result
@@ -56,20 +56,20 @@ class TwinRun(NamedTuple):
 
 
 class Twin:
-    """A run of a smaller error than that of the integrator of a simulation.
+    """A run with a smaller error than that of the integrator of a simulation.
 
-    Within a ``with`` block it goes on in a thread of its own, where the integrator's loop needs no interpreter, and
-    ends with the block at the latest; else it runs when it is asked for.
+    Within a ``with`` block it runs in a separate thread if the integrator's loop needs no interpreter, and it ends with
+    the block at the latest. Else it runs when its outcome is requested.
 
     Parameters
     ----------
     simulation : refweb.dynamics.simulation.Simulation
-        What it is the twin of.
+        Simulation of the first run.
 
     Attributes
     ----------
     failure : Exception, optional
-        Why it has not come to its end.
+        Error that ended the run.
     """
 
     def __init__(self, simulation):
@@ -139,7 +139,7 @@ class Twin:
 
 
 def _parts(times, end):
-    """Times in each part of that to ``end``: from ½ to end, from ¼ to ½, from ⅛ to ¼, from 0 to ⅛."""
+    """Masks of the times in each part of the time to ``end``: from ½ to 1, from ¼ to ½, from ⅛ to ¼, from 0 to ⅛."""
     starts = (0.5, 0.25, 0.125, 0.0)
     for start, until in zip(starts, (1.0, *starts[:-1]), strict=False):
         near = (times >= start * end) & (times <= until * end)
@@ -153,23 +153,23 @@ def _mean(values):
 
 
 def largest_mean(times, apart, end):
-    """Largest root mean square of differences, of those of all parts of the time to ``end``."""
+    """Largest root mean square of differences over the parts of the time to ``end``."""
     return max((_mean(apart[near]) for near in _parts(times, end)), default=0.0)
 
 
 def _of_chance(times, off, apart, end, order, floor):
-    """Factor by which differences are too small, by that of energy, whose error is known: 1 to `MOST_CHANCE`.
+    """Factor by which differences are too small, from 1 to `MOST_CHANCE`, by the known error of energy.
 
     Parameters
     ----------
     times : ndarray
-        Of rows [s].
+        Times of rows [s].
     off, apart : ndarray
-        Error of the balance of energy at these [J], and difference of the two runs.
+        Error of the energy balance at these times [J], and difference of both runs in it.
     end, order : float
         Time of the result [s], and the error over the difference.
     floor : float
-        What is left of the balance by rounding [J].
+        Error of the balance by rounding [J].
     """
     means = [(_mean(off[near]), _mean(apart[near])) for near in _parts(times, end)]
     floor = max(floor, TELLING * max((mean for mean, _ in means), default=0.0))
@@ -178,47 +178,47 @@ def _of_chance(times, off, apart, end, order, floor):
 
 
 def with_errors(results, floors, twin, kept_rows, rows_refined, order=2.0, drifts=None, energy=0.0):
-    """Results with ± from what differs in a run of a smaller error, times ``order`` and `SPREAD`.
+    """Results with ±: the difference from a run with a smaller error, times ``order`` and `SPREAD`.
 
-    Two runs may agree by chance on a peak, or at the end, where the motion differs otherwise. What counts is the larger
-    of the difference of the result and the mean one, root mean square, of the observable at the times before: in half
-    the time up to the result, or in half of what is left, wherever it is largest. Central differences are of order 2: a
-    run of √2 times the steps has half the error, so that the error is twice the difference where that order holds
-    (``order`` is that factor for the steps really taken). The error of CVODE and IDA goes with the tolerance to the
-    power 2/3 at order 2, and faster at higher ones. Higher orders count as 2 here: peaks, contact and slack lines leave
-    no more of them, for which the threefold is taken as well. Extremes between steps and absolute tolerances have a
-    ``floors`` of their own.
+    Two runs may agree by chance on a peak, or at the end, although the motions differ. Therefore ± uses the larger of
+    the difference of the result and the largest mean difference of the observable before it. Means are root mean
+    squares over the second half of the time up to the result, over the second half of the time before that, and so on.
+    Central differences are of order 2: a run with √2 times the steps has half the error, so that the error is twice the
+    difference (``order`` is this factor for the actual steps). The error of CVODE and IDA is proportional to the
+    tolerance to the power 2/3 at order 2, and falls faster at higher orders. Higher orders count as 2, since peaks,
+    contact and slack lines reduce them; `SPREAD` covers this as well. Extremes between steps and absolute tolerances
+    have lower limits of ±, ``floors``.
 
-    A kink of the force, where a body touches or a line snaps taut, costs each run what depends on where in a step it
-    lies. Two runs may have it alike, and then they agree on all that comes of it: one chance difference runs through
-    all rows. But their energy is off by the same, and of energy the error is known: it stays what it is. Where that is
-    larger than ``order`` times the difference in energy, in one of the parts of time before, ± of all results is larger
-    by as much. Velocities may differ, and the place of a body that has just been touched be the same by chance: its
-    error is at least what they make of it in half of the last row (``drifts``).
+    A kink of the force, at a first contact or when a line snaps taut, causes an error that depends on its position
+    within a step. This error may be similar in two runs by chance, and then all later rows agree too well. The energy
+    balance has the same error, and its error is known, since it must be constant. If it is larger than ``order`` times
+    the difference of both balances, in one of the parts of the time before, ± of all results is increased by this
+    factor. The position of a body after a first contact may agree by chance although velocities differ. Its error is at
+    least the difference of velocities times half of the last row interval (``drifts``).
 
-    By the twin alone 7 of 7452 results of 207 random impacts are off by more than three times ±, with both of these
-    and ``floors`` none; of 1992 results of explicit steps of 83 more impacts 5 and 1: the speed of a web that is first
-    touched in the last row, 3.4 times. What else was tried: by energy in all the time to
-    the result at once a first touch that agrees is hidden by what comes later (3.05 times ±); the largest ratio of all
-    times from the start on has more misses, and a wider ±. A third run of 1.75 times the steps leaves nothing off by
-    more than 1.4 times ±, but costs 1.7 times as much; with 1.2 times the steps it costs 1.5 times, and the median of ±
-    over what is off rises to 12. A bound from the jump of the force's rate needs the speed of each touch, which a
-    compiled loop would have to note in every step. How often ± contains the truth is counted by ``python -m validation
-    coverage``.
+    Of 7452 results of 207 random impacts, 7 have an error above three times ± by the difference alone, and none with
+    the factor of energy, ``drifts`` and ``floors``. Of 1992 results of explicit steps of 83 more impacts the numbers
+    are 5 and 1: the speed of a web with its first contact in the last row, 3.4 times ±. ``python -m validation
+    coverage`` counts how often ± contains the true value. Alternatives are worse. The mean error of energy over all the
+    time to the result hides a first contact that agrees (3.05 times ±). The largest ratio of all times from the start
+    has more misses and a wider ±. With a third run of 1.75 times the steps no error is above 1.4 times ±, but it costs
+    1.7 times as much. With 1.2 times the steps it costs 1.5 times, and the median of ± over the error rises to 12. A
+    bound by the jump of the rate of the force needs the speed of each contact, which a compiled loop would have to
+    record in every step.
 
     Parameters
     ----------
     results, twin : dict of str to refweb.results.solution.Result
-        Of either run.
+        Results of both runs.
     floors : dict of str to float
-        What ± is at least.
+        Lower limits of ±.
     rows_run, rows_refined : ndarray, shape (rows, columns)
-        Rows of either history, see `refweb.dynamics.history.Watch.compared`. Those of equal times are compared: the
-        last ones differ where an event ends either run.
+        Rows of both histories, see `refweb.dynamics.history.Watch.compared`. Rows of equal times are compared; the last
+        times differ if an event ends a run.
     order : float
-        The error over the difference.
+        Error over the difference.
     drifts : dict of str to float, optional
-        Least difference of places at the end, see `refweb.dynamics.history.Watch.drifts`.
+        Least difference of positions at the end, see `refweb.dynamics.history.Watch.drifts`.
     energy : float
         Largest energy of the run [J].
     """
@@ -243,18 +243,18 @@ def add_errors(simulation, run, twin, rows):
     Parameters
     ----------
     simulation : refweb.dynamics.simulation.Simulation
-        At its end.
+        Simulation at its end.
     run : refweb.dynamics.simulation.Ended
-        What its results are made of.
+        Outcome of the run.
     twin : TwinRun
-        What came of its twin.
+        Outcome of its step refinement.
     rows : ndarray, shape (rows, columns)
         Rows of its history, see `refweb.dynamics.history.Watch.compared`.
 
     Returns
     -------
     float
-        Time from which on the twin tells nothing of the run [s].
+        Time after which the step refinement shows no error of the run [s].
     """
     solution = simulation.solution
     first_run, refined = run.course, twin.course
@@ -286,7 +286,7 @@ def add_errors(simulation, run, twin, rows):
 
 
 def _add_errors_of_shares(simulation, run, twin, rows, factor, known):
-    """Add ± to the utilisation and the margin of safety of a solution, as far as these are before a ``known`` time."""
+    """Add ± to the utilisation and the margin of safety of a solution, if these are before a ``known`` time."""
     solution, largest = simulation.solution, run.course.largest
     tables = (rows, simulation.share_rows), (twin.rows, twin.share_rows)
     kept, refined = (np.column_stack([table[:, 0], shares, table[:, -1]]) for table, shares in tables)
@@ -304,9 +304,9 @@ def _add_errors_of_shares(simulation, run, twin, rows, factor, known):
 
 
 def _add_lateness(results, events, rows):
-    """Add to ± of results at the end what they change in that of the time of the event there.
+    """Add to ± of results at the end their change within ± of the time of the event that ended the run.
 
-    ``rows`` are the last two, of time and of the results in their order.
+    ``rows`` are the last two rows, with time and the results in their order.
     """
     before, last = rows
     late = max((event["error"] or 0.0 for event in events if event["time"] == last[0]), default=0.0)

@@ -73,22 +73,22 @@ An entry point makes it known to scenes, messages, help and all methods; in ``py
 
 In a script or a notebook ``refweb.register("effect", "current", Current)`` does the same.
 
-A scene then has as many of it as it likes, ``several``, as tables of a list; without that line there is one,
-``[current]``::
+A scene may have several of it, as tables of a list; without the line ``several`` it has one, ``[current]``::
 
     [[current]]
     lines = "all"
     current = 20.0
     field = [0.0, 0.0, 0.5]
 
-Kernels of forces work with numbers and tuples: an array that is made in a loop takes fifty times as long as what is
-computed with it. ``x`` in a kernel is the displacement of all rows and ``net.points`` their reference; ``cells`` are
-the rows that each cell couples, ``data`` its numbers. A kernel adds to ``f`` and to ``rates``, and writes ``blocks``
-and ``out``, both of which hold what was there before; signatures are in `refweb.kernels`.
+Kernels of forces work with numbers and tuples: an array that is made in a loop takes fifty times as long as the
+computation with it. ``x`` in a kernel is the displacement of all rows, and ``net.points`` are their reference
+positions. ``cells`` are the rows that each cell couples, and ``data`` its numbers. A kernel adds to ``f`` and to
+``rates``. It must write all of ``blocks`` and ``out``, which contain old values before. Signatures are in
+`refweb.kernels`.
 
-Nodes are found by ``net.web.find(self.node)``, lines by ``net.web.find_lines(self.lines)``; ``net.find`` has the nodes
-that order and subdivision add in "all" as well. `refweb.effects.base.column` makes cells of one row each. A field reads
-and checks its value: ``real(above=0.0, unit="N/m")``; the others are in `refweb.tables`.
+``net.web.find(self.node)`` finds nodes, and ``net.web.find_lines(self.lines)`` finds lines. For "all", ``net.find``
+also finds the nodes that order and subdivision add. `refweb.effects.base.column` makes cells of one row each. A field
+reads and checks its value, as ``real(above=0.0, unit="N/m")`` does; the others are in `refweb.tables`.
 
 A force with a potential has ``energy=energy`` and ``Balance("spring_energy")`` instead of a power: that name heads a
 column of ``history.csv`` and counts in the total energy. It is observed once it has a
@@ -96,9 +96,9 @@ column of ``history.csv`` and counts in the total energy. It is observed once it
 stable, not accurate: something stiff may need a smaller ``safety``. ``definite`` asks for a part of the stiffness that
 is positive semidefinite, such as none.
 
-The balance of momentum integrates the force of an effect along the steps, which only tells whether a method gives what
-it has. It sees what steps miss where ``impulse=impulse`` of `Balance` brings ∫F dt as a kernel, and nothing of what is
-``internal``.
+The momentum balance integrates the force of an effect along the steps, which only checks that a method applies its
+forces. With ``impulse=impulse`` of `Balance`, a kernel of ∫F dt, it also finds impulses that steps miss. Forces that
+are ``internal`` do not count.
 
 A load with a factor over time is made by `refweb.effects.outer_load`; what changes natural lengths, by
 `refweb.effects.natural_lengths`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which

@@ -1,8 +1,8 @@
-"""Nodes of the web that are tied to a point of a body.
+"""Nodes of the web that are attached to a point of a body.
 
-A node that a free body carries is no unknown: it is where the body takes it, at the arm a from the centre of mass, and
-has the velocity v + ω × a. What acts on it acts on the body, as a force f and the moment a × f. Its mass m is the
-body's: the centre of mass of both moves by s, and the tensor of inertia about it is
+A node that is attached to a free body is no unknown. It moves with the body, at the arm a from the centre of mass, with
+the velocity v + ω × a. A force f on it acts on the body, as the force f and the moment a × f. Its mass m is added to
+the body: the centre of mass of both moves by s, and the tensor of inertia about it is
 
     J + M (|s|² 1 − s⊗s) + Σ m (|a|² 1 − a⊗a),
 
@@ -32,7 +32,7 @@ def hold(t, x, v, f, cells, data, out):
 
 @table
 class Attach(Table):
-    """Nodes of the web tied to a body, which pull at it and go with it, and are free to turn there.
+    """Nodes of the web that are attached to a body, with lines that are free to turn there.
 
     Their mass is the body's, whose row is the centre of mass of all: position and velocity that are observed are those
     of this; a body that ``[[motion]]`` moves has none, and its nodes neither. A sphere turns in space where it has
@@ -47,15 +47,15 @@ class Attach(Table):
     node : int, str or list
         Nodes, by number or name.
     point : sequence of 3 float, optional
-        Where on the body they are, along its axes from its position [m]; by default where each stands in the web's
-        position. Lines keep the natural length that the web's position gives them.
+        Point on the body of all these nodes, along its axes from its position [m]; by default the position of each node
+        in the web. Natural lengths of lines stay those of the positions in the web.
 
     Raises
     ------
     InputError
-        From ``extend``, for a node or a body that there is not, a ring that is free, which keeps its plane, and a node
-        that a body has already; in a scene, for a node that is supported, moved or linked as well, a free body
-        with nodes and a consistent mass, and for friction of lines on each other there by "central-difference".
+        From ``extend``, for an unknown node or body, a free ring, which keeps its plane, and a node that is attached
+        twice. In a scene, for a node that is also supported, moved or linked, for a free body with nodes and a
+        consistent mass, and for friction of lines on each other there by "central-difference".
 
     Examples
     --------
@@ -76,7 +76,7 @@ class Attach(Table):
     point: Several = vector(default=None, unit="m")
 
     def extend(self, net):
-        """The net with the nodes on the body."""
+        """The net with the nodes attached to the body."""
         names = [body.name for body in net.bodies]
         if self.body not in names:
             raise InputError(f"body = {quote(self.body)} is not a [[body]], {nearest(self.body, names)}")
@@ -107,7 +107,7 @@ class Attach(Table):
         return replace(net, mass=mass, points=places, bodies=tuple(bodies))
 
     def on(self, net):
-        """The nodes on a fixed body as supports; of a free one there is nothing to add."""
+        """The nodes on a fixed body as supports; nothing for a free body."""
         body = next(body for body in net.bodies if body.name == self.body)
         carried = np.isin(body.carried, net.web.find(self.node))
         if not body.fixed:
@@ -119,7 +119,7 @@ class Attach(Table):
 
 
 def _joined(body, mass, added):
-    """(by how much the centre of mass moves, the body with masses at the last of its points)."""
+    """(Displacement of the centre of mass, the body with masses at the last of its points)."""
     last = body.points[len(body.points) - len(added) :]
     shift = added @ last / (mass + added.sum())
     inertia = body.inertia + mass * _about(shift) + sum(m * _about(p - shift) for m, p in zip(added, last, strict=True))

@@ -1,18 +1,18 @@
-"""Effects: what acts on a net, one file each.
+"""Effects: forces and other changes of a net, one file each.
 
-An effect is a frozen value that holds physical numbers only. It has one or more of these methods, touches no global
+An effect is a frozen value that has physical numbers only. It has one or more of the methods below. It uses no global
 matrix and knows no other effect.
 
 ``on(net)``
-    A `ForceTerm`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
-    `PrescribedMotion`, a `Constraint` or a `BreakLimits`.
+    Returns a `ForceTerm`, which has cells with their numbers and compiled kernels for force, energy and stiffness; or a
+    list of them; or a `PrescribedMotion`, a `Constraint` or a `BreakLimits`.
 ``extend(net)``
-    The `refweb.net.net.Net` with more rows, mass or columns of numbers of its lines; comes before any ``on``, of what
-    has no ``on`` first.
+    Returns the `refweb.net.net.Net` with more rows, mass or columns of line data. It is called before any ``on``;
+    effects without ``on`` come first.
 ``start(net, supported, v)``
-    Writes initial velocities; the points of this net are where the start has them.
+    Writes initial velocities; the points of this net are the positions at the start.
 ``lay(net, supported)``
-    The displacement of all rows that a run starts from.
+    Returns the displacement of all rows at the start of a run.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ FELT_COLUMNS = width_of(FELT)
 
 
 class ImplicitContactKernels(NamedTuple):
-    """Kernels that solve for losses where an explicit method kicks velocities, see `refweb.effects.contact_solver`.
+    """Kernels that solve for contact losses in the kick of an explicit method, see `refweb.effects.contact_solver`.
 
     Attributes
     ----------
     detect, law : kernel
         Detection of contacts, and their law; signatures are in `refweb.kernels`.
     slots : int
-        Number of contacts of a cell that are remembered until the next step.
+        Number of contacts of a cell whose forces are kept until the next step.
     parts : int
-        Largest number of rows that a contact moves where no body carries a node.
+        Largest number of rows that a contact moves, without attached nodes.
     """
 
     detect: Callable
@@ -67,17 +67,17 @@ class ImplicitContactKernels(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """Check if cells of a term, each of two lines, can have passed through each other.
+    """Penetration check of cells of a term, each of two lines that may pass through each other.
 
     Attributes
     ----------
     meets, watch, soon : kernel
-        Whether lines of a cell meet in a drift, the same for the neighbours, and for how long none can; signatures are
-        in `refweb.kernels`.
+        Check if lines of a cell meet in a drift; the same for neighbours; time in which no lines can meet. Signatures
+        are in `refweb.kernels`.
     touch : float
         Distance at which lines touch [m].
     stiffness : float
-        k of their push [N/m].
+        Contact stiffness k [N/m].
     rows, data, elements : ndarray
         Rows, numbers and elements of neighbours: pairs of lines that do not push each other.
     """
@@ -102,7 +102,7 @@ class Tangent(NamedTuple):
     bound : kernel, optional
         Bound on the row sums of |K|, for the step of an explicit method; None where it is zero.
     symmetric : bool
-        Whether stiffness and damping are symmetric.
+        True if stiffness and damping are symmetric.
     """
 
     stiffness: Callable | None = None
@@ -129,27 +129,27 @@ class VelocityForce(NamedTuple):
 
 
 class ContactForce(NamedTuple):
-    """Kind of a contact, and its search.
+    """Kind of a contact, and its detection.
 
     Attributes
     ----------
     felt : tuple of int
-        Columns of ``cells`` with the row of the body that feels the force in ``out``, see `FELT`, and, between bodies,
-        with that of the one that feels its negative; empty where no body touches.
+        Columns of ``cells`` with the row of the body on which the force in ``out`` acts, see `FELT`, and, between
+        bodies, with the row of the body on which its negative acts; empty without a body.
     pairs : tuple of (RigidBody, RigidBody)
-        The bodies of each cell, where it is the push of bodies on each other.
+        The bodies of each cell, for contact of bodies with bodies.
     near : kernel, optional
-        Finds the cells that may act soon, for an explicit method: the others add nothing and show 0; None where all
-        are looked at.
+        Finds the cells that may act soon, for an explicit method. The others add no force and have zeros in ``out``.
+        None if all cells are evaluated.
     finder : kernel, optional
-        As ``near``, where cells are elements of which any two may act on each other, or pairs of them: finds (numbers
-        of the elements, their rows, their data) of the pairs that may act soon. Such a term has no stiffness; None
-        where cells are what acts.
+        As ``near``, if cells are elements of which any two may act on each other, or pairs of them. Finds (numbers of
+        the elements, their rows, their data) of the pairs that may act soon. Such a term has no stiffness. None if the
+        cells themselves act.
     crossing : Crossing, optional
-        Check if lines have passed through lines, where those of its cells push each other.
+        Penetration check of lines with lines, if the cells are lines that push each other.
     passing : kernel, optional
-        Check if lines of its cells come as deep in a body as its middle in a drift, by `refweb.kernels.MEETS`, where it
-        is the push of contact with straight lines.
+        Penetration check of lines with a body, for contact of bodies with straight lines. It tells, as a kernel
+        `refweb.kernels.MEETS`, if lines come as deep in a body as its middle in a drift.
     """
 
     felt: tuple = ()
@@ -171,18 +171,17 @@ class Balance(NamedTuple):
     Attributes
     ----------
     column : str
-        Column of the energy balance that its energy or power belongs to: "work", "dissipated_energy", or an energy of
-        its own.
+        Column of the energy balance of its energy or power: "work", "dissipated_energy", or a separate energy.
     power : int, optional
-        Column of ``out`` with the power of the force [W], where ``column`` is "work" or "dissipated_energy".
+        Column of ``out`` with the power of the force [W], if ``column`` is "work" or "dissipated_energy".
     internal : bool
-        True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
+        True if the net exerts the forces on itself: their resultant is zero, and a rigid motion does not change them.
     impulse : kernel, optional
-        Impulse of all cells until a time, exact in time and displacement, for the balance of momentum; None where there
-        is no such formula: then it is integrated along the steps. Where forces depend on velocity it is linear in
+        Impulse of all cells until a time, exact in time and displacement, for the momentum balance. None if there is no
+        such formula: then the impulse is integrated along the steps. For forces that depend on velocity it is linear in
         displacement.
     moment_free : bool
-        Whether forces that are not internal have no moment about the centre of mass of all that there is.
+        True if forces that are not internal have no moment about the centre of mass of web and bodies.
     twists : bool
         Whether forces that are internal have moments that the twist of lines or a clamp bears: they do not keep angular
         momentum, and feel a rotation as a whole.
@@ -197,14 +196,14 @@ class Balance(NamedTuple):
 
 
 class MovingFrame(NamedTuple):
-    """Frame whose forces of inertia a term has.
+    """Rotating frame of a term of inertia forces.
 
     Attributes
     ----------
     angular_velocity : sequence of 3 float, optional
-        That of the frame [rad/s], where it turns.
+        Angular velocity of the frame [rad/s].
     orbit_radius : float, optional
-        Radius of the orbit [m], where forces are linear in distances from its origin that are small against it.
+        Radius of an orbit [m], for forces that are linear in distances from the origin, which are small against it.
     """
 
     angular_velocity: tuple | None = None
@@ -219,7 +218,7 @@ class Timing(NamedTuple):
     times : sequence of float
         Times at which the force has a corner [s]; no step of an implicit method passes one.
     at_rest : bool
-        Whether it acts on what does not move; statics leaves out what does not.
+        True if the force acts at rest; statics leaves out all other forces.
     """
 
     times: tuple = ()
@@ -227,14 +226,14 @@ class Timing(NamedTuple):
 
 
 class CellElements(NamedTuple):
-    """Elements of the net that cells act through, and with which they end.
+    """Elements of the net through which cells act; a cell ends when its element breaks.
 
     Attributes
     ----------
     numbers : ndarray of int, shape (cells,) or (cells, 2), optional
-        Elements of each cell; None for what acts on nodes.
+        Elements of each cell; None for forces on nodes.
     disable : callable, optional
-        Changes rows of ``data`` in place so that their cells do nothing, where one of their elements is broken.
+        Changes rows of ``data`` in place so that their cells have no force, for cells with a broken element.
     """
 
     numbers: np.ndarray | None = None
@@ -252,17 +251,17 @@ class ForceTerm:
     cells : ndarray of int32, shape (cells, arity)
         Rows that each cell couples.
     data : ndarray, shape (cells, columns), optional
-        Numbers of each cell. None where the cells are the elements of the net: kernels then see the numbers of its
-        lines at the time, `refweb.system.system.System.line_data`, and ``out`` is one array for all such terms. It has
-        the columns from `TENSION` on.
+        Numbers of each cell. None if the cells are the elements of the net: kernels then get the line data at the time,
+        `refweb.system.system.System.line_data`, and all such terms share one ``out``, with the columns from `TENSION`
+        on.
     force : kernel
         Adds to the forces.
     balance : Balance
         Part in the balances of energy and momentum.
     energy : kernel, optional
-        Potential of the force, where there is one; that of a force with a power is linear in time between its times.
+        Potential of the force, if there is one; for a force with a power it is linear in time between its times.
     tangent, velocity, contact, frame, timing, elements
-        Parts that not all terms have, see the classes.
+        Optional parts, see the classes.
     """
 
     name: str
@@ -303,7 +302,7 @@ def pairs_of(system):
 
 
 def refuse_found(terms, what):
-    """Refuse terms whose pairs are found, `ContactForce.finder`, where ``what`` needs a tangent.
+    """Refuse terms with a `ContactForce.finder`, which have no tangent, since ``what`` needs one.
 
     Raises
     ------
@@ -319,7 +318,7 @@ def refuse_found(terms, what):
 
 
 def without(columns):
-    """A `CellElements.disable` that leaves nothing in some columns, a number or a slice."""
+    """A `CellElements.disable` that sets some columns, a number or a slice, to zero."""
 
     def disable(numbers):
         numbers[:, columns] = 0.0
@@ -353,23 +352,23 @@ class PrescribedMotion:
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """Pairs of rows whose distance is kept: g(x) = (|d|² − L²)/(2L) = 0 with d from the first to the second.
+    """Pairs of rows with a constant distance: g(x) = (|d|² − L²)/(2L) = 0 with d from the first to the second.
 
-    It says what is kept, as kernels say what a force is; `refweb.system.links` finds the forces that keep it.
+    This class defines the constraint; `refweb.system.links` finds the forces that maintain it.
 
     Attributes
     ----------
     cells : ndarray of int32, shape (cells, 2)
         The rows.
     data : ndarray, shape (cells, 4)
-        d at x = 0, and its magnitude L [m].
+        The vector d at x = 0, and its magnitude L [m].
     """
 
     cells: np.ndarray
     data: np.ndarray
 
     def between(self, x):
-        """Second less first of each pair, shape (cells, 3)."""
+        """Vectors d from the first to the second row of each pair, shape (cells, 3)."""
         return x[self.cells[:, 1]] - x[self.cells[:, 0]]
 
     @property
@@ -378,7 +377,7 @@ class Constraint:
         return self.data[:, 3]
 
     def excess(self, x):
-        """g [m] at displacement x, shape (cells,); the difference of the two lengths where that is small."""
+        """g [m] at displacement x, shape (cells,); it is close to the difference of both lengths if that is small."""
         u = self.between(x)
         return ((2.0 * self.data[:, :3] + u) * u).sum(axis=1) / (2.0 * self.length)
 
@@ -404,14 +403,14 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class BreakLimits:
-    """Elements that break.
+    """Limits at which elements break.
 
     Attributes
     ----------
     limits : ndarray, shape (elements,)
-        Tension at which each breaks [N], infinite for those that hold.
+        Tension at which each element breaks [N], infinite for elements that cannot break.
     times : tuple of (float, int)
-        Times at which elements break whatever holds them [s], increasing, with the element.
+        Times at which elements break at any tension [s], increasing, with the element.
     """
 
     limits: np.ndarray
@@ -419,7 +418,7 @@ class BreakLimits:
 
     @property
     def watched(self):
-        """True if any tension breaks anything."""
+        """True if any limit is finite."""
         return bool(np.isfinite(self.limits).any())
 
 

@@ -1,13 +1,13 @@
 """Bending stiffness: torsion springs between elements that continue each other.
 
-With a and b the vectors of two elements that follow each other, n = a × b and θ = atan2(|n|, a·b) the angle by which
-the line turns, a spring has the energy ½ k θ², k = B/L̄, L̄ the mean of the two natural lengths: the curvature θ/L̄ over
-the length L̄. With its moment m = k (θ/|n|) n the forces are
+Let a and b be the vectors of two elements that follow each other, n = a × b, and θ = atan2(|n|, a·b) the angle between
+them. A spring has the energy ½ k θ² with k = B/L̄ and the mean L̄ of both natural lengths: this is the curvature θ/L̄
+over the length L̄. With its moment m = k (θ/|n|) n the forces are
 
     f_i = −m × a/|a|²,        f_k = −m × b/|b|²,        f_j = −f_i − f_k
 
-on the first, last and middle node. Where a line is folded back onto itself, θ = π, the energy is finite; the direction
-of the force is that of rounding, or of none.
+on the first, last and middle node. If a line is folded back onto itself, θ = π, the energy is finite; the direction of
+the force is then arbitrary by rounding, or the force is zero.
 
 This is the bending of the multi-particle model, whose states of rest are straight. n is evaluated from displacements,
 so that tiny deflections keep their digits.
@@ -30,7 +30,7 @@ from .base import Balance, CellElements, ForceTerm, Tangent, without
 from .vectors import cross, dot
 
 LARGEST = math.radians(30.0)
-"""Largest angle between elements that continue each other in the web's position."""
+"""Largest angle between elements that continue each other in the initial web."""
 ROUNDING = 1e-9
 """Angles that differ by less are the same [rad]."""
 FAR = 2.0**20
@@ -39,7 +39,7 @@ FAR = 2.0**20
 
 @kernel()
 def hinge(x, cells, data, c):
-    """(a, b, a × b, θ, θ/|a × b|) of spring c; the last is 0 where it has no value."""
+    """(a, b, a × b, θ, θ/|a × b|) of spring c; the last is 0 where it is not defined."""
     i, j, k = cells[c, 0], cells[c, 1], cells[c, 2]
     a, b = (data[c, 1], data[c, 2], data[c, 3]), (data[c, 4], data[c, 5], data[c, 6])
     u = (x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2])
@@ -137,7 +137,7 @@ def bound(reach, speed, x, mass, rates, cells, data):
 
 
 def springs(net):
-    """Springs between elements whose ends continue each other: every end and the one, or those, it turns least to.
+    """Springs between elements that continue each other: each end is joined to the end, or ends, of least angle.
 
     Returns
     -------

@@ -29,7 +29,7 @@ from ..tables import (
 )
 
 EVEN = 1e-9
-"""Share by which moments of inertia may miss what they have to satisfy: the last digits of a CAD program."""
+"""Relative tolerance of conditions on moments of inertia: they may come from a CAD program with few digits."""
 
 
 def _keys(shape):
@@ -101,9 +101,9 @@ def _axle(name, value):
 class Body(Table):
     """A rigid body, free, fixed, on an axle or moved by ``[[motion]]``; its shape has keys of its own.
 
-    A free body moves and turns in space, but for a ring, which keeps its plane and turns about its normal only. A ring
-    is a rigid circle that touches the web as the disc inside it would, at any distance from its plane: how deep a point
-    is in it is measured at right angles to its normal. It is meant for webs that move in its plane.
+    A free body moves and rotates in space. A ring is an exception: it keeps its plane and rotates about its normal
+    only. It is a rigid circle that touches the web as the disc inside it would, at any distance from its plane. The
+    depth of a point is measured at right angles to the normal. A ring is meant for webs that move in its plane.
 
     In statics a free body rests where forces and moments on it balance, if it touches the web, or carries nodes by
     ``[[attach]]``. Newton's method goes downhill from where its table has it, so that a ball begins in the net, or next
@@ -114,11 +114,11 @@ class Body(Table):
     name : str
         Name in observables and files.
     shape : {"sphere", "ring", "box", "cylinder", "capsule", "mesh", "plane", "terrain"}
-        Its shape, of `refweb.registry.SHAPES`; "sphere" by default.
+        Shape, one of `refweb.registry.SHAPES`; "sphere" by default.
     radius : float
         Radius of a sphere, a ring, a cylinder or a capsule [m], > 0.
     normal : sequence of 3 float
-        Normal of a ring; of a plane the direction away from the ground.
+        Normal of a ring; for a plane the direction away from the ground.
     size : sequence of 3 float
         Edges of a box [m], > 0.
     axes : list of 2 vectors, optional
@@ -131,38 +131,38 @@ class Body(Table):
     rounding : float, optional
         Radius of the edges of a box or a cylinder [m], > 0, by default 2 % of its smallest size.
     file : str
-        Of a mesh: STL, OBJ or VTP file of its surface, relative to the scene's folder.
+        For a mesh: STL, OBJ or VTP file of its surface, relative to the scene's folder.
     scale : float
-        Of a mesh or terrain: metres a unit of its file, > 0; 1 by default.
+        For a mesh or terrain: metres per unit of its file, > 0; 1 by default.
     surface : {"file", "hull"}
-        Of a mesh: "hull" takes the convex hull of its surface in place of what the file has.
+        For a mesh: "hull" takes the convex hull of the surface in the file.
     drawn : float
-        Of a plane: edge of the square that is drawn [m], > 0; 2 by default.
+        For a plane: edge of the square that is drawn [m], > 0; 2 by default.
     heights : str
-        Of terrain: CSV file of heights, with the columns x, y and z, or OBJ, STL or VTP file of an open surface,
+        For terrain: CSV file of heights, with the columns x, y and z, or OBJ, STL or VTP file of an open surface,
         relative to the scene's folder.
     thickness : float, optional
-        Of terrain: depth of the ground below its lowest place [m], > 0; by default a quarter of its longest side.
+        For terrain: depth of the ground below its lowest point [m], > 0; by default a quarter of its longest side.
     grid : int, optional
-        Of a mesh or terrain: number of cells along its longest side of the grid on which depth is known; by default 48,
-        or as many as its thinnest wall asks for.
+        For a mesh or terrain: number of cells, along the longest side, of the grid of depth; by default 48, or more if
+        the thinnest wall needs them.
     orientation : sequence of 4 float, optional
         In place of ``axes`` or ``axis``: the quaternion (w, x, y, z), of any length but 0, of the rotation that takes
         x, y and z to the body's axes.
     mass : float, optional
         Mass [kg], > 0; it or the density is needed unless the body is fixed, or moved by ``[[motion]]``.
     density : float, optional
-        Density [kg/m³] of a body that is solid, > 0, in place of the mass.
+        Density of a solid body [kg/m³], > 0, in place of the mass.
     position : sequence of 3 float
-        Position of its centre [m], which is its centre of mass; of a mesh that of a uniform solid, of a plane any point
-        on it, of terrain that of the origin of its file.
+        Position of its centre of mass [m]. For a mesh this is the centre of a uniform solid. For a plane it is any
+        point on it, for terrain the position of the origin of its file.
     velocity : sequence of 3 float
         Initial velocity [m/s].
     angular_velocity : sequence of 3 float
-        Initial angular velocity along x, y and z [rad/s]; of a ring along its normal.
+        Initial angular velocity along x, y and z [rad/s]; for a ring along its normal.
     inertia : float or list, optional
-        Moments of inertia about its centre [kg m²]: one, three about its axes, or the symmetric 3 × 3 tensor along
-        them; of a ring that about its normal. By default that of a uniform solid, and of a thin ring m r².
+        Moments of inertia about its centre [kg m²]: one number, three about its axes, or the symmetric 3 × 3 tensor
+        along them; for a ring that about its normal. By default those of a uniform solid, and m r² for a ring.
     fixed : bool
         Whether it does not move.
     axle : BodyAxle, optional
@@ -222,9 +222,9 @@ class Body(Table):
 
     @classmethod
     def keys(cls, given):
-        """Names of its keys: its own with those of its shape in their place, of all shapes where one is none of them.
+        """Names of the keys for a shape, or of all shapes if a key in ``given`` belongs to another one.
 
-        What ``given`` does not ask for is not imported.
+        Shapes that ``given`` does not need are not imported.
         """
 
         def among(*shapes):
@@ -241,7 +241,7 @@ class Body(Table):
         return {k: v for key, value in pairs for k, v in (value.items() if key == "form" else [(key, value)])}
 
     def check(self):
-        """Refuse half a shape, a free body without mass, a fixed one that moves, a name that is no file name."""
+        """Refuse an incomplete shape, a free body without mass, a fixed body that moves, and a bad name."""
         object.__setattr__(self, "form", self._form())
         if not self.fixed and not self.form.free and not self.moved:
             free = [shape for shape, reference in SHAPES.items() if load(reference).free]
@@ -296,7 +296,7 @@ class Body(Table):
             )
 
     def _refuse_tensor(self):
-        """Refuse axes that are given twice or not at all, and more than one moment of inertia of a ring."""
+        """Refuse axes that are missing or given twice, and more than one moment of inertia of a ring."""
         given = [key for key in self.form.directions if getattr(self.form, key, None) is not None]
         if self.orientation is None:
             self.form.frame()
@@ -306,7 +306,7 @@ class Body(Table):
             raise InputError(f'inertia = {quote(self.inertia)} must be a number for shape = "{self.shape}"')
 
     def _form(self):
-        """The table of the shape, from what is given of its keys."""
+        """The table of the shape, from the given keys."""
         kind, noted = load(SHAPES[self.shape]), vars(self)["form"]  # by `__init__`, a dict
         given = {key: value for key, value in noted.items() if value is not None}
         for f in fields(kind):

@@ -1,6 +1,6 @@
-"""Values of broken elements: tension and strain 0, and the energy that they had, which stays.
+"""Values of broken elements: tension and strain 0, and their constant rupture energy.
 
-Every system with broken elements has this term, whether a ``[rupture]`` broke them or the web came with them.
+Every system with broken elements has this term, also if they were broken in the initial web.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from .base import DAMPED_TENSION, LINE_OUT, Balance, ForceTerm, Timing
 from .line_kernels import line_at
 
 HELD = "rupture_energy"
-"""Column of the numbers of the lines with what a broken element held [J]."""
+"""Column of line data with the energy that a broken element had stored [J]."""
 
 
 @functools.cache
 def kernels(column):
-    """Force and energy kernels; what elements held is in a ``column`` of the numbers of the lines."""
+    """Force and energy kernels; the rupture energy is in a ``column`` of the line data."""
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -39,7 +39,7 @@ def kernels(column):
 
 
 def held_energy(net):
-    """The `ForceTerm` of what broken elements held, and of their tension and strain, which are 0.
+    """The `ForceTerm` of the rupture energy of broken elements, with their tension and strain 0.
 
     Raises
     ------

@@ -1,32 +1,32 @@
-"""Losses where things touch and drag, solved for contact by contact, where an explicit method kicks velocities.
+"""Implicit contacts: friction, damping and drag, solved contact by contact within a kick of an explicit method.
 
-A kick of size h leaves positions where they are. Of the velocities v⁻ ahead of it and v⁺ behind it, the impulses
-of contacts that act at once are to follow: with the relative velocity u = J v of a contact, its force F(u) of
-`refweb.effects.contact.friction` and all other forces f,
+A kick of size h does not change positions. It changes velocities from v⁻ to v⁺, and the impulses of contacts depend on
+both. With the relative velocity u = J v of a contact, its force F(u) of `refweb.effects.contact.friction` and all other
+forces f,
 
     v⁺ = v⁻ + h M⁻¹(f + Σ Jᵀ F(u_θ)),        u_θ = (1 − θ) u⁻ + θ u⁺.
 
-Friction below its slip velocity is as stiff as that is small, so these equations are solved and not stepped over. They
-are coupled, since contacts share nodes and bodies: a sweep solves them one after the other, each with the forces that
-the others have come to, and the next sweep goes the other way, as nonlinear Gauss–Seidel does in [1]_. Each alone has a
-solution in closed form but for one number. Along the normal u = b + θ h w F is linear by pieces. Along the two
-directions of the tangent plane in which J M⁻¹ Jᵀ has no mixed term, with Z_i = θ h w_i μ N, the size r = √(|u_t|² +
-v_s²) is the root of
+Friction below its slip velocity is very stiff, so that these equations are implicit. They are coupled, since contacts
+share nodes and bodies. A Gauss–Seidel sweep solves one contact after the other with the latest forces of all others,
+and the next sweep runs in reverse order, as in [1]_. A single contact has a solution in closed form up to one number.
+Along the normal, u = b + θ h w F is piecewise linear. In the tangent plane, axes are chosen along which J M⁻¹ Jᵀ has no
+mixed term. With Z_i = θ h w_i μ N, the size r = √(|u_t|² + v_s²) is the root of
 
     v_s²/r² + Σ b_i²/(r + Z_i)² = 1,
 
-whose left side falls and is convex, so that Newton's method on its inverse root comes to it from below.
+whose left side decreases and is convex, so that Newton's method on its inverse root converges from below.
 
-θ is ½ where a kick hardly changes the slip, which makes steps of order 2, and goes to 1 where the contact sticks, which
-takes the slip away instead of turning it round: θ(z) = 1/(1 − e⁻ᶻ) − 1/z is exact for a force −z u/h w. It departs from
-½ by z/12, of order h, which leaves the order at 2. What all forces do to the kinetic energy in a kick is h times their
-power at v = ½ (v⁻ + v⁺), and this power is what is booked: it closes the book whether sweeps have converged or not.
-Where it would be positive at a contact, whose slip turns round within the kick, θ is ½ there: F(u)·u is never positive.
+θ is ½ if a kick hardly changes the slip, which makes steps of order 2. It tends to 1 if the contact sticks, so that the
+slip vanishes instead of changing its sign. θ(z) = 1/(1 − e⁻ᶻ) − 1/z is exact for a force −z u/h w. It differs from ½ by
+z/12, which is of order h and keeps order 2. All forces change the kinetic energy in a kick by h times their power at v
+= ½ (v⁻ + v⁺). The energy balance uses this power, so that it closes even if sweeps have not converged. If this power
+would be positive at a contact, whose slip changes its direction within the kick, θ is ½ there: F(u)·u is never
+positive.
 
-All kinds of contact are one record, `refweb.kernels.CONTACT`: lines on bodies, bodies on bodies, lines on lines, and
-nodes in a fluid. A force term has a kernel that detects its contacts and another that is their law, the force of one of
-them where all others stay; friction with damping is `friction_law`. Where bodies carry nodes by ``[[attach]]``, a force
-on such a node is one on the body and a moment: rows of the node are replaced by those of the body, see `carry`.
+All kinds of contact have one record, `refweb.kernels.CONTACT`: lines on bodies, bodies on bodies, lines on lines, and
+nodes in a fluid. A force term has a kernel that detects its contacts, and one for their law: the force of one contact
+while all others stay. `friction_law` is friction with damping. A force on a node that is attached to a body is a force
+and a moment on the body: rows of the body replace those of the node.
 
 References
 ----------
@@ -45,9 +45,9 @@ from .base import CONTACT_COLUMNS, TOUCH
 from .vectors import cross, dot, solve
 
 SETTLING = 1
-"""Number of sweeps after which θ stays: forces of the step before are known, and a second changes nothing."""
+"""Number of sweeps after which θ is constant: with a warm start a second sweep changes nothing."""
 UNMIXED = 1e-15
-"""Share of J M⁻¹ Jᵀ along the tangents below which their mixed term is rounding."""
+"""Size of the mixed term of J M⁻¹ Jᵀ, over its terms along the tangents, below which it is rounding."""
 
 
 # Contacts
@@ -55,7 +55,7 @@ UNMIXED = 1e-15
 
 @kernel(forceinline=True)
 def set_part(part, row, i, rate, force):
-    """Write what a row has of direction i of a contact in J and in Jᵀ."""
+    """Write the entries of a row in J and in Jᵀ for direction i of a contact."""
     part.row = row
     for k in range(3):
         part.jacobian[i, k], part.transpose[i, k] = rate[k], force[k]
@@ -129,7 +129,7 @@ def set_delassus(contact, parts, inverse):
 
 @kernel(forceinline=True)
 def turn_tangents(vectors, cosine, sine):
-    """Turn the second and third of some vectors (3, 3) in their plane."""
+    """Rotate the second and third of some vectors (3, 3) in their plane."""
     for k in range(3):
         first, second = vectors[1, k], vectors[2, k]
         vectors[1, k], vectors[2, k] = cosine * first + sine * second, cosine * second - sine * first
@@ -137,7 +137,7 @@ def turn_tangents(vectors, cosine, sine):
 
 @kernel(leaf=True)
 def prepare(h, n, v, inverse, contacts, parts):
-    """Write what the solver asks of contact n, with tangents between which J M⁻¹ Jᵀ has no mixed term."""
+    """Write the data of contact n for the solver, with tangents for which J M⁻¹ Jᵀ has no mixed term."""
     contact = contacts[n]
     if contact.group == 0:
         return
@@ -161,7 +161,7 @@ def prepare(h, n, v, inverse, contacts, parts):
 
 @kernel(forceinline=True)
 def add_part(contact, parts, row, i, rate, force):
-    """Add what a row has of direction i of a contact to its part, which is new where it has none."""
+    """Add the entries of a row for direction i of a contact to its part, which is created if it does not exist."""
     m, end = contact.first, contact.first + contact.count
     while m < end and parts[m].row != row:
         m += 1
@@ -178,11 +178,11 @@ def add_part(contact, parts, row, i, rate, force):
 def carry(
     n: int, x: Matrix, carriers: Integers, turns: RigidRotations, contacts: ContactArray, parts: PartArray
 ) -> None:
-    """Let bodies feel contact n at the nodes that they carry.
+    """Replace attached nodes in contact n by their bodies.
 
-    Such a node, at the arm a from the centre of mass, has the velocity v + ω × a, and a force p on it is p and the
-    moment a × p on the body. In the rows of `refweb.net.rotation` ω is W times the velocity of the rotation, W along
-    the axes of space. The force stands at the node as well, which has no velocity of its own.
+    An attached node, at the arm a from the centre of mass, has the velocity v + ω × a. A force p on it acts on the body
+    as p and the moment a × p. In the rows of `refweb.net.rotation`, ω is W times the velocity of the rotation, with W
+    along the axes of space. The force is also written at the node, which is no unknown.
     """
     contact = contacts[n]
     for m in range(contact.first, contact.first + contact.count):
@@ -209,7 +209,7 @@ def carry(
 
 @kernel()
 def fitted(z):
-    """θ(z) = 1/(1 − e⁻ᶻ) − 1/z of a loss that alone would take e⁻ᶻ of a velocity, z ≥ 0; ½ to 1."""
+    """θ(z) = 1/(1 − e⁻ᶻ) − 1/z, from ½ to 1, of a loss that alone reduces a velocity by the factor e⁻ᶻ, z ≥ 0."""
     if z < 0.1:
         return 0.5 + z / 12.0 * (1.0 - z * z / 60.0 * (1.0 - z * z / 42.0))
     return 1.0 / (1.0 - math.exp(-z)) - 1.0 / z
@@ -232,7 +232,7 @@ def slip_size(b, c, y, z, slip):
 
 @kernel(forceinline=True)
 def solve_normal(contact, h, rate):
-    """(force along the normal, N) where the others alone would speed the contact up by ``rate`` [m/s²]."""
+    """(Force along the normal, N) if the other forces alone accelerate the contact by ``rate`` [m/s²]."""
     push, weight = contact.normal_force, contact.delassus[0, 0]
     while True:
         theta = contact.theta[0]
@@ -249,7 +249,7 @@ def solve_normal(contact, h, rate):
 
 @kernel(forceinline=True)
 def solve_tangents(contact, h, drag, first, last, settling):
-    """Friction along both tangents, of μ N = ``drag``, where the others alone would speed it up by first and last."""
+    """Friction along both tangents, μ N = ``drag``, if other forces alone accelerate by ``first`` and ``last``."""
     slip, first_weight, second = contact.slip_velocity, h * contact.delassus[1, 1], h * contact.delassus[2, 2]
     u, w = contact.velocity[1], contact.velocity[2]
     if settling:
@@ -300,7 +300,7 @@ def friction_law(h, number, n, f, inverse, contacts, parts):
 
 @kernel(leaf=True)
 def gauss_seidel(h, number, f, inverse, contacts, parts, count, laws):
-    """Solve contacts in turn, backwards where ``number`` is odd; the largest change of a velocity [m/s]."""
+    """Solve contacts in turn, in reverse order if ``number`` is odd; return the largest change of a velocity [m/s]."""
     largest = 0.0
     for m in range(count):
         n = count - 1 - m if number % 2 else m
@@ -310,7 +310,7 @@ def gauss_seidel(h, number, f, inverse, contacts, parts, count, laws):
 
 @kernel(forceinline=True)
 def slot_of(memory, contact):
-    """Slot of a contact in the memory of its owner: that of its tag, a free one, or that of the oldest step."""
+    """Slot of a contact in the memory of its cell: that of its tag, a free slot, or that of the oldest step."""
     slots, oldest = memory.shape[1], contact.tag % memory.shape[1]
     for s in range(slots):
         slot = (contact.tag + s) % slots
@@ -332,7 +332,7 @@ def forget(memory):
 
 @kernel(leaf=True)
 def warm_start(number, memory, f, contacts, parts, begin, end):
-    """Begin with the forces of the step before ``number``: what sticks then takes few sweeps."""
+    """Start with the forces of the step before ``number``, so that sticking contacts take few sweeps."""
     for n in range(begin, end):
         contact = contacts[n]
         if contact.group == 0:
@@ -348,7 +348,7 @@ def warm_start(number, memory, f, contacts, parts, begin, end):
 
 @kernel(leaf=True)
 def commit(number, memory, v, contacts, parts, begin, end, out):
-    """Write the power of each cell at the velocities v, with the force that a body feels; remember forces."""
+    """Write the power of each cell at the velocities v, and the force on a body; keep forces for the next step."""
     out[:] = 0.0
     for n in range(begin, end):
         contact = contacts[n]

@@ -50,7 +50,7 @@ def kernels(law, gradients, weights):
 
     @kernel()
     def add_pull(f, cells, c, pull, out):
-        """Add the forces of an element of one point, and write what it shows."""
+        """Add the forces of an element of one point, and write its output."""
         p0, p1, p2, scale, tension, e = pull
         pull_together(f, cells, c, 0, nodes, flat, scale, p0, p1, p2)
         shows = record_at(LINE_OUT, out, c, 0)
@@ -70,7 +70,7 @@ def kernels(law, gradients, weights):
 
     @kernel(FORCE)
     def force_of_four(t, x, v, f, cells, data, out):
-        """The same of elements of one point, four at once: what one waits for, the others use."""
+        """Forces of elements of one point, four at once, which uses the processor better."""
         fours = cells.shape[0] // 4 * 4
         for n in range(0, fours, 4):
             i, j, k, m = np.uint64(n), np.uint64(n + 1), np.uint64(n + 2), np.uint64(n + 3)
@@ -145,7 +145,7 @@ def kernels(law, gradients, weights):
 
 
 def of(net):
-    """The kernels of a net's laws and element."""
+    """The kernels for the laws and the element of a net."""
     return kernels(net.law_number, tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist()))
 
 

@@ -1,4 +1,4 @@
-"""A start in which the web is folded: slack, and its lines apart from each other."""
+"""Folded initial positions of a web: all lines slack and apart from each other."""
 
 from __future__ import annotations
 
@@ -14,48 +14,48 @@ from ..tables import Several, Table, choice, nodes, real, table, text, vector
 
 @table
 class Fold(Table):
-    """Initial positions of the nodes: drawn in to a hub and wound about it, or as a file has them.
+    """Initial positions of the nodes: drawn in to a hub and wound about it, or those of a file.
 
-    Natural lengths, and the places that displacements are counted from, stay those of ``[web]``; nodes that order and
-    subdivision add lie straight between the ends of their line. Velocities that spin are those of the folded web. All
-    lines are slack, and two that share no node are further apart than ``gap``: what is not so is refused. What is held
-    keeps its place; a web to be thrown has ``[supports] nodes = []``.
+    Natural lengths, and the reference of displacements, stay those of ``[web]``. Nodes that order and subdivision add
+    lie straight between the ends of their line. Velocities by a spin are those of the folded positions. All lines must
+    be slack, and lines that share no node must be further apart than ``gap``. Supported nodes must keep their position;
+    a web to be thrown has ``[supports] nodes = []``.
 
-    ``[web]`` may say it as well: ``fold = "star"``, ``[web.fold]`` with these keys, or ``positions = FILE``.
+    The keys may also be in ``[web]``: ``fold = "star"``, ``[web.fold]`` with these keys, or ``positions = FILE``.
 
-    A ``"star"`` draws each node in to ``ratio`` times its distance from the hub, and winds arms, rings and what is
-    between about the axis, in proportion to that distance: the outermost node by ``turns``. Nothing is pleated.
+    A ``"star"`` moves each node to ``ratio`` times its distance from the hub. Then it winds all nodes about the axis by
+    an angle in proportion to that distance: the outermost node by ``turns``. Lines are not pleated.
 
     Parameters
     ----------
     kind : {"star", "positions"}
-        How it is folded.
+        Kind of folding.
     ratio : float
-        Of a star: distance from the hub over that in the web, 0 < ratio < 1; 0.5 where it is left out.
+        For a star: distance from the hub over that in the web, 0 < ratio < 1; by default 0.5.
     turns : float, optional
-        Of a star: turns of the outermost node [1]; by default as many as leave the ends of every line within 0.9 of its
-        natural length.
+        For a star: turns of the outermost node [1]. By default as many as keep the distance of the ends of every line
+        within 0.9 of its natural length.
     hub : int or str
-        Of a star: one node, by number or name.
+        For a star: one node, by number or name.
     axis : sequence of 3 float
-        Of a star: its axis, of any length.
+        For a star: its axis, of any length.
     file : str, optional
-        Of positions: CSV file with the columns x, y and z [m], a row for each node of the web in its order, relative to
-        the scene's folder.
+        For positions: CSV file with the columns x, y and z [m], a row for each node of the web in its order, relative
+        to the scene's folder.
     gap : float, optional
-        Distance that lines without a common node keep [m]; by default the diameter of a round line of the largest area.
+        Least distance of lines without a common node [m]; by default the diameter of a round line of the largest area.
 
     Raises
     ------
     InputError
-        For numbers out of bounds, a key of the other kind, and an axis that is zero; from ``lay``, in statics, for a
-        hub that is not one node, a file that cannot be read or has other nodes, a supported node that would move, a
-        line that would be taut, and lines nearer than the gap.
+        For numbers out of bounds, a key of the other kind, and an axis that is zero. From ``lay``: in statics, for a
+        hub that is not one node, and for a file that cannot be read or has other nodes. Also for a supported node that
+        would move, for a line that would be taut, and for lines nearer than the gap.
 
     Notes
     -----
-    The winding is refweb's own, in `refweb.net.folding`; webs that are flown have their arms pleated and wound as well:
-    M. Gärdsback, G. Tibert, "Deployment control of spinning space webs", J. Guid. Control Dyn. 32 (2009) 40–50.
+    The winding is refweb's own, in `refweb.net.folding`; webs in space have their arms pleated as well: M. Gärdsback,
+    G. Tibert, "Deployment control of spinning space webs", J. Guid. Control Dyn. 32 (2009) 40–50.
 
     Examples
     --------
@@ -73,7 +73,7 @@ class Fold(Table):
     gap: float | None = real(default=None, at_least=0, unit="m")
 
     def check(self):
-        """Refuse keys that have no meaning, and what draws nothing in."""
+        """Refuse keys of the other kind, a missing file, a ratio not below 1, and an axis without direction."""
         keys = ("ratio", "turns", "hub", "axis") if self.kind == "positions" else ("file",)
         for key in keys:
             if getattr(self, key) is not None:
@@ -106,7 +106,7 @@ class Fold(Table):
         return x
 
     def _star(self, web, length):
-        """Places of the nodes of a star, lines having these natural lengths [m]."""
+        """Positions of the nodes of a star, for these natural lengths [m]."""
         hub_nodes = web.find("centre" if self.hub is None else self.hub, "hub")
         if len(hub_nodes) != 1:
             raise InputError(f"hub is {len(hub_nodes)} nodes, must be one")
@@ -116,7 +116,7 @@ class Fold(Table):
         return wound(web.points, web.points[hub_nodes[0]], self.axis or (0.0, 0.0, 1.0), ratio, turns)
 
     def _from_file(self, web):
-        """Places of the nodes in the file."""
+        """Positions of the nodes in the file."""
         from ..net.csv_files import places_of
 
         places = places_of(pathlib.Path(str(self.file)))

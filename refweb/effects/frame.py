@@ -1,6 +1,7 @@
-"""A frame that turns steadily: the centrifugal and the Coriolis force on every mass.
+"""A steadily rotating frame: the centrifugal and the Coriolis force on every mass.
 
-In axes that turn with the angular velocity Ω about a line through the origin a mass m at r that moves with v feels
+In axes that rotate with the angular velocity Ω about a line through the origin, the force on a mass m at r with the
+velocity v is
 
     m (Ω²I − ΩΩᵀ) r − 2 m Ω × v,      with the potential −½ m |Ω × r|² of the first part;
 
@@ -18,7 +19,7 @@ from .turning_axes import force_terms
 
 @table
 class Frame(Table):
-    """A steadily turning frame; positions, velocities, supports and all other effects are those in its axes.
+    """A steadily rotating frame; positions, velocities, supports and all other effects are relative to its axes.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def strain(x, cells, data, c, q, nodes, gradients):
 
 @kernel(forceinline=True)
 def pull_together(f, cells, c, q, nodes, gradients, scale, p0, p1, p2):
-    """Add to the forces on the nodes of cell c those of a tension at quadrature point q: −``scale`` dN/dξ dx/dξ."""
+    """Add the forces −``scale`` dN/dξ dx/dξ of a tension at quadrature point q to the nodes of cell c."""
     for a in range(nodes):
         row, d = np.uint64(cells[c, a]), scale * gradients[q * nodes + a]
         f[row, 0] -= d * p0

@@ -12,20 +12,20 @@ from .base import Constraint
 
 @table
 class Link(Table):
-    """Massless bars that do not stretch, from each of some nodes to the next; they pull and push.
+    """Rigid bars without mass, from each of some nodes to the next; they pull and push.
 
-    Dynamics by ``method = "ida"`` alone can hold them: other methods, statics and modes take a stiff line in its place.
+    They need dynamics with ``method = "ida"``. For other methods, statics and modes use a stiff line instead.
 
     Parameters
     ----------
     nodes : list
-        Two nodes or more, by number or name; the length of each link is their distance in the web's position.
+        Two nodes or more, by number or name; the length of each link is their distance in the initial web.
 
     Raises
     ------
     InputError
-        For fewer than two nodes; from ``on``, for a name that is not one node of the web, and for neighbours in the
-        list that are at one place.
+        For fewer than two nodes. From ``on``, for a name that is not one node of the web, and for neighbours in the
+        list with the same position.
 
     Examples
     --------

@@ -46,13 +46,13 @@ class Load(Table):
     force : sequence of 3 float
         Force on each node [N].
     factor : sequence of (t, factor), optional
-        Multiplies the force; linear in between, end values held. Without it the force acts in full, or, in statics,
-        times the load step.
+        Factor on the force over time: linear between the times, constant before and after them. Without it the factor
+        is 1, in statics the load step.
 
     Raises
     ------
     InputError
-        For a force that is not three finite numbers, and a factor without rows or whose times do not increase; from
+        For a force that is not three finite numbers, and a factor without rows or with times that do not increase. From
         ``on``, for a node that the web does not have.
 
     Examples

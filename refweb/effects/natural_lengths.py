@@ -1,7 +1,7 @@
-"""Natural lengths at a time: those of the net, times factors that follow tables over time.
+"""Natural lengths at a time: those of the net, times factors by tables over time.
 
-Reels and heat give the net factors, and nothing else changes natural lengths. `set_lengths` is all that computes them;
-it writes them to the numbers of the lines that its caller holds.
+Reels and heat add factors to the net; nothing else changes natural lengths. Only `set_lengths` computes them; it writes
+them to the line data of its caller.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from .time_tables import flattened, interpolate
 
 
 class NaturalLengths(Record):
-    """Natural lengths that change.
+    """Natural lengths that change over time.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class NaturalLengths(Record):
     by_length : table
         One kernel of ∂E/∂L [N], where any length changes.
     corners : ndarray
-        Times at which a factor has a corner [s], increasing, then ∞ for the end of a row if there are factors, then −∞
+        Times at which a factor has a corner [s], increasing; if there are factors, then ∞ for the end of a row and −∞
         for its start.
     """
 
@@ -98,7 +98,7 @@ def with_factor(net, lines, table):
     Parameters
     ----------
     net : refweb.net.net.Net
-        What it acts on.
+        The net.
     lines : ndarray of int, shape (k,)
         Lines of the web; all elements of a line share the factor.
     table : sequence of (t, factor)
@@ -119,9 +119,9 @@ def with_factor(net, lines, table):
 
 
 def shortest_of(net):
-    """Natural length of each element at its shortest in a run [m], shape (cells,).
+    """Least natural length of each element in a run [m], shape (cells,).
 
-    Between corners a length is a product of positive linear functions of time, which is least at an end.
+    Between corners a length is a product of positive linear functions of time, which has its minimum at an end.
     """
     lengths, numbers, shortest = NaturalLengths.of(net), net.line_data.copy(), net.natural_length.copy()
     shortest[lengths.elements] = np.inf

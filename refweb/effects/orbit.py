@@ -1,13 +1,13 @@
-"""An orbit: what masses feel about a point that goes round the Earth in a circle.
+"""An orbit: forces relative to a point that moves around the Earth in a circle.
 
-In axes that go with this point, the origin, x away from the Earth, y along the track and z along the angular velocity
-n of the orbit, masses move by the equations of Clohessy and Wiltshire,
+The origin of the axes is this point. x points away from the Earth, y along the track, and z along the angular velocity
+n of the orbit. In these axes masses move by the equations of Clohessy and Wiltshire,
 
     ẍ = 3n²x + 2nẏ,      ÿ = −2nẋ,      z̈ = −n²z,
 
-gravity less its value at the origin, to first order in r over the orbit's radius R, and the forces of inertia of the
-axes. With G = n² diag(3, 0, −1) `refweb.effects.turning_axes` has the kernels. Kinetic energy, −½ m n² (3x² − z²) and
-the energies of all other effects keep their sum, the Jacobi integral.
+which have the difference of gravity from its value at the origin, to first order in r over the radius R of the orbit,
+and the inertia forces of the axes. `refweb.effects.turning_axes` has the kernels, with G = n² diag(3, 0, −1). The sum
+of the kinetic energy, −½ m n² (3x² − z²) and the energies of all other effects is constant: the Jacobi integral.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from .turning_axes import force_terms
 GRAVITATION = 3.986004418e14
 """Gravitational parameter of the Earth [m³/s²], IERS Conventions (2010), table 1.1."""
 EARTH = 6378136.6
-"""Equatorial radius of the Earth [m], of the same table."""
+"""Equatorial radius of the Earth [m], from the same table."""
 
 
 @table
 class Orbit(Table):
-    """A circular orbit of the Earth; everything else in the scene is given in axes that go round with it.
+    """A circular orbit of the Earth; all other data of the scene are relative to axes that rotate with it.
 
-    The origin of the scene goes round; x points away from the Earth, y along the track, z along the angular velocity,
-    or other directions of the scene do that `axes` names.
-    Velocities are relative to these axes: what keeps its place in them has the velocity 0, and a web that does not turn
-    as seen from the stars has the spin −n about z. Spheres whose rotation is followed turn by the same rule.
+    The origin of the scene moves along the orbit. x points away from the Earth, y along the track, and z along the
+    angular velocity; `axes` may name other directions. Velocities are relative to these axes: an object that rests in
+    them has the velocity 0, and a web that does not rotate in the inertial frame has the spin −n about z. The same
+    holds for the rotation of spheres.
 
-    Each result says beside ± what the equations neglect: its size times the largest distance from the origin over the
-    radius of the orbit, by which gravity differs from what is linear in the distance. That is an order of magnitude. A
-    place along the track may come to differ by more, as differences of periods add up.
+    Each result has, beside ±, an estimate of the error of the linear equations: its size times the largest distance
+    from the origin over the radius of the orbit. This is an order of magnitude. The error of a position along the track
+    may be larger, since differences of periods add up.
 
     Parameters
     ----------
@@ -50,9 +50,8 @@ class Orbit(Table):
     Raises
     ------
     InputError
-        For a number out of bounds, or where not exactly one is given; for axes that are not two at right angles; and
-        beside ``[frame]`` or ``[gravity]``, which
-        it has itself.
+        For a number out of bounds, and unless exactly one of both is given; for axes that are not two at right angles;
+        and beside ``[frame]`` or ``[gravity]``, which an orbit includes.
 
     References
     ----------
@@ -72,7 +71,7 @@ class Orbit(Table):
     axes: Several = rows(3, default=None)
 
     def check(self):
-        """Refuse an orbit that is not given, or twice, and axes that are none."""
+        """Refuse an orbit that is not given, or given twice, and wrong axes."""
         if (self.mean_motion is None) == (self.altitude is None):
             given = "both are given" if self.altitude is not None else "none is"
             raise InputError(f"give mean_motion [rad/s] or altitude [m]: {given}")
@@ -88,7 +87,7 @@ class Orbit(Table):
 
     @property
     def radius(self):
-        """R [m], of an orbit of the Earth."""
+        """Radius R of the orbit of the Earth [m]."""
         if self.mean_motion is None:
             return EARTH + (self.altitude or 0.0)
         return float(np.cbrt(GRAVITATION / self.mean_motion) / np.cbrt(self.mean_motion))

@@ -1,8 +1,8 @@
-"""Loads from outside: forces that a factor over time multiplies, and whose power is work.
+"""External loads: forces with a factor over time, whose power is work.
 
-Behind its own numbers each cell of such a load has those of the factor: its largest size; the constant and the slope
-that it has without a table, 1 and 0, in statics 0 and 1; its table. Without one a load acts in full, or, in statics,
-times the load step.
+Each cell of such a load has first its numbers, and then those of the factor: its largest size; constant and slope
+without a table, which are 1 and 0, in statics 0 and 1; its table. Without a table the factor is 1, in statics the load
+step.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .time_tables import flattened, integrate, interpolate
 
 @kernel()
 def factor_at(t, data, start):
-    """The factor at time t of a cell, whose numbers begin at ``start``; ``data[start]`` is the largest size of it."""
+    """The factor at time t, whose numbers begin at ``start``; ``data[start]`` is its largest size."""
     if data[start + 3] > 0.0:
         return interpolate(t, data, start + 3, 2, 1)[0]
     return data[start + 1] + data[start + 2] * t
@@ -24,7 +24,7 @@ def factor_at(t, data, start):
 
 @kernel()
 def factor_until(t, data, start):
-    """∫ of the factor until time t [s], but for a constant; all cells of a load have one factor."""
+    """∫ of the factor until time t [s], up to a constant; all cells of a load have the same factor."""
     if data[start + 3] > 0.0:
         return integrate(t, data, start + 3, 2, 1)
     return (data[start + 1] + 0.5 * data[start + 2] * t) * t
@@ -36,17 +36,17 @@ def outer_load(net, name, cells, data, factor, impulse=None, **parts):
     Parameters
     ----------
     net : refweb.net.net.Net
-        What it acts on.
+        The net.
     name : str
         Name of the effect.
     cells : ndarray of int32, shape (cells, arity)
         Rows that each cell couples.
     data : ndarray, shape (cells, columns)
-        Numbers of each cell; in what kernels see those of the factor follow, from ``columns`` on.
+        Numbers of each cell; kernels get those of the factor as well, from ``columns`` on.
     factor : sequence of (t, factor) or None
-        Linear in between, end values held.
+        Table that is linear between its times, and constant before and after them.
     impulse : kernel, optional
-        That of a `Balance`.
+        Impulse of the `Balance`.
     **parts
         ``force``, which writes its power [W] to ``out[c, 0]``, and other parts of a `ForceTerm`.
     """

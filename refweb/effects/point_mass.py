@@ -11,7 +11,7 @@ from ..tables import Several, Table, nodes, real, table
 
 @table
 class PointMass(Table):
-    """A mass added to each of some nodes; it weighs under gravity.
+    """A mass that is added to each of some nodes; gravity acts on it.
 
     Parameters
     ----------

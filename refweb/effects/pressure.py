@@ -1,12 +1,12 @@
-"""Pressure on lines in a plane, which stays at right angles to them: the load of a flow, or of gas in a flat hose.
+"""Pressure on lines in a plane, at right angles to the current lines: the load of a flow, or of gas in a flat hose.
 
 With the unit normal n of the plane, p per current length and x' = dx/dξ along an element
 
     force on node a      ∫ N_a p x' × n dξ
     stiffness of (a, b)  ∫ N_a dN_b/dξ dξ p [n]×
 
-exactly, for every order: the force depends on positions alone and not on natural length. On a closed loop in a plane it
-has the potential −p × area; on other lines it has none, and its work depends on the path.
+exactly, for every order: the force depends on positions and not on natural length. On a closed loop in a plane it has
+the potential −p × area. On other lines it has no potential, and its work depends on the path.
 """
 
 from __future__ import annotations
@@ -91,9 +91,9 @@ def kernels(nodes, shares, couples):
 class Pressure(Table):
     """A force per current length, at right angles to lines and to the normal of a plane.
 
-    It pushes to the right of a line's direction, from its first node to its second, as seen from the tip of the normal:
-    a loop that runs counterclockwise is blown up. ``away_from`` asks for the side instead. Only the part of a line in
-    the plane counts.
+    Seen from the tip of the normal, it pushes to the right of a line's direction, from its first node to its second: a
+    loop that runs counterclockwise is inflated. ``away_from`` selects the side in another way. Only the projection of a
+    line on the plane counts.
 
     Parameters
     ----------
@@ -104,16 +104,16 @@ class Pressure(Table):
     value : float
         p, force per current length [N/m].
     away_from : sequence of 3 float, optional
-        A point [m] on the other side: every line is pushed away from it, judged in the web's position.
+        A point [m] from which every line is pushed away; its side is that in the initial web.
     factor : sequence of (t, factor), optional
-        Multiplies p; linear in between, end values held. Without it p acts in full, or, in statics, times the load
-        step.
+        Factor on p over time: linear between the times, constant before and after them. Without it the factor is 1, in
+        statics the load step.
 
     Raises
     ------
     InputError
-        For a normal that is zero, numbers that are not finite, and a factor without rows or whose times do not
-        increase; from ``on``, for a line or a group that the web does not have, and a line that has the point on
+        For a normal that is zero, numbers that are not finite, and a factor without rows or with times that do not
+        increase. From ``on``, for a line or a group that the web does not have, and a line that has the point on
         neither side.
 
     References
@@ -161,7 +161,7 @@ class Pressure(Table):
         return outer_load(net, "pressure", cells, matrix_of(data), self.factor, **arguments)
 
     def _sides(self, web, lines, normal):
-        """Sign of each line: 1 if it pushes away from the point by itself, −1 if not."""
+        """Sign of each line: 1 if the push by its direction is away from the point, else −1."""
         ends = web.points[web.lines]
         push = np.cross(ends[:, 1] - ends[:, 0], normal)
         side = ((ends.mean(axis=1) - self.away_from) * push).sum(axis=1)
@@ -171,7 +171,7 @@ class Pressure(Table):
 
 
 def _integrals(places):
-    """∫ N_a dξ, and ∫ N_a dN_b/dξ dξ row by row, of an element with nodes at these places in [0, 1]."""
+    """∫ N_a dξ, and ∫ N_a dN_b/dξ dξ row by row, of an element with nodes at these coordinates in [0, 1]."""
     power = np.arange(len(places))
     functions = np.linalg.inv(np.vander(places, increasing=True))  # by power, then node
     slopes = power / np.maximum(power + power[:, None], 1)

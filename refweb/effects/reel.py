@@ -1,4 +1,4 @@
-"""Reels: lines whose natural length is a function of time, as a winch or a closing line has it."""
+"""Reels: lines whose natural length is a function of time, such as those of a winch or a closing line."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from .natural_lengths import with_factor
 class Reel(Table):
     """Lines that are reeled in or paid out; their nodes keep their mass, and the reel does work.
 
-    The factors of a line on several reels, and that of its temperature, multiply.
+    The factors of several reels of a line, and the factor of its temperature, are multiplied.
 
     Parameters
     ----------
     lines : int, str or list
         Lines, by number or group (see `refweb.net.groups`), or "all".
     factor : sequence of (t, factor)
-        Natural length over that without the reel [1], > 0; linear in between, end values held. In statics t is the
-        load step.
+        Natural length over that without the reel [1], > 0: linear between the times, constant before and after them. In
+        statics t is the load step.
 
     Raises
     ------
     InputError
-        For a factor that is not > 0, a table without rows, and times that do not increase; from ``extend``, for a line
+        For a factor that is not > 0, a table without rows, and times that do not increase. From ``extend``, for a line
         or a group that the web does not have.
 
     Examples

@@ -1,8 +1,8 @@
-"""Rupture: lines that break, and the energy that each held.
+"""Rupture: lines that break, and their rupture energy.
 
-A broken element has no stiffness: its tension, strain and energy are 0, and what acts through it ends. What it held,
-and what ended with it, is the energy of a term that does nothing else, so that the book of energies closes through
-every break. `refweb.dynamics.integrators.rupture` finds the moments.
+A broken element has no stiffness: its tension, strain and energy are 0, and forces through it end. The energy that it
+had stored, and the energy of the forces that end with it, become the constant energy of a separate term, so that the
+energy balance closes through every break. `refweb.dynamics.integrators.rupture` finds the times of breaks.
 """
 
 from __future__ import annotations
@@ -33,35 +33,35 @@ class GroupRupture(Table):
 
 @table
 class Rupture(Table):
-    """Lines that break, where their stress reaches their strength or at given times.
+    """Lines that break when their stress reaches their strength, or at given times.
 
-    A line breaks at that of its elements whose stress is first to reach the strength, and there alone: the rest of it
-    hangs on at both ends, with its mass. A line of one element goes as a whole, and half of its mass stays with either
-    end; the inner nodes of a curved element fly on by themselves. A broken element has neither tension nor strain any
-    more, and contact, bending, drag, pressure and thrust through it end. What it held is ``rupture_energy``. Elements
-    whose stress over strength is within 1e-9 of the largest at that moment break together, as symmetry asks for.
+    A line breaks at the element whose stress is the first to reach the strength; its other elements and their mass
+    stay. If a line has one element, all of it breaks, and half of its mass stays at each end. The inner nodes of a
+    broken curved element move on freely. A broken element has neither tension nor strain. Contact, bending, drag,
+    pressure and thrust through it end. Its stored energy becomes ``rupture_energy``. Elements whose stress over
+    strength is within 1e-9 of the largest at that moment break together, which keeps symmetry.
 
-    In dynamics ``run.json`` has each break with its line, element, time and place. The order of breaks is compared with
-    that of the twin run: behind the first that differs results are beyond the horizon of what is known, and have no ±.
-    Statics, whose equilibria behind a break depend on how it happens, ends where the first line would break.
+    In dynamics ``run.json`` has each break with its line, element, time and position. The order of breaks is compared
+    with that of the step-refinement run: after the first difference, results have no ±. Statics ends when the first
+    line would break, since equilibria after a break depend on the motion.
 
     Parameters
     ----------
     strength : float, optional
         Nominal stress T/A at which a line breaks [Pa], damping included; by default the strength of ``[cable]`` and its
-        groups. Lines without either do not break by stress.
+        groups. Lines without a strength do not break by stress.
     at : sequence of (line, t), optional
-        Lines that break at a time [s] whatever their stress, in the middle, or in the element behind it; those that
-        are broken by then stay as they are. In statics t is the load step.
+        Lines that break at a time [s] for any stress, in the middle element or in the element after the middle. Lines
+        that are already broken stay as they are. In statics t is the load step.
     groups : dict of str to GroupRupture
-        Strengths that differ by group of lines; groups that share lines give it once.
+        Strengths by group of lines; only one of the groups that share a line may give a strength.
 
     Raises
     ------
     InputError
-        For a strength that is not > 0, times < 0, and a line that breaks at two times; from ``on``, for a line or a
-        group that the web does not have, where nothing can break, for nodes without mass that move, and for a
-        consistent mass, which would tie the ends of a broken line together.
+        For a strength that is not > 0, times < 0, and a line that breaks at two times. From ``on``, for a line or a
+        group that the web does not have, if no line can break, for moving nodes without mass, and for a consistent
+        mass, which would couple the ends of a broken line.
 
     Examples
     --------
@@ -80,7 +80,7 @@ class Rupture(Table):
         return self.at or ()
 
     def check(self):
-        """Refuse breaks that are no line and time, and a line that breaks twice."""
+        """Refuse breaks that are not (line, time), and a line that breaks twice."""
         lines = [line for line, _ in self._due]
         for i, (line, time) in enumerate(self._due):
             if line != int(line) or line < 0:
@@ -91,7 +91,7 @@ class Rupture(Table):
                 raise InputError(f"at[{i}][0] = {line:g}: this line breaks at two times, name it once")
 
     def extend(self, net):
-        """The net with the strengths of its lines, and what broken elements held in one more column."""
+        """The net with the strengths of its lines, and the rupture energy in one more column of line data."""
         web = net.web
         strengths = np.full(len(web.lines), np.nan if self.strength is None else self.strength)
         given = givers(web.groups, self.groups, len(web.lines)).get("strength", np.full(len(strengths), -1))
@@ -102,7 +102,7 @@ class Rupture(Table):
         return replace(net, strength=strength).with_column(HELD, 0.0)
 
     def on(self, net):
-        """The elements that break and, but in statics, the term that holds what they held."""
+        """The elements that may break and, except in statics, the term of the rupture energy."""
         limits, count = net.strength * net.area, len(net.web.lines)
         for i, (line, _) in enumerate(self._due):
             if line >= count:

@@ -35,23 +35,23 @@ class GroupTemperature(Table):
 
 @table
 class Temperature(Table):
-    """Thermal strain of the lines; mass, section and modulus stay.
+    """Thermal strain of the lines; mass, section and modulus do not change.
 
     Parameters
     ----------
     expansion : float
-        Coefficient of linear expansion α [1/K]; that of aramid is negative.
+        Coefficient of linear expansion α [1/K]; it is negative for aramid.
     change : float or sequence of (t, change)
-        Difference ΔT [K] to the temperature at which natural lengths are those of the web: one number for all times, or
-        a table, linear in between, end values held. In statics t is the load step.
+        Difference ΔT [K] from the temperature at which natural lengths are those of the web: one number, or a table
+        over time, linear between the times, constant before and after them. In statics t is the load step.
     groups : dict of str to GroupTemperature
-        Values that differ by group of lines; groups that share lines give them different keys.
+        Values by group of lines; groups that share lines must give different keys.
 
     Raises
     ------
     InputError
-        For numbers that are not finite, times that do not increase, and 1 + α ΔT that is not > 0 on some lines; from
-        ``extend``, for a group that no line has, and two groups that give the same key to one line.
+        For numbers that are not finite, times that do not increase, and 1 + α ΔT that is not > 0 on some lines. From
+        ``extend``, for a group without lines, and two groups that give the same key to one line.
 
     Examples
     --------
@@ -93,7 +93,7 @@ class Temperature(Table):
 
 
 def _factor(expanding, changing):
-    """Table of 1 + α ΔT, of the two tables that give α and ΔT."""
+    """Table of 1 + α ΔT, from the two tables that give α and ΔT."""
     change = changing.change if isinstance(changing.change, tuple) else ((0.0, changing.change),)
     return [(t, 1.0 + expanding.expansion * value) for t, value in change]
 

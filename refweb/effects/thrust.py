@@ -1,11 +1,11 @@
-"""Thrust along a line: a force on a node that turns with the line's tangent there.
+"""Thrust along a line: a force on a node in the direction of the line's tangent there.
 
 With d = ±dx/dξ at the node, into the line, and e = d/|d|
 
     force on the node     F e
     stiffness towards b   −F (∂d/∂x_b) (I − e⊗e)/|d|.
 
-It has no potential. A line that has no length at the node has no direction, and no thrust acts.
+It has no potential. If dx/dξ is zero at the node, the line has no direction and no thrust acts.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .line_kernels import direction
 from .outer_load import factor_at, outer_load
 
 SHORTER = 0.5
-"""Length, of that at a history row, down to which a line may shrink until the next within the bound of the step."""
+"""Length of a line, over that at the last history row, down to which the bound of the step is valid."""
 
 
 def end_of(nodes):
@@ -86,18 +86,18 @@ class Thrust(Table):
     node : int or str
         One node, by number or name.
     line : int, str or list
-        The line that ends at it, by number or group; of several lines one ends there.
+        The line that ends at the node, by number or group; of several lines exactly one must end there.
     force : float
         Force [N]; a positive one pulls the node into the line, towards its other end.
     factor : sequence of (t, factor), optional
-        Multiplies the force; linear in between, end values held. Without it the force acts in full, or, in statics,
-        times the load step.
+        Factor on the force over time: linear between the times, constant before and after them. Without it the factor
+        is 1, in statics the load step.
 
     Raises
     ------
     InputError
-        For a force that is not finite, and a factor without rows or whose times do not increase; from ``on``, for what
-        is not one node of the web, and a line that does not end at it.
+        For a force that is not finite, and a factor without rows or with times that do not increase. From ``on``, for a
+        name that is not one node of the web, and a line that does not end at it.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Piecewise linear tables over time, as compiled kernels read them.
+"""Piecewise linear tables over time, for compiled kernels.
 
-A table of rows (t, values...) stands in a row of ``data`` as: number of rows, then the rows one after another. It holds
-its end values before the first and after the last time.
+A table of rows (t, values...) is stored in a row of ``data``: the number of rows, then the rows one after another. Its
+values are constant before the first and after the last time.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def interpolate(t, data, start, width, column):
 
 @kernel()
 def integrate(t, data, start, width, column):
-    """∫ of one column from the first time of the table to t, exact for what `interpolate` gives."""
+    """∫ of one column from the first time of the table to t, exact for the values of `interpolate`."""
     rows, first, total = int(data[start]), start + 1, 0.0
     if t < data[first]:
         return data[first + column] * (t - data[first])
@@ -48,5 +48,5 @@ def integrate(t, data, start, width, column):
 
 
 def flattened(table):
-    """A table as the list of numbers that `interpolate` reads."""
+    """A table as a list of numbers, in the format of `interpolate`."""
     return [float(len(table)), *(value for row in table for value in row)]

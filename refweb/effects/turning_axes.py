@@ -1,15 +1,16 @@
-"""Forces in axes that turn steadily about the origin: linear in the place of a mass, and Coriolis forces.
+"""Forces in axes that rotate steadily about the origin: forces linear in position, and Coriolis forces.
 
-With the angular velocity Ω of the axes, a symmetric matrix G [1/s²] and consistent or lumped masses M every row feels
+With the angular velocity Ω of the axes, a symmetric matrix G [1/s²] and consistent or lumped masses M, each row has the
+force
 
     M G r − 2 M Ω × v,      with the potential −½ r·M G r of the first part.
 
-Coriolis forces do no work: kinetic energy and potentials, this one among them, keep their sum, the Jacobi integral. The
-moment of inertia I of a sphere whose rotation is followed feels −I Ω × ω, ω its angular velocity in these axes; a ring
-keeps its plane in these axes and turns about its normal, which that does not change. Moments on bodies that turn in
-space are in `refweb.effects.turning_bodies`.
+Coriolis forces do no work: the sum of kinetic energy and all potentials is constant, the Jacobi integral. A sphere
+whose rotation is followed has the moment −I Ω × ω, with its moment of inertia I and its angular velocity ω in these
+axes. A ring keeps its plane in these axes, and this moment does not act about its normal.
+`refweb.effects.turning_bodies` has the moments on bodies that rotate in space.
 
-Consistent mass couples the nodes of an element here as it does in M v': the force is that of the position between them.
+Consistent mass couples the nodes of an element here as in M v'.
 """
 
 from __future__ import annotations
@@ -149,14 +150,14 @@ def kernels_of_velocity(nodes):
 
 
 def force_terms(net, frame, pull, **arguments):
-    """The terms of all rows with mass; where mass is consistent those of the lines as well.
+    """The terms of all rows with mass; with consistent mass also those of the lines.
 
     Parameters
     ----------
     net : refweb.net.net.Net
-        What they act on.
+        The net.
     frame : refweb.effects.base.MovingFrame
-        With Ω [rad/s].
+        Frame with Ω [rad/s].
     pull : array_like, shape (3, 3)
         G [1/s²].
     **arguments

@@ -1,12 +1,12 @@
-"""Moments on bodies that turn in space, in axes that turn steadily: of forces linear in the place, and Coriolis forces.
+"""Moments on bodies in steadily rotating axes: by forces that are linear in position, and by Coriolis forces.
 
-With S = ∫ r⊗r dm of a body, which is ½ tr(J) 1 − J of its tensor of inertia J, the forces of
+Let S = ∫ r⊗r dm of a body, which is ½ tr(J) 1 − J with its tensor of inertia J. The forces of
 `refweb.effects.turning_axes` have the moments about its centre
 
     ∫ r × G r dm = ε : (S G),        −2 ∫ r × (Ω × (ω × r)) dm = 2 ω × S Ω,
 
-the first of the potential −½ tr(S G), of which gravity gradients are a part; the second does no work. ω is the angular
-velocity in these axes, see `refweb.net.rotation`; a rotation δθ changes S by δθ × S − S × δθ.
+The first moment, which includes gravity gradients, has the potential −½ tr(S G). The second does no work. ω is the
+angular velocity in these axes, see `refweb.net.rotation`. A rotation δθ changes S by δθ × S − S × δθ.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ def rows_of(m):
 
 @kernel()
 def turned(m, s):
-    """M S Mᵀ of a symmetric matrix S, all by rows."""
+    """M S Mᵀ of a symmetric matrix S, all row by row."""
     p, q, r = times(m, s[0]), times(m, s[1]), times(m, s[2])
     return times(m, (p[0], q[0], r[0])), times(m, (p[1], q[1], r[1])), times(m, (p[2], q[2], r[2]))
 
 
 @kernel()
 def turning_of(s, g):
-    """ε : (S G) of a matrix S and a symmetric one, by rows."""
+    """ε : (S G) of a matrix S and a symmetric matrix G, row by row."""
     return (
         s[1][0] * g[0][2] + s[1][1] * g[1][2] + s[1][2] * g[2][2]
         - s[2][0] * g[0][1] - s[2][1] * g[1][1] - s[2][2] * g[2][1],
@@ -68,7 +68,7 @@ def turning_of(s, g):
 
 @kernel()
 def changed(e, s):
-    """e × S − S × e, what a small rotation e adds to a symmetric matrix S, by rows; symmetric."""
+    """e × S − S × e, the symmetric change of a symmetric matrix S by a small rotation e, row by row."""
     a, b, c = cross(e, s[0]), cross(e, s[1]), cross(e, s[2])  # columns of e × S
     return (
         (a[0] + a[0], b[0] + a[1], c[0] + a[2]),
@@ -182,7 +182,7 @@ def damping_bound(reach, speed, x, mass, rates, cells, data):
 
 
 def force_terms(net, speed, pull, arguments):
-    """The terms of all bodies that turn in space, see `refweb.effects.turning_axes.force_terms`."""
+    """The terms of all bodies that rotate in space, see `refweb.effects.turning_axes.force_terms`."""
     turns = RigidRotations.of(net)
     tensors = [body.axes.T @ body.inertia @ body.axes for body in net.bodies if body.turn is not None]
     spreads = [0.5 * np.trace(tensor) * np.eye(3) - tensor for tensor in tensors]

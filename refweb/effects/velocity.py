@@ -10,26 +10,25 @@ from ..tables import Several, Table, nodes, table, vector
 
 @table
 class Velocity(Table):
-    """Initial velocity of some nodes, alike or as they turn about a point; "all" are all nodes that are free.
+    """Initial velocity of some nodes, uniform or by a spin about a point; "all" are all free nodes.
 
     Parameters
     ----------
     node : int, str or list
-        Nodes, by number or name. Of several velocities of one node the last counts: first those of "all".
+        Nodes, by number or name. If a node has several velocities the last table counts; tables with "all" come first.
     value : sequence of 3 float, optional
         Velocity [m/s].
     spin : sequence of 3 float, optional
-        Angular velocity [rad/s] at which they turn about a point, as a rigid body does: ω × (x − about) adds to
-        ``value``.
+        Angular velocity ω [rad/s] about a point, as for a rigid body: ω × (x − about) is added to ``value``.
     about : sequence of 3 float
-        That point [m].
+        Point of the spin [m].
 
     Raises
     ------
     InputError
-        For vectors that are not three finite numbers, and where neither ``value`` nor ``spin`` is given; from
-        ``start``, in statics, for a node that the web does not have, and for one that is named and on a body, or
-        supported along a component that is not 0.
+        For vectors that are not three finite numbers, and if neither ``value`` nor ``spin`` is given. From ``start``:
+        in statics, for a node that the web does not have, and for a named node that is attached to a body, or supported
+        along a component that is not 0.
 
     Examples
     --------
@@ -47,7 +46,7 @@ class Velocity(Table):
     about: Several = vector(default=(0.0, 0.0, 0.0), unit="m")
 
     def check(self):
-        """Refuse what gives no velocity."""
+        """Refuse a table without ``value`` and ``spin``."""
         if self.value is None and self.spin is None:
             raise InputError("value is missing: a velocity needs value = [...] [m/s], spin = [...] [rad/s], or both")
         if self.spin is None and any(self.about):

@@ -12,12 +12,12 @@ the least quadrature with which no motion of an element but a rigid one is free 
 the elements: on the elastic catenary L2 errors fall with order p + 1 and nodal errors with 2p, those of frequencies
 with 2p for either mass. A Gauss point is then a bar of its own, of length w L; see `refweb.net.net.Net.bars`.
 
-Where a line goes slack inside an element the integrand has a kink, its quadrature is of order 2 for any p, and orders
-above 1 lose their advantage. In a cable that is knocked together L2 errors fall with orders 2.0, 3.0 and 4.0 for
+The integrand has a kink where a line goes slack inside an element. Its quadrature is then of order 2 for any p, and
+orders above 1 lose their advantage. In a cable that is knocked together L2 errors fall with orders 2.0, 3.0 and 4.0 for
 p = 1, 2 and 3 while all of it is taut, and with 2.0, 1.1 and 1.0 once its middle is slack: nodes of a slack element fly
 on by themselves, with velocities that several points going slack one after another leave wrong by ~ h. With 160 nodes
-the errors of p = 2 and 3 are still an eighth of that of p = 1, with 1000 nodes all three are alike. Where a slack part
-is pulled taut the strain jumps, and no order exceeds 1.
+the errors of p = 2 and 3 are still an eighth of that of p = 1, with 1000 nodes all three are alike. The strain jumps
+where a slack part is pulled taut, and no order exceeds 1.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
     cable : refweb.net.cable.Cable
         Material, order and subdivision.
     quasi_static : bool
-        Whether time is the load step of statics.
+        True if time is the load step of statics.
     consistent : bool
         Whether mass is consistent, ∫ρA N_a N_b ds, and not lumped to ∫ρA N_a ds.
     explicit : bool

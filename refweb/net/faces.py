@@ -39,7 +39,7 @@ def decided(mesh, edges):
     edge_groups : dict of str to ndarray of int
         Edges of each group of faces, by their number among the edges.
     notes : list of refweb.findings.Finding
-        What was decided by itself.
+        Decisions that were made automatically.
 
     Raises
     ------

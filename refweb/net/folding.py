@@ -44,8 +44,8 @@ def wound(points, hub, axis, ratio, turns):
 def distances(starts, ends, pairs):
     """Least distance of the segments of each pair, shape (pairs,).
 
-    The least of |a + s u − t v|² over the square of s and t is at its middle where that is inside, else on one of its
-    four edges, where it is that of an end and a segment.
+    The minimum of |a + s u − t v|² over the unit square of s and t is at its stationary point if that is inside. Else
+    it is on one of the four edges, where it is the distance of an end and a segment.
     """
     (i, j), tiny = pairs.T, np.finfo(float).tiny
     u, v, a = ends[i] - starts[i], ends[j] - starts[j], starts[i] - starts[j]

@@ -18,10 +18,10 @@ opposite faces. With b = (|l| − c + g)₊ of each axis, or √(l² + (g − c)
 This is convex in l and t together. Depth is concave, its gradient continuous, of length 1 at the surface and nowhere
 longer, and Newton's method comes down to the root from the distance of the nearest face.
 
-What that is worth, with the default rounding, over faces with creases and the normal of one of them: of 60 taut cables
-that are bent over the edge of a box, Newton's method refuses none instead of 48; nets that fall on a box keep their
-energy to 1e-5, with order 2, instead of 0.1. A `WIDENING` of 1, edges that stay as sharp as they are, gives the same
-until rounding is as small as 1e-4 of the size, where the order is 1; one of 2 leaves less depth in the middle.
+With the default rounding, this depth does better than faces with creases and the normal of one of them. Of 60 taut
+cables that are bent over the edge of a box, Newton's method refuses none instead of 48. Nets that fall on a box keep
+their energy to 1e-5, with order 2, instead of 0.1. A `WIDENING` of 1, edges that stay as sharp as they are, gives the
+same until rounding is as small as 1e-4 of the size, where the order is 1; one of 2 leaves less depth in the middle.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ class Tessellation(NamedTuple):
     lines : ndarray of int, shape (lines, 2)
         Shared sides.
     frame : ndarray of bool, shape (lines,)
-        Which of them belong to one polygon only.
+        True for sides of one polygon only.
     sides : ndarray of int, shape (polygons, corners)
         The line of each side.
     """

@@ -16,7 +16,7 @@ FIELDS = [
     ("reference", float, (3,)),
     ("distance", float),
 ]
-"""What a net begins with; kernels know these columns by `refweb.effects.line_kernels`."""
+"""Columns of every net; kernels know them by `refweb.effects.line_kernels`."""
 
 
 class LineData(np.recarray):

@@ -67,8 +67,8 @@ class File(Table):
     lines : str, optional
         With CSV the file of the lines.
     edges : bool, optional
-        Whether edges of faces are lines: "true" takes them beside the lines of the file, "false" takes its lines alone.
-        By default they are where the file has no lines; a file of both is refused without this key.
+        True to take edges of faces as lines, beside the lines of the file; false to take the lines of the file alone.
+        By default edges are taken if the file has no lines. A file with lines and faces is refused without this key.
     columns : dict of str to str, optional
         With CSV the names of columns that have other names: ``columns = {i = "from", j = "to"}``.
     first : int, optional

@@ -24,7 +24,7 @@ REMEDIES = {
     ".obj": "write rows l 1 2 of lines, or rows f 1 2 3 of faces",
     "": "extract the edges of solids, in ParaView by Extract Edges, in pyvista by mesh.extract_all_edges()",
 }
-"""What to do with a file that has other cells."""
+"""Remedies for a file with other cells, by the end of its name."""
 BY_VTK = """
 import sys
 import numpy as np
@@ -38,7 +38,8 @@ for kind, data in (("cell", mesh.cell_data), ("point", mesh.point_data)):
         found[f"{kind} {name}"] = np.asarray(data[name])
 np.savez(sys.argv[2], **found)
 """
-"""What reads a file by VTK, its path and that of an archive of arrays given."""
+"""Program that reads a file by VTK. Its arguments are the path of the file and that of the archive of arrays to
+write."""
 
 
 class Block(NamedTuple):
@@ -63,9 +64,9 @@ class Mesh(NamedTuple):
     blocks : list of Block
         All cells, in the order of the file.
     point_data : dict of str to ndarray
-        What is known of nodes.
+        Data of nodes by name.
     remedy : str
-        What to do where there are cells that a web does not have.
+        Remedy for cells that a web cannot have.
     groups : dict of str to list of int, optional
         Cells of Gmsh that are lines, by physical group; None for other files.
     names : dict of str to list of int

@@ -43,7 +43,7 @@ class Net:
     line_data : refweb.net.line_data.LineData
         Numbers of each element.
     factors : tuple
-        What reels and heat make of natural lengths: (elements, table of (t, factor)), they multiply.
+        Factors of reels and heat on natural lengths, which are multiplied: (elements, table of (t, factor)).
     end : float
         Time at which a run ends at the latest [s], or its last load step.
     area, strength : ndarray, shape (cells,)

@@ -68,7 +68,7 @@ class Grown(NamedTuple):
     core : tuple of 3 float
         Half sizes of the core along the body's axes [m]; infinite where it has no end.
     round : bool
-        Whether the core is a cylinder about the third axis, of the radius that stands first, and not a box.
+        True if the core is a cylinder about the third axis, with the first number as radius; False for a box.
     fine : float
         Length on which the surface may turn [m], of a body that need not be convex; 0 of a convex one.
     thick : float
@@ -91,14 +91,14 @@ class Shape(Table):
     Attributes
     ----------
     free : bool
-        Whether a body of this shape may move.
+        True if a body of this shape may move.
     once : bool
-        Whether its core is a point: a sphere touches a line once, at the deepest place, other shapes each element at
-        both ends and once in between.
+        True if its core is a point: a sphere has one contact with a line, at the deepest point. Other shapes have
+        contacts with each element at both ends and one in between.
     planar : bool
-        Whether it turns about its third axis only, and looks the same then.
+        True if it rotates about its third axis only, about which it is symmetric.
     ground : bool
-        Whether its size says nothing of the depth of contact that is too much, as that of ground does not.
+        True for ground, whose size gives no limit of the penetration.
     error : float, optional
         Largest distance of the surface that lines feel from the one that is meant [m], where these differ.
     directions : tuple of str
@@ -216,7 +216,7 @@ class RigidBody:
     row : int
         Its row of x and v.
     shape : Shape
-        What it looks like.
+        Shape of the body.
     velocity : tuple of 3 float
         Initial velocity [m/s].
     fixed : bool
@@ -232,7 +232,7 @@ class RigidBody:
     angular_velocity : tuple of 3 float
         Initial angular velocity [rad/s].
     turns : bool
-        Whether its rotation is followed.
+        True if its rotation is followed.
     spin : int, optional
         Its row of rotation, where it has one.
     turn : int, optional

@@ -307,8 +307,9 @@ def along_principal(n, m, a, turns):
 def fastest_about(n, u, turns):
     """Angular velocities about its principal axes that a free body comes to, at most [rad/s], by L/I along these.
 
-    With w = I/J about each axis and e = Σ (w − 1) u², which is (2 T I − L²)/I² of what a free body keeps, they are no
-    more than w |u|, √(w Σ w u²) and w √(e/(w − 1)): a rod that spins about its middle does not about its own line.
+    Let w = I/J about each axis and e = Σ (w − 1) u², which is (2 T I − L²)/I² and constant for a free body. Bounds are
+    w |u|, √(w Σ w u²) and w √(e/(w − 1)). With the last one, a rod that spins about its middle does not spin about its
+    axis.
     """
     w, square, energy, spare = turns.faster[n], 0.0, 0.0, 0.0
     for k in range(3):

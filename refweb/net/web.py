@@ -41,7 +41,7 @@ class Web:
         each group, a dict of increasing int64 arrays, with those of `refweb.net.groups` that the web's own supports
         make.
     length_given : bool, optional
-        Whether natural lengths are data of their own and not distances; by default whether ``natural_length`` is given.
+        True if natural lengths are separate data, not distances; by default True if ``natural_length`` is given.
     broken : sequence of int
         Lines that are broken and carry nothing, as an attribute increasing int64.
     notes : sequence of refweb.findings.Finding
@@ -176,7 +176,7 @@ class Web:
         selection : int, str or list of them
             Node numbers, the user's names, "centre", "rim", "corners" or "all".
         name : str
-            What messages call the selection.
+            Name of the selection in messages.
 
         Returns
         -------
@@ -212,7 +212,7 @@ class Web:
         selection : int, str or list of them
             Line numbers, groups, or "all".
         name : str
-            What messages call the selection.
+            Name of the selection in messages.
 
         Returns
         -------

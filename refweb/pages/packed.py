@@ -21,9 +21,9 @@ def levels(values, steps):
     Parameters
     ----------
     values : ndarray
-        What is written; entries that are not finite get the level ``steps + 1``.
+        Values to write; entries that are not finite get the level ``steps + 1``.
     steps : int
-        How many steps the range has.
+        Number of steps of the range.
 
     Returns
     -------

@@ -24,7 +24,7 @@ from .sheet_text import PACKING
 SCRIPTS = ("model.js", "webgl.js", "hand.js", "view.js")
 ENDINGS = ("html", "htm")
 NAME = "report.html"
-"""What the page of a result folder is called."""
+"""Name of the page of a result folder."""
 
 
 def report(folder, out=None, frames=None, progress=None):

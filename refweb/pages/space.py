@@ -36,7 +36,7 @@ class Space(NamedTuple):
     Attributes
     ----------
     head : dict
-        What the page is told of them, plain values for JSON; its key ``arrays`` says what is where in `text`.
+        Data for the page, plain values for JSON; its key ``arrays`` lists the arrays in `text`.
     text : str
         Arrays in the form of `refweb.pages.packed.pack`.
     error : float
@@ -61,7 +61,7 @@ def space_of(record, peak=None, limit=None, progress=None):
     Parameters
     ----------
     record : refweb.pictures.record.Record
-        What is shown.
+        Record of the run.
     peak : int, optional
         Number of a frame that is shown in any case, as are the first and the last.
     limit : int, optional
@@ -98,9 +98,10 @@ def space_of(record, peak=None, limit=None, progress=None):
 
 
 def chosen_of(numbers, count, peak=None):
-    """The first, the last, the frame ``peak`` and, evenly between them, others; ``count`` in all where there are so
-    many, and not fewer than these three unless fewer are asked for: then the peak comes before the first, and the first
-    before the last."""
+    """Numbers of the frames to show: the first, the last, the frame ``peak``, and others evenly between them.
+
+    There are ``count`` in all, if there are so many. If ``count`` is 1 or 2, the peak precedes the first and the last.
+    """
     if count >= len(numbers):
         return list(numbers)
     if count < 3:

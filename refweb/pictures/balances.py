@@ -22,18 +22,19 @@ STORED, LOST, GIVEN, TOTAL = "stored", "dissipated_energy", "work", "total_energ
 
 
 class EnergyBalance(NamedTuple):
-    """The book of energies.
+    """The energy balance of a plot.
 
     Attributes
     ----------
     parts : dict of str to ndarray
-        What is stacked, by name: energies [J], shape (rows,), where they have no zero above their least.
+        Energies that are stacked, by name [J], shape (rows,); energies without a natural zero count from their smallest
+        value.
     smallest : dict of str to float
-        What has been subtracted of each of them [J].
+        Smallest value that was subtracted from each [J].
     top : ndarray
         Their sum [J].
     given : ndarray
-        What is there at the start, and work [J]; as large as ``top`` where the book closes.
+        Energy at the start plus work [J]; it equals ``top`` if the energy balance closes.
     """
 
     parts: dict
@@ -191,7 +192,7 @@ class MomentumBalancePlot(NamedTuple):
     momentum : ndarray
         Of all that is free.
     impulses : dict of str to ndarray
-        What came in since the start.
+        Impulses since the start, by name.
     """
 
     momentum: np.ndarray

@@ -8,11 +8,11 @@ import numpy as np
 
 TANGENT = np.tan(np.radians(10.0))
 ALONE, WHOLE = (0.07, 0.08, 0.79, 0.78), (0.02, 0.04, 0.85, 0.85)
-"""Where a view stands that is the only one [share of the page], with metres along its axes and without."""
+"""Position on the page of a view that stands alone [share of the page]: with axes in metres, and without axes."""
 LEFT, WIDTH, BOTTOM, HEIGHT, LEAST = 0.07, 0.79, 0.07, 0.79, 0.12
 """Of two views that stand one above the other, and the least height of the lower one [share of the page]."""
 BESIDE = (0.02, 0.06, 0.40, 0.82), (0.48, 0.08, 0.37, 0.80)
-"""Where two views stand side by side [share of the page]."""
+"""Positions on the page of two views side by side [share of the page]."""
 MANY = 50_000
 """Points above which a view is fitted to the `outermost` of them."""
 VIEWS = ("oblique", "side", "front", "top")
@@ -130,7 +130,7 @@ def choose(origin, points, solid, moved, tree, aspect, named=None):
     moved : float
         Largest component of a displacement [m].
     tree : bool
-        Whether the lines close no loop, as those of a cable.
+        True if the lines form no closed loop, as in a cable.
     aspect : float
         Width/height of the page.
     named : str or array of 3, optional

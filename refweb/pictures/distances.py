@@ -17,7 +17,7 @@ from .record import CLOCKS
 from .sheet import PALE, Panel, label, legend
 
 FIELDS = {"stress": "Pa", "tension": "N", "strain": "1"}
-"""What can be drawn, and its unit."""
+"""Fields that can be drawn, with their units."""
 MANY = 4000
 """Lines above which their points are an image in files that are made of strokes."""
 
@@ -38,7 +38,7 @@ class Spread(NamedTuple):
     origin : str
         The place in words.
     remark : str
-        Which instant it is, where the largest value is that of another one; empty where it is of this.
+        Text of the instant, if the largest value belongs to another instant; else empty.
     """
 
     frame: Frame

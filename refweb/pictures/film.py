@@ -1,7 +1,7 @@
 """Films of a run: all its frames, with one camera and one range of colours; of a mode a period of its swing.
 
-One renderer is kept for all frames. What stands around the web is drawn once; of a frame only the web and its time are.
-Frames are read, drawn and written one after the other.
+One renderer is kept for all frames. The surroundings of the web are drawn once; of each frame only the web and its time
+are drawn. Frames are read, drawn and written one after the other.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class Frame(NamedTuple):
     paths, origin : ndarray, shape (lines, points, 3)
         Lines where they are and undeformed [m].
     tree : bool
-        Whether the lines close no loop.
+        True if the lines form no closed loop.
     fields : dict of str to ndarray, shape (lines,)
         Values per line [SI].
     slack : ndarray of bool, shape (lines,)
@@ -48,7 +48,7 @@ class Frame(NamedTuple):
     lifted : ndarray, shape (n, 3)
         Displacements of supported nodes [m].
     swing : ndarray, shape (lines, points, 3), or None
-        What a mode adds to the paths [m]; None of what is no mode.
+        Displacement of a mode along the paths [m]; None if there is no mode.
     masses : Masses or None
         Point masses; None where there are none.
     """
@@ -194,7 +194,7 @@ def frame_of(number, time, meshes, supported, point_mass=None):
     meshes : dict of str to meshio.Mesh
         ``web``, and bodies by name, as `refweb.results.vtu.meshes` makes them.
     supported : ndarray of bool, shape (points,)
-        Which points of the web are supported.
+        True for supported points of the web.
     point_mass : ndarray, shape (points,), optional
         Point mass on each point of the web [kg].
     """

@@ -26,7 +26,7 @@ def script(folder, field=None, out=None):
     folder : path-like
         A result folder.
     field : str, optional
-        What the colours show, as of `refweb.picture`.
+        Field of the colours, as in `refweb.picture`.
     out : path-like, optional
         A ``.py`` to write; default ``web_in_paraview.py`` in the folder. It finds the folder beside itself, or
         else where it was when the script was written.

@@ -1,10 +1,9 @@
 """Pictures of a run: the web, its lines coloured by a field, drawn of a result folder or of a solution in memory.
 
-A web is seen twice: in perspective, and from the side with metres along the axes. What lies in a plane, such as a
+A web is seen twice: in perspective, and from the side with metres along the axes. A web that lies in a plane, such as a
 hanging cable, is seen once, along the normal of the plane. Colours have one range in all frames of a run, so that two
-pictures of it can be held against each other. Slack lines are grey where the field is a tension, stress or strain.
-Nothing needs a display: `refweb.pictures.render` renders by OpenGL off screen, and `refweb.pictures.polygons` where it
-cannot.
+pictures of it can be compared. Slack lines are grey where the field is a tension, stress or strain. Nothing needs a
+display: `refweb.pictures.render` renders by OpenGL off screen, and `refweb.pictures.polygons` where it cannot.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from .stage import DARK, PALE, Look, Seen, Stage, limits_of
 SIZE = (1600, 1000)
 """Of a picture [pixel]."""
 LABELS = ("lines",)
-"""What can be numbered."""
+"""Parts of a web that can be numbered."""
 MOST_SCALED = 1e6
 """Largest factor on displacements."""
 
@@ -53,16 +52,16 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
         ``stress``, of modes ``shape``, or the first there is. ``utilisation`` is that of lines that have a strength,
         and ``largest_NAME`` of each line the largest NAME over the frames that were written.
     range : (low, high) or "auto", optional
-        What the colours span [SI]; ``"auto"`` the values of this frame. Default the values of all frames.
+        Range of the colours [SI]; ``"auto"`` for the values of this frame. Default the values of all frames.
     scale : float
-        What displacements, of modes their shape, are drawn times, > 0.
+        Factor on displacements, or on the shape of a mode, > 0.
     view : str or sequence of 3 floats, optional
         The only view: ``"oblique"``, ``"side"``, ``"front"``, ``"top"``, along the web's normal, or a direction from
         the web to the viewer. Default an oblique view and one from the side.
     out : path-like, optional
         File to write, in any format that matplotlib writes.
     labels : {"lines"}, optional
-        What is numbered. Of lines whose numbers would cover each other, that with the largest value has its own.
+        Parts to number. If numbers of lines would overlap, the line with the largest value keeps its number.
 
     Returns
     -------

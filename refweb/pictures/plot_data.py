@@ -26,9 +26,9 @@ class Shown:
     Attributes
     ----------
     record : refweb.pictures.record.Record
-        What is drawn.
+        Record to draw.
     name : str
-        What tells it from the others; empty where there are none.
+        Name that distinguishes it from other records; empty if there are none.
     ink : refweb.pictures.sheet.Ink
         How its lines look.
     """

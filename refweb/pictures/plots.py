@@ -23,9 +23,9 @@ from .sheet import Ink, sheet
 ENDINGS = ("png", "svg", "pdf")
 """Formats of plots."""
 LETTERS_STAY: dict[Any, Any] = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg.hashsalt": "refweb"}
-"""What keeps text as text in files that are made of strokes, and their names the same each time."""
+"""Settings that keep text as text in vector files, and give their elements the same names each time."""
 BESIDE: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-"""What is written of a file's making: nothing, so that equal plots are equal files."""
+"""Metadata of a file, by format: no dates, so that equal plots are equal files."""
 SPECTRUM, DISTANCE = "spectrum:", "-distance"
 
 
@@ -75,7 +75,7 @@ def draw(records, what=None, title=None):
         results over load steps, of one load step stress over distance, of modes their frequencies. A spectrum alone is
         that of the first observable, a field of lines alone that over distance.
     title : str, optional
-        What stands above; by default the titles of the scenes, and how a run ended that is not solved.
+        Title above the plot; by default the titles of the scenes, with the status of runs that are not solved.
 
     Returns
     -------

@@ -25,7 +25,7 @@ OTHERS = {
     "cost": "its diagram is cost.png there, by refweb cost",
     "sweep": "its plots are there already, by refweb sweep, one a result; refweb report writes its page",
 }
-"""What is said of folders that hold something else."""
+"""Remedies for folders that hold something else."""
 
 
 FRAMES_KEPT = 64
@@ -38,9 +38,9 @@ class Record(NamedTuple):
     Attributes
     ----------
     name : str
-        What tells it from others: the name of its folder, in memory the title of its scene.
+        Name that distinguishes it from others: that of its folder, in memory the title of its scene.
     kind : {"static", "dynamic", "modes"}
-        What was solved.
+        Kind of the run.
     summary : dict
         The content of ``run.json``; empty where a folder has none.
     scene : dict
@@ -148,7 +148,7 @@ def of_folder(folder, with_frames=True):
     folder : path-like
         The folder.
     with_frames : bool
-        Whether there have to be frames: a run that failed at once has none, and may have a history.
+        True if frames are required: a run that failed at once has none, but may have a history.
 
     Raises
     ------

@@ -47,11 +47,11 @@ class Panel(NamedTuple):
     draw : callable
         Called with the `matplotlib.axes.Axes` to draw on.
     along : str
-        What its horizontal axis is, with its unit: panels below each other share one that is the same.
+        Label of its horizontal axis, with its unit; panels below each other share an equal axis.
     height : float
         Its height [inch].
     notes : tuple of str
-        What stands below the sheet, once each.
+        Notes below the sheet, each once.
     """
 
     draw: Callable

@@ -53,9 +53,9 @@ def spectrum_of(time, values, name="history"):
     time : ndarray, shape (rows,)
         Times [s]. The last row, that of the end or of an event, may be nearer than the others and is left out then.
     values : ndarray, shape (rows,)
-        What is there.
+        Values at these times.
     name : str
-        What messages call it.
+        Name in messages.
 
     Raises
     ------

@@ -23,7 +23,7 @@ GREY_WHERE_SLACK = ("tension", "stress", "strain")
 UNITS = {"tension": "N", "reaction": "N", "stress": "Pa", "natural_length": "m", "displacement": "m"}
 UNITS |= {"velocity": "m/s", "mass": "kg"}
 LARGEST = "largest_"
-"""What the names of fields over all frames begin with."""
+"""Prefix of the names of fields over all frames."""
 MASSES, MASS_RADIUS, MASS_SIZES = (0.55, 0.16, 0.42), 5.0, 6
 """Colour of point masses, the radius of the largest over that of lines, and the number of their sizes."""
 MOST_UNDEFORMED = 20_000
@@ -36,17 +36,17 @@ class Look(NamedTuple):
     Attributes
     ----------
     field : str
-        What the colours show.
+        Field of the colours.
     limits : (low, high)
         Its range [SI].
     scale : float
-        What displacements are drawn times.
+        Factor on displacements.
     view : str, ndarray of shape (3,) or None
         The only view; None for those that show the web best.
     remark : str
         Words on the field, which stand beside the time.
     missed : bool
-        Whether the largest value of the run is above the range, as no frame has it.
+        True if the largest value of the run is above the range, since no frame has it.
     """
 
     field: str
@@ -63,19 +63,19 @@ class Seen(NamedTuple):
     Attributes
     ----------
     points, supports : ndarray, shape (n, 3)
-        What spans the lines, and the supports [m].
+        Extreme points of the lines, and of the supports [m].
     bodies : dict of str to ndarray, shape (n, 3)
-        What spans each body [m].
+        Extreme points of each body [m].
     origin : ndarray, shape (lines, points, 3)
         Undeformed lines [m].
     moved : float
         Largest component of a displacement [m].
     tree : bool
-        Whether the lines close no loop.
+        True if the lines form no closed loop.
     slack : bool
-        Whether some line is drawn as slack.
+        True if a line is drawn as slack.
     broken : bool
-        Whether some line is broken.
+        True if a line is broken.
     lower, upper : float
         Values of lines that are not [SI].
     masses : tuple

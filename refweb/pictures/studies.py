@@ -83,7 +83,7 @@ def draw(study, result):
     Parameters
     ----------
     study : Rows
-        What is drawn.
+        Rows of the study.
     result : refweb.results.case_rows.Named
         The result.
 

@@ -26,7 +26,7 @@ def window(folder, field=None):
     folder : path-like
         A result folder.
     field : str, optional
-        What the colours show, as of `refweb.picture`.
+        Field of the colours, as in `refweb.picture`.
 
     Raises
     ------

@@ -29,7 +29,7 @@ SUMMARIES = {
     "support": "Supports in addition to others.",
     "study": "Many runs of one scene: a file of its own, for `refweb sweep`.",
 }
-"""What tables are that share a class, or have one for each kind."""
+"""Summaries of tables that share a class, or that have a class for each kind."""
 
 
 class Key(NamedTuple):
@@ -55,21 +55,21 @@ class Page(NamedTuple):
     Attributes
     ----------
     name : str
-        What ``refweb help`` calls it: the table, and behind a dot the kind, or the key of tables inside of it.
+        Name in ``refweb help``: the table, then a dot and the kind, or the key of tables inside of it.
     header : str
-        How it stands in a scene file.
+        Header in a scene file.
     summary : str
-        What it is.
+        First sentence of its description.
     prose : list of str
-        What else there is to say.
+        Further paragraphs of its description.
     keys : list of Key
         Its keys.
     refused : str
-        What is refused beyond what a key takes.
+        Refusals beyond the limits of single keys.
     example : str
         Lines of a scene file.
     listing : Listing, optional
-        What its keys may be, row by row.
+        Possible values of a key, row by row.
     """
 
     name: str

@@ -58,7 +58,7 @@ def with_value(given, path, value) -> dict:
     Parameters
     ----------
     given : dict
-        What TOML reads of the file; it stays as it is.
+        Content of the file by TOML; it is not changed.
     path : str
         Keys and numbers with dots between. Tables that are missing are made, in a list of tables behind the last one.
     value : object

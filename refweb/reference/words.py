@@ -18,7 +18,7 @@ RULES = (
     "`refweb schema` prints these tables as JSON Schema for editors: save it as `refweb.schema.json`, and begin a "
     "scene file with the line `#:schema ./refweb.schema.json`.",
 )
-"""What holds for all tables."""
+"""Rules for all tables."""
 MATERIALS_TEXT = (
     "`[cable] material` and `[cable.groups.NAME] material` take modulus, density and strength from this table where a "
     "scene does not give them. Values are typical ones of new, dry fibres at room temperature; a braid or a twisted "

@@ -1,13 +1,12 @@
-"""``results.csv`` of a study, a row a case: written so that a kill at any moment leaves whole rows and nothing else.
+"""``results.csv`` of a study, one row a case. A kill at any moment leaves whole rows and nothing else.
 
-Columns are ``case``, which tells what was run by its content, ``status``, the parameters by their paths, of each result
-``NAME [unit]`` with ``NAME ±`` behind it and, where there is such, ``NAME least`` and ``NAME most``, between which it
-may lie anywhere, ``NAME mean`` and ``NAME deviation`` of its ensemble, and ``NAME verdict``, see
-`refweb.results.error_budget`; ``statistical``, names of results of which
-one run is one draw; ``message``, and what the run cost. An empty cell is what is not known. Numbers read back to the
-same floats.
+The columns are ``case``, a key of the content of the case; ``status``; the parameters by their paths; for each result
+``NAME [unit]`` and ``NAME ±``; ``statistical``, the names of results of which one run is one draw; ``message``; and the
+cost of the run. Some results have more columns. ``NAME least`` and ``NAME most`` are the ends of an interval in which
+the result may lie. ``NAME mean`` and ``NAME deviation`` are those of its ensemble. ``NAME verdict`` is its verdict, see
+`refweb.results.error_budget`. An empty cell means that the value is not known. Numbers read back to the same floats.
 
-While a study goes rows stand in the order in which cases end, and in the end in that of the cases.
+Rows are in the order in which cases end while a study runs, and in the order of the cases when it has ended.
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ from .files import number, write_atomically
 from .folder import hold
 
 NAME, ASIDE = "results.csv", "set-aside.csv"
-"""The table of a study, and rows that its cases do not ask for any more."""
+"""File of the table of a study; file of rows that are not among its cases any more."""
 FIRST, LAST = ("case", "status"), ("statistical", "message", "cpu_s", "wall_s", "compile_s")
-"""Columns before the parameters and behind the results."""
+"""Columns before the parameters, and columns after the results."""
 _TEXTS = ("case", "status", "statistical", "message")
 
 
@@ -40,13 +39,13 @@ class Named(NamedTuple):
 
 
 def results_among(columns):
-    """The results that columns hold, each a `Named`."""
+    """The results among columns, each a `Named`."""
     named = [column.rpartition(" [") for column in columns if column.endswith("]")]
     return [Named(name, unit[:-1]) for name, _, unit in named if f"{name} ±" in columns]
 
 
 def result_cells(row):
-    """The cells of a row that its case alone determines: without parameters, whose names may be others by now."""
+    """The cells of a row that its case determines: all but parameters, whose names may have changed."""
     names = {result.name for result in results_among(row)}
     ends = (" ±", " least", " most", " mean", " deviation", " verdict")
     mine = {f"{result.name} [{result.unit}]" for result in results_among(row)} | {
@@ -56,7 +55,7 @@ def result_cells(row):
 
 
 def read(path):
-    """Rows of a table, each a dict by column; none where there is no table. A row without its end is left out."""
+    """Rows of a table, each a dict by column; empty without a table. A row without its end is left out."""
     try:
         with open(path, encoding="utf-8", newline="") as file:
             text = file.read()
@@ -115,21 +114,21 @@ def write(path, rows, columns=()):
 
 
 class CaseRows:
-    """The table of a study that is being run, locked for as long.
+    """The table of a study during its run, locked until the run ends.
 
     Parameters
     ----------
     folder : path-like
         Folder of the study.
     rows : list of dict
-        Rows that are there already.
+        Rows that exist already.
     columns : sequence of str
-        Columns in their order, as far as they are known.
+        Columns that are known already, in their order.
 
     Raises
     ------
     SolverError
-        From every method that writes, where the folder cannot be written any more.
+        From every method that writes, if the folder cannot be written any more.
     """
 
     def __init__(self, folder, rows, columns):
@@ -166,18 +165,18 @@ class CaseRows:
                 raise
 
     def order(self, rows):
-        """Let the table hold some rows in their order."""
+        """Write the table with the given rows in their order."""
         self.rows = list(rows)
         self._write(self._columns)
 
     def close(self):
-        """Let go of the table."""
+        """Close the table, which ends its lock."""
         self._file.close()
 
 
 @contextlib.contextmanager
 def written(folder):
-    """Name a folder of a study where it cannot be written; see `refweb.results.folder.Folder`."""
+    """Turn an error of writing into a `SolverError` that names the folder of the study."""
     try:
         yield
     except OSError as error:

@@ -1,19 +1,19 @@
-"""Columns of ``history.csv`` beside the observables: which there are, by what acts on a system.
+"""Columns of ``history.csv`` beside the observables, by the effects of a system.
 
-Statics and dynamics write these, and no observable, event, body or group may have the name of one.
+Statics and dynamics write these columns. No observable, event, body or group may have the name of one.
 """
 
 from __future__ import annotations
 
 AXES = "xyz"
 VECTORS = ("momentum", "support_impulse", "outer_impulse")
-"""Vectors in the book of momentum of a dynamic run, the last where something acts from outside."""
+"""Vectors of the momentum balance of a dynamic run; the last exists where external forces act."""
 FIRST = {"static": "step [1]", "dynamic": "time [s]"}
-"""First column, by what is solved."""
+"""First column, by kind of run."""
 
 
 def static_energies(system):
-    """Names of the energies of an equilibrium: work is left out where other loads than dead ones act."""
+    """Names of the energies of an equilibrium; work is left out if loads that are not dead act."""
     stored = dict.fromkeys(term.balance.column for term in system.terms if term.energy is not None)
     works = [term for term in system.terms if term.balance.column == "work"]
     known = works and all(term.energy is not None for term in works)
@@ -28,7 +28,7 @@ def dynamic_energies(system):
 
 
 def vectors(system):
-    """Names of the vectors in the book of momentum."""
+    """Names of the vectors of the momentum balance."""
     return VECTORS[: len(VECTORS) - all(term.balance.internal for term in system.terms)]
 
 
@@ -38,6 +38,6 @@ def components(names):
 
 
 def taken(system):
-    """Names that columns of a static or a dynamic run of a system have."""
+    """Names of columns of static and dynamic runs of a system."""
     first = [column.rsplit(" [", 1)[0] for column in FIRST.values()]
     return [*first, *static_energies(system), *dynamic_energies(system), *components(VECTORS)]

@@ -1,4 +1,4 @@
-"""Result folders side by side: do their results agree within ±, and what differs between their scenes?"""
+"""Comparison of result folders: agreement of their results within ±, and differences of their scenes."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ def compare(folders):
     Returns
     -------
     dict
-        Plain values: ``folders``, ``status`` of each run; ``results``, a list of ``name``, ``step`` (None but for
-        several load steps), ``unit``, ``values``, what each ``run.json`` holds or None, ``differences`` from the first
-        that is there, ``agree``, and ``meaningless``, why the comparison of the result means nothing, else None;
-        ``scene``, a list of ``path`` and ``values``, None where a scene lacks the key;
-        ``agree``, whether all results that are there twice do.
+        Plain values. ``folders`` and ``status`` have an entry for each run. ``results`` is a list of dicts with
+        ``name``, ``step`` (None without several load steps), ``unit``, ``values`` (the entry of each ``run.json``, or
+        None), ``differences`` from the first value, ``agree``, and ``meaningless`` (reason why the comparison means
+        nothing, else None). ``scene`` is a list of dicts with ``path`` and ``values`` (None where a scene lacks the
+        key). ``agree`` is True if all common results agree.
 
     Raises
     ------
     InputError
-        For fewer than two folders, one that holds no results of refweb, and folders without a common result.
+        For fewer than two folders, a folder without results of refweb, and folders without a common result.
 
     Notes
     -----
-    Results agree where all intervals value ± error, or those in which an open value may lie, have a point in common. A
-    value without ± agrees with equal ones alone: that others are near shows nothing. Where the verdict on a result of
-    either run is "no limit" or "statistical" its value belongs to a mesh, or is one draw of many: whether it agrees is
-    told as of others, but means nothing.
+    Results agree if all their intervals have a point in common: value ± error, or the interval of an open value. A
+    value without ± agrees with equal values alone. If the verdict of a result is "no limit" or "statistical" in a run,
+    its value belongs to a mesh, or is one draw of many. Such results are compared as all others, but the comparison
+    means nothing.
     """
     if len(folders) < 2:
         raise InputError(f"compare {' '.join(map(str, folders))}: needs two result folders or more")
@@ -89,7 +89,7 @@ def _results(folder, summary, several):
 
 
 def _has(folder, summary, results):
-    """Content of a run, in words."""
+    """Text of the results of a run."""
     names = ", ".join(dict.fromkeys(name for name, _ in results))
     return f"{folder} has {names}" if names else f"the run in {folder} is {summary['status']} and has none"
 
@@ -121,7 +121,7 @@ MEANINGLESS = {
 
 
 def _why_meaningless(results):
-    """Reason why a comparison of results means nothing, by their verdicts; None where it means something."""
+    """Reason why a comparison of results means nothing, by their verdicts; else None."""
     given = [result.get("verdict") for result in results]
     verdicts = [verdict for verdict in MEANINGLESS if verdict in given]
     return "; ".join(f'verdict "{verdict}": {MEANINGLESS[verdict]}' for verdict in verdicts) or None
@@ -153,7 +153,7 @@ def _span(result):
 
 
 def _scenes(scenes):
-    """Paths at which scenes differ, and what stands there in each."""
+    """Paths at which scenes differ, and the value in each scene."""
     leaves = [dict(_leaves(scene)) for scene in scenes]
     rows = [
         (path, [leaf_values.get(path) for leaf_values in leaves])
@@ -165,7 +165,7 @@ def _scenes(scenes):
 
 
 def _leaves(value, path=""):
-    """Paths and values of whatever is no table; tables of a list go by name where each has one, else by number."""
+    """Paths and values of all keys that are no tables; tables of a list have their names in the path, else numbers."""
     parts = None
     if isinstance(value, dict):
         parts = value.items()

@@ -1,8 +1,8 @@
-"""Error budget of results: its parts, their sum ±, and a verdict that says what the number is worth.
+"""Error budget of results: its parts, their sum ±, and the verdict on the worth of each number.
 
 Parts are the errors of time steps, of elements, of the stiffness of contact, of the smoothing of the cable law, of
-chance where the motion is chaotic, and of rounding. Each is a number in the unit of the result, "none" where it does
-not exist here, or "not estimated" where nothing was run that tells. ± is the sum of the numbers.
+chance where the motion is chaotic, and of rounding. Each part is a number in the unit of the result, "none" if it does
+not exist in the scene, or "not estimated" if no run shows it. ± is the sum of the numbers.
 
 Every verdict follows from ± and the parts alone:
 
@@ -14,8 +14,7 @@ Every verdict follows from ± and the parts alone:
 `no limit`             finer elements do not converge: the number is one of the mesh
 =====================  =================================================================================
 
-A result has n digits where ± is at most 10^−n of its value. Where ± is small and a part is not estimated there is no
-verdict.
+A result has n digits if ± is at most 10^−n of its value. There is no verdict if ± is small and a part is not estimated.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from .units import readable
 
 PARTS = ("time", "elements", "contact_stiffness", "smoothing", "chance", "rounding")
 MODELS = ("elements", "contact_stiffness", "smoothing")
-"""Parts that are of the model and not of its solution."""
+"""Parts that belong to the model and not to its solution."""
 NONE, OPEN = "none", "not estimated"
 DETERMINED, WIDE, STATISTICAL, MODEL, NO_LIMIT = VERDICTS = (
     "determined",
@@ -44,17 +43,17 @@ DETERMINED, WIDE, STATISTICAL, MODEL, NO_LIMIT = VERDICTS = (
 ALLOWED = 0.1
 """± over the value above which a result is not determined."""
 SMOOTHING_SHARE = 0.1
-"""Smoothing that results are compared with, over that of the scene."""
+"""Smoothing of the runs that show the error of smoothing, over that of the scene."""
 SMOOTHED = 1.32
-"""What smoothing leaves of a result over what is found by a tenth of it, as if errors went with η.
+"""Error of smoothing over the error that a run with a tenth of it shows, if errors are proportional to η.
 
-Where they go with √η, as of nets that are flat and slack, a tenth leaves √0.1 of them."""
+For nets that are flat and slack errors are proportional to √η, and a tenth of η leaves √0.1 of them."""
 ZERO = 1e-14
-"""Value with its ± over the size of such results in a net, below which it is zero but for rounding."""
+"""Value plus ±, over the size of such results in a net, up to which the value is zero up to rounding."""
 MOST_DIGITS = 12
-"""Most digits that are named."""
+"""Largest number of digits that is reported."""
 TOUCH = 4.0
-"""Force of a contact over that of its first touch of one node up to which it is one of the mesh."""
+"""Largest force of a contact, over that of its first touch of one node, that counts as a property of the mesh."""
 WORDS = {
     "time": "time steps",
     "elements": "elements",
@@ -64,7 +63,7 @@ WORDS = {
     "rounding": "rounding",
 }
 EXACT = {"load", "motion", "reel", "temperature", "point_mass", "link"}
-"""Effects of statics that leave straight elements straight, so that more of them change nothing."""
+"""Effects of statics that keep straight elements straight, so that more elements change nothing."""
 
 
 def reasons_of(scene, system, solution):
@@ -102,18 +101,18 @@ def with_parts(result, static, reasons, further):
     Parameters
     ----------
     result : refweb.results.solution.Result
-        With the errors that its run tells.
+        Result with the errors of its run.
     static : bool
-        Whether it is one of an equilibrium.
+        True for a result of an equilibrium.
     reasons : dict of str to str
         Reasons why parts do not exist in its scene, by part.
     further : dict
-        ``parts`` and ``reasons`` by further runs, which count where they differ; empty without any.
+        ``parts`` and ``reasons`` by further runs, which take precedence; empty without further runs.
 
     Returns
     -------
     refweb.results.solution.Result
-        Also with the reason of each part that does not exist.
+        The result with its parts, and a reason for each part that does not exist.
     """
     reasons = {**reasons, **further.get("reasons", {})}
     known = {
@@ -130,20 +129,20 @@ def with_parts(result, static, reasons, further):
 
 
 def summed(result):
-    """The result with ± the sum of the parts that are known; None where none is."""
+    """The result with ± as the sum of its known parts; None without any."""
     numbers = [value for value in result.parts.values() if isinstance(value, float)]
     return result._replace(error=float(sum(numbers)) if numbers else None)
 
 
 def digits_of(value, error):
-    """Number of digits that ± leaves of a value: ± is at most 10^−n of it."""
+    """Number n of digits of a value: ± is at most 10^−n of it."""
     if error == 0.0:
         return MOST_DIGITS
     return max(0, min(MOST_DIGITS, math.floor(math.log10(abs(value) / error) + 1e-9))) if value else 0
 
 
 def scales_of(system):
-    """Sizes by unit that results of a system have, below `ZERO` of which they are zero."""
+    """Sizes of results of a system by unit; results below `ZERO` times these are zero."""
     net = system.net
     axial = float(net.axial.max())
     energy = float((net.axial * net.line_data.natural_length).sum())
@@ -156,16 +155,16 @@ def scales_of(system):
 
 
 def with_verdict(result, remedies, mesh_only=False, scales=None):
-    """The result with its verdict and a sentence on that.
+    """The result with its verdict, and a sentence on it.
 
     Parameters
     ----------
     result : refweb.results.solution.Result
-        With its parts and their sum.
+        Result with its parts and their sum.
     remedies : dict of str to str
-        Sentence by verdict on what makes ± smaller, or on what to ask instead.
+        Sentence by verdict: a way to make ± smaller, or a result to ask for instead.
     mesh_only : bool
-        Whether finer elements are known not to converge.
+        True if the result is known not to converge with finer elements.
     scales : dict of str to float, optional
         Sizes by unit, see `scales_of`.
     """
@@ -206,7 +205,7 @@ def listed(words):
 
 
 def shares(result):
-    """Words behind ± that say what it holds, where parts of the error are not estimated: "time only"."""
+    """Words after ± on the parts that it contains, if others are not estimated: "time only"."""
     parts, proven = result.get("parts") or {}, ["proven"] if result.get("proven") else []
     if parts.get("time") == NONE:  # an equilibrium
         of = {"elements": "elements", "contact_stiffness": "stiffness of contact", "smoothing": "smoothing"}
@@ -217,11 +216,11 @@ def shares(result):
 
 
 def first_touch(scene, system, observable):
-    """Force at which a body first meets the mass of one node [N], that of an unlimited number of elements is zero.
+    """Contact force at which a body first meets the mass of one node [N]; with ever finer elements it tends to zero.
 
     A mass m that meets a spring k δ^p at the speed v compresses it to ½ m v² = k δ^(p + 1)/(p + 1). The mass is the
-    largest that elements give a node which is free to move, the speed that of the body over that of the web at the
-    start. None for what is no instant of a force of contact.
+    largest that elements give to a free node. The speed is that of the body relative to the web at the start. None for
+    observables that are not the peak of a contact force on a body.
     """
     if observable.quantity != "reaction" or observable.body is None or observable.average is not None:
         return None
@@ -243,18 +242,18 @@ def first_touch(scene, system, observable):
 
 
 def judge(solution, scene, system, price=None, asked=None):
-    """Give the results of a solution their parts, ± and verdicts, and add warnings of what is wide.
+    """Set parts, ± and verdicts of the results of a solution, and add findings on wide results.
 
     Parameters
     ----------
     solution : refweb.solution.Solution
-        Its ``steps`` or ``reduced`` results are replaced; ``findings`` grow.
+        Solution whose ``steps`` or ``reduced`` results are replaced; ``findings`` grow.
     scene : refweb.Scene
         As it was solved.
     system : refweb.system.system.System
         That of the scene.
     price : callable, optional
-        ``price(share)``, the CPU time [s] that errors take which are to fall by a factor.
+        Function ``price(share)``: expected CPU time [s] of errors that are smaller by a factor.
     asked : dict, optional
         Errors by result of further runs, of the last load step in statics: ``parts``, ``reasons``, ``mesh_only`` and
         ``spread``, see `refweb.studies.further_runs`.
@@ -285,12 +284,12 @@ def judge(solution, scene, system, price=None, asked=None):
 
 
 def _judge_utilisation(solution, scene, system, reasons, further):
-    """Give the utilisation and the margin of safety of a solution their ±.
+    """Set ± of the utilisation and of the margin of safety of a solution.
 
     Parameters
     ----------
     solution : refweb.solution.Solution
-        With its results judged; its ``utilisation`` and ``margin`` are replaced.
+        Solution with judged results; its ``utilisation`` and ``margin`` are replaced.
     scene : refweb.Scene
         As it was solved.
     system : refweb.system.system.System
@@ -298,7 +297,7 @@ def _judge_utilisation(solution, scene, system, reasons, further):
     reasons : dict of str to str
         Reasons why parts of the error do not exist, by part.
     further : dict
-        ``parts`` and ``reasons`` by further runs, as of results.
+        ``parts`` and ``reasons`` by further runs, as for results.
     """
     used, margin = solution.utilisation, solution.margin
     if used is None:
@@ -318,7 +317,7 @@ def _judge_utilisation(solution, scene, system, reasons, further):
 
 
 def _remedies(result, solution, price):
-    """Sentences by verdict on what to do about a result."""
+    """Sentences by verdict: remedies for a result."""
     share = math.inf if not result.value else (result.error or 0.0) / (ALLOWED * abs(result.value))
     cost = ""
     if price is not None and 1.0 < share < math.inf:
@@ -340,14 +339,14 @@ def _remedies(result, solution, price):
 
 
 def _of_statistics(solution):
-    """Sentence on what to ask instead of a number that chance decides."""
+    """Sentence that names results to ask for instead of a number that chance decides."""
     horizon = next((time for k, time in reversed(solution.horizon.get("digits", ())) if time is not None), None)
     until = f" at t < {horizon:.3g} s" if horizon else ""
     return f"ask for a result{until}, for a mean (average), or for quantiles of many runs (refweb sweep)"
 
 
 def _of_model(result, cable):
-    """Sentence on the largest part of a model; bars that push, of the linear law, become chains in more elements."""
+    """Remedy for the largest part of the model; bars of the linear law that push become chains with more elements."""
     where = " where lines only pull" * (cable.law == "linear")
     parts = {part: result.parts[part] for part in MODELS if isinstance(result.parts[part], float)}
     largest = max(parts, key=lambda part: parts[part], default="elements")
@@ -359,9 +358,9 @@ def _of_model(result, cable):
 
 
 def _of_chaos(result, solution, spread):
-    """The result with mean and spread where it is statistical, and statistical where run and twin grow apart.
+    """The result with mean and spread if it is statistical, and as statistical if run and step refinement diverge.
 
-    It stays wide where time steps are the largest part of ±, and runs from starts side by side say otherwise.
+    It stays wide if time steps are the largest part of ± and an ensemble shows that it is not statistical.
     """
     divergence = solution.divergence
     if spread is not None and result.verdict == STATISTICAL:
@@ -376,7 +375,7 @@ def _of_chaos(result, solution, spread):
 
 
 def _warnings(solution, named, known):
-    """Findings on ± of peaks that are wide, and on motions that grow apart."""
+    """Findings on wide ± of peaks, and on chaotic motions."""
     wide = {
         name: result.error / abs(result.value)
         for name, result in solution.reduced.items()

@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written beside their place and then moved; numbers and tables as text."""
+"""Files that are whole or do not exist: they are written under another name and then moved. Numbers as text."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def number(value):
 
 
 def as_toml(given):
-    """The dict of a scene as TOML, its tables in the order they have there: sums are taken in that order."""
+    """The dict of a scene as TOML, with tables in the order of the dict, in which sums are taken."""
     import tomli_w
 
     parts = []

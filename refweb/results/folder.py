@@ -1,7 +1,7 @@
-"""Result folders: frames, history and summary, so written that a kill at any moment leaves a folder that opens.
+"""Result folders: frames, history and summary. A kill at any moment leaves a folder that can be read.
 
-Every file but ``history.csv``, which grows by whole rows, is written beside its place and then moved there. A frame is
-listed in ``web.pvd`` after it and the checkpoint of its state are there, and its row of the history before.
+``history.csv`` grows by whole rows. Every other file is written under another name and then moved. The row of a frame
+is written first, then the frame and the checkpoint of its state, and then its entry in ``web.pvd``.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ RESULT_FILES = re.compile(
 """Files that refweb writes into a result folder under names of its own; ``--force`` removes these and no others."""
 
 TABLES = ("history.csv", "modes.csv", "results.csv")
-"""Names of the table that a run, or a study of many, writes."""
+"""Names of the tables of runs and studies."""
 
 
 def read_summary(folder):
-    """The content of ``run.json`` in a folder, None where there is none that a run of refweb wrote."""
+    """The content of ``run.json`` in a folder; None if there is no such file of refweb."""
     try:
         run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -48,7 +48,7 @@ def read_summary(folder):
 def is_alive(folder):
     """True if the run that writes a folder is alive, None where that cannot be known.
 
-    A run holds a lock on its history, which ends with its process, however that ends; not on Windows.
+    A run locks its history; the lock ends with its process in any case. Windows has no such lock.
     """
     try:
         import fcntl
@@ -65,12 +65,12 @@ def is_alive(folder):
 
 
 def fingerprint(folder):
-    """Key that tells the scene of a folder apart from others, that of an edited ``scene.toml`` among them."""
+    """Key of the scene of a folder by its content: an edited ``scene.toml`` has another key."""
     return hashlib.sha256((folder / "scene.toml").read_bytes()).hexdigest()
 
 
 def reached(folder):
-    """Position of a run by the last row of its history, in words; None where there is none."""
+    """Text of the time or load step of the last row of a history; None without rows."""
     try:
         with open(folder / "history.csv", encoding="utf-8") as lines:
             name, *rows = (line.split(",")[0] for line in lines)
@@ -80,7 +80,7 @@ def reached(folder):
 
 
 def so_far(folder, summary):
-    """The summary of a run without an end: how far it came, and whether it is dead."""
+    """The summary of a run that has not ended: its last row, and if its process is alive."""
     alive, at = is_alive(folder), reached(folder)
     text = f"it has reached {at}" if at else "it has written no row"
     if summary.get("kind") == "sweep":
@@ -101,7 +101,7 @@ def _rows(folder):
 
 
 def remedy(folder):
-    """Say how a run that has not come to its end goes on."""
+    """Text on how to continue a run that has not ended."""
     if (folder / "results.csv").exists():
         return "refweb sweep with the same study and --out goes on with what is missing"
     if (folder / "checkpoint.npz").exists():
@@ -110,7 +110,7 @@ def remedy(folder):
 
 
 def hold(table):
-    """Hold the lock on a table that is open, where there are locks."""
+    """Lock an open table, if the system has locks."""
     with contextlib.suppress(ImportError, OSError):
         import fcntl
 
@@ -123,8 +123,8 @@ def check_folder(folder, force=False):
     Raises
     ------
     InputError
-        Where ``folder`` is a file, cannot be written, or is not empty and ``force`` is not given; with ``force`` where
-        it holds no ``run.json`` of refweb.
+        If ``folder`` is a file, cannot be written, or is not empty without ``force``; with ``force`` if it holds no
+        ``run.json`` of refweb.
     """
     folder = pathlib.Path(folder)
     name = f"result folder {short(str(folder))}"
@@ -151,7 +151,7 @@ def check_folder(folder, force=False):
 
 
 def clear(folder, kept=("run.json",)):
-    """Remove what a run wrote except ``kept``, and nothing else."""
+    """Remove the files of a run except ``kept``, and no others."""
     for path in [*folder.iterdir(), *(folder / "frames").glob("*")]:
         name = path.relative_to(folder).as_posix()
         if path.is_file() and RESULT_FILES.fullmatch(name) and name not in kept:
@@ -159,7 +159,7 @@ def clear(folder, kept=("run.json",)):
 
 
 def copy(source, target):
-    """Copy what a run wrote from one folder to another, ``run.json`` last."""
+    """Copy the files of a run from one folder to another, ``run.json`` last."""
     target = pathlib.Path(target)
     if source.resolve() == target.resolve():
         return
@@ -177,9 +177,9 @@ class Folder:
     Parameters
     ----------
     path : path-like
-        The folder; made where it does not exist, cleared of earlier results where it does.
+        The folder. It is created if it does not exist; else earlier results are removed.
     scene : refweb.Scene
-        Written as ``scene.toml`` with all defaults filled in.
+        Scene, which is written as ``scene.toml`` with all defaults.
     columns : sequence of str
         Header of ``history.csv``.
     run : dict
@@ -187,7 +187,7 @@ class Folder:
     table : str
         Name of the history's file.
     row : int, optional
-        Number of the last row to keep of a run that goes on; nothing else is cleared then.
+        Number of the last row to keep of a run that continues; only later rows and frames are removed then.
 
     Raises
     ------
@@ -218,7 +218,7 @@ class Folder:
 
     @contextlib.contextmanager
     def _written(self):
-        """Name the folder where it cannot be written: a full disk, a permission or the folder itself that is gone."""
+        """Turn an error of writing into a `SolverError` that names the folder."""
         try:
             yield
         except OSError as error:
@@ -236,7 +236,7 @@ class Folder:
         self._list_frames()
 
     def _go_on(self, row, run):
-        """Cut the history behind a row, and remove the frames behind it."""
+        """Cut the history after a row, and remove later frames."""
         self._scene = fingerprint(self.path)
         try:
             with open(self.path / self._table, "rb") as lines:
@@ -263,7 +263,7 @@ class Folder:
         self.summary(run)
 
     def restart(self, run):
-        """Remove rows and frames and begin anew; ``run`` is the content of ``run.json``."""
+        """Remove rows and frames and begin again; ``run`` is the content of ``run.json``."""
         self.close()
         with self._written():
             (self.path / "checkpoint.npz").unlink(missing_ok=True)
@@ -273,7 +273,7 @@ class Folder:
         self._start()
 
     def row(self, values):
-        """Append a row to the history, or nothing where it does not fit on the disk."""
+        """Append a row to the history, or nothing if the disk is full."""
         line = (",".join(v if isinstance(v, str) else number(v) for v in values) + "\n").encode()
         length = self._history.tell()
         with self._written():
@@ -287,7 +287,7 @@ class Folder:
     def frame(self, number, state, shape=None, run=None):
         """Write frame and checkpoint of a state and list the frame in ``web.pvd``, with a ``shape`` as its mode.
 
-        ``run`` is what the checkpoint holds besides, as arrays by name, for the run to go on from it.
+        ``run`` has further arrays of the checkpoint by name, from which the run can continue.
         """
         with self._written():
             for name, mesh in meshes(state, shape).items():
@@ -310,7 +310,7 @@ class Folder:
         self.listed([(number, state.time if shape is None else number)], net.bodies)
 
     def keep_twin(self, end):
-        """Add to the last checkpoint where the twin run ended: displacement [m] and velocity [m/s]."""
+        """Add the end of the step-refinement run to the last checkpoint: displacement [m] and velocity [m/s]."""
         with self._written():
             with np.load(self.path / "checkpoint.npz") as archive:
                 arrays = {key: archive[key] for key in archive}

@@ -8,7 +8,7 @@ from .units import other_errors, position_text, readable
 
 
 def of_solution(solution):
-    """Title, status, results with their ±, warnings, and what it cost."""
+    """Title, status, results with their ±, warnings and cost."""
     dynamic = not solution.steps
     head = ["result", "value", *(["time"] if dynamic else []), "at"]
     rows = []
@@ -31,7 +31,7 @@ def of_solution(solution):
 
 
 def of_scene(given, title):
-    """The tables of a scene as its file has them."""
+    """The tables of a scene, as in its file."""
     rows = []
     for name, value in given.items():
         for entry in value if isinstance(value, list) else [value]:

@@ -1,10 +1,10 @@
-"""Compiled probes: what a run looks at in every step, one scalar each.
+"""Compiled probes: scalars that a run evaluates in every step.
 
-A probe has the signature ``value = probe(t, x, v, f, lines, rows, data, where)``: ``x``, ``v`` and ``f`` are the
-displacement of each row of the unknowns, its velocity and the whole force on it, shape (rows, 3); ``lines`` holds
-tension and strain of each element, shape (cells, 2 or more); ``rows`` and ``data`` are the probe's own numbers, or
-``data`` is what a term shows of its cells at that state. Where ``where[1]`` is `PLACE` it writes the row or element
-it stands at to ``where[0]``.
+A probe has the signature ``value = probe(t, x, v, f, lines, rows, data, where)``. ``x``, ``v`` and ``f`` are the
+displacement, the velocity and the total force of each row of the unknowns, shape (rows, 3). ``lines`` has tension and
+strain of each element, shape (cells, 2 or more). ``rows`` and ``data`` are parameters of the probe; ``data`` may also
+be the output of a force term for its cells. If ``where[1]`` is `PLACE`, the probe writes the row or element of its
+value to ``where[0]``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, M
 MAGNITUDE = 3
 """Component number of a magnitude."""
 PLACE = 1
-"""Value of ``where[1]`` that asks a probe for the place of its value as well."""
+"""Value of ``where[1]`` that asks a probe for the row or element of its value."""
 
 
 class Probe(NamedTuple):
@@ -35,16 +35,16 @@ class Probe(NamedTuple):
     kernel : callable
         Compiled function of the signature `PROBE`.
     rows : sequence of int
-        The probe's own numbers, see its kernel.
+        Parameters of the probe, see its kernel.
     data : ndarray of float, two-dimensional
-        More of them.
+        Further parameters.
     sign : float
         1 for the largest value of all steps, −1 for the smallest, 0 for neither.
     average : float
-        Length of a window [s] whose mean is looked at instead of the value, 0 for none.
+        Length of a window [s] whose mean replaces the value, 0 for none.
     term : int
-        Number of the term of the system whose values per cell stand in place of ``data``, or
-        `refweb.effects.base.CONTACT` for what bodies feel of contact, −1 for none.
+        Number of the force term whose output per cell replaces ``data``; `refweb.effects.base.CONTACT` for the contact
+        forces on bodies; −1 for none.
     """
 
     kernel: Callable
@@ -75,8 +75,8 @@ def _value(a, data, row, n, component):
 def largest_of(a, data, rows, where):
     """Largest component, or magnitude, of ``a + data`` over some rows.
 
-    ``rows`` is (component, first, last + 1), or (component, −1, −1, row, row, ...); the value is found first, and
-    its place only where it is asked for.
+    ``rows`` is (component, first, last + 1), or (component, −1, −1, row, row, ...). The row of the value is found only
+    if it is asked for.
     """
     component, first, last, best = rows[0], rows[1], rows[2], -math.inf
     if first >= 0:
@@ -97,12 +97,12 @@ def largest_of(a, data, rows, where):
 
 
 NODES, LINES = 1, 2
-"""Kinds of what `plain_of` tells: the largest magnitude of displacements, the largest of a column over elements."""
+"""Kinds of `plain_of`: the largest magnitude of displacements, the largest value of a column over elements."""
 
 
 @kernel(leaf=True, forceinline=True)
 def largest_in(lines, column, first, last):
-    """Largest of a column over the elements from ``first`` to ``last`` − 1: four maxima at once."""
+    """Largest value of a column over the elements from ``first`` to ``last`` − 1, by four maxima at once."""
     a = b = c = d = -math.inf
     k, fours = np.uint64(column), (last - first) // 4 * 4
     for n in range(first, first + fours, 4):
@@ -116,7 +116,7 @@ def largest_in(lines, column, first, last):
 
 @kernel(leaf=True, forceinline=True)
 def farthest(x, first, last):
-    """Largest magnitude of x, given in a row, over the rows from ``first`` to ``last`` − 1, four at once."""
+    """Largest magnitude of the flat array x over the rows from ``first`` to ``last`` − 1, by four maxima at once."""
     a = b = c = d = -math.inf
     fours = (last - first) // 4 * 4
     for n in range(first, first + fours, 4):
@@ -136,14 +136,14 @@ def _size(x, q):
 
 
 def plain_of(probe):
-    """Quantity of a probe that is so simple that a loop needs no kernel for it.
+    """Quantity of a probe if it is so simple that the loop needs no kernel for it.
 
     Returns
     -------
     tuple of 4 int
-        `NODES`, the first row and the last + 1, and 0; `LINES`, the column, the first element and the last + 1; or 0.
+        (`NODES`, first row, last + 1, 0), or (`LINES`, column, first element, last + 1), or zeros if it is not simple.
     float
-        Factor on that; the largest of all products with one factor is that of the largest.
+        Factor on the largest value.
     """
     rows, data, none = list(probe.rows), probe.data, ((0, 0, 0, 0), 1.0)
     if probe.kernel is displacement and rows[0] == MAGNITUDE and rows[1] >= 0:
@@ -155,7 +155,7 @@ def plain_of(probe):
 
 @kernel(PROBE)
 def displacement(t, x, v, f, lines, rows, data, where):
-    """Largest of x + data: displacement where data is zero, position where it is the reference."""
+    """Largest of x + data: a displacement if data is zero, a position if data is the reference position."""
     return largest_of(x, data, rows, where)
 
 
@@ -195,7 +195,7 @@ def contact_force(t, x, v, f, lines, rows, data, where):
 
 @kernel(PROBE)
 def contact_depth(t, x, v, f, lines, rows, data, where):
-    """Largest depth in some rows of what bodies feel, 0 where nothing touches."""
+    """Largest contact depth in some rows of ``data``, 0 without contact."""
     deepest, where[0] = 0.0, -1
     for r in rows:
         felt = record_at(FELT, data, r, 0)
@@ -310,9 +310,9 @@ def slack_fraction(t, x, v, f, lines, rows, data, where):
 
 @kernel(PROBE)
 def deepest(t, x, v, f, lines, rows, data, where):
-    """Largest of data, of one column, over some of its rows, (first, last + 1); the place is counted from there.
+    """Largest value of data, one column, over rows (first, last + 1); ``where[0]`` counts from ``first``.
 
-    Eight maxima at once take a ninth of the time of one, which waits for itself.
+    Eight independent maxima take a ninth of the time of one.
     """
     values = data.reshape(-1)[rows[0] : rows[1]]
     a = b = c = d = e = g = h = i = 0.0
@@ -336,9 +336,10 @@ def deepest(t, x, v, f, lines, rows, data, where):
 
 @kernel(PROBE)
 def surface_speed(t, x, v, f, lines, rows, data, where):
-    """Largest speed that a point of a body may have; ``rows`` are those of its place and rotation, or −1.
+    """Largest possible speed of a point of a body; ``rows`` are those of its position and rotation, or −1.
 
-    data is the largest distance from the place times the largest angular velocity over that of the row.
+    data is the largest distance of its points from the position, times the factor from the row of rotation to the
+    largest angular velocity.
     """
     best = 0.0
     for n in range(data.shape[0]):

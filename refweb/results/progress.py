@@ -11,7 +11,7 @@ import time
 from ..compiled import watched
 
 DELAY = 2.0
-"""Time after which it is shown [s]."""
+"""Time after which progress is shown [s]."""
 APART = 0.5
 """Least time between two texts in a notebook [s]."""
 EVERY = 10.0
@@ -23,7 +23,7 @@ LOADING = "loading"
 
 @contextlib.contextmanager
 def followed(progress, text=LOADING):
-    """Show the progress of a run in a terminal or notebook, for as long as the block lasts.
+    """Show the progress of a run in a terminal or notebook while the block runs.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def followed(progress, text=LOADING):
         in a terminal and in a notebook, and elsewhere as a line of the error stream every `EVERY`; False and None show
         nothing.
     text : str
-        What is told before anything else is.
+        First text.
 
     Yields
     ------
@@ -55,7 +55,7 @@ def followed(progress, text=LOADING):
 
 
 def _compiling(tell):
-    """Tell of kernels that are compiled."""
+    """Show the number of kernels that are compiled."""
     return watched(lambda done, count: tell(f"compiling {done + 1} of {count}, the first time", done / count))
 
 
@@ -119,7 +119,7 @@ def _bar(text):
 
 @contextlib.contextmanager
 def _line():
-    """A line that is written over itself, and empty in the end."""
+    """A line that is overwritten, and empty at the end."""
     last = time.perf_counter() + DELAY - APART
     width, remaining = 0, RemainingTime()
 

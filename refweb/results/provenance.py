@@ -18,11 +18,11 @@ PLOTTING = ("pyvista", "matplotlib")
 
 
 def web_of(system):
-    """Sizes of the web, as `run.json` holds them.
+    """Sizes of the web, as in `run.json`.
 
-    ``extent`` is that along x, y and z as the web is built [m], ``diameter`` the least and the largest of a round cable
-    of the same area [m], ``volume`` that of the cable [m³], and ``total_mass`` that of the cable, of point masses and
-    of all bodies that move [kg].
+    ``extent`` is the size of the initial web along x, y and z [m]. ``diameter`` has the least and the largest diameter
+    of round cables of the same area [m]. ``volume`` is that of the cable [m³]. ``total_mass`` is the mass of cable,
+    point masses and free bodies [kg].
     """
     import numpy as np  # `refweb --version` does without
 

@@ -1,4 +1,4 @@
-"""End of a run and its cost: status, message and time, however it is left."""
+"""End of a run and its cost: status, message and time, also after an error."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ def _compiling():
 
 
 def _cpu():
-    """CPU time of this process and of those that it has begun and that have ended [s]."""
+    """CPU time of this process and of its child processes that have ended [s]."""
     return time.process_time() + sum(os.times()[2:4])
 
 
 class Clock:
-    """CPU and wall time since it was made, and what of it kernels took to compile."""
+    """CPU and wall time since its creation, and the time of compiling kernels."""
 
     def __init__(self):
         self._cpu, self._wall, self._compiled = _cpu(), time.perf_counter(), _compiling().seconds
 
     def spent(self):
-        """Time that has passed since, ``cpu_s``, ``wall_s`` and ``compile_s`` [s]."""
+        """Times since the creation: ``cpu_s``, ``wall_s`` and ``compile_s`` [s]."""
         return {
             "cpu_s": _cpu() - self._cpu,
             "wall_s": time.perf_counter() - self._wall,
@@ -56,17 +56,18 @@ class Clock:
 
 @contextlib.contextmanager
 def recorded(target, clock, done=None):
-    """Write to what is found how the run inside ends, and what it cost.
+    """Record in ``target`` how the run inside the block ends, and its cost.
 
     Parameters
     ----------
     target : object
-        Gets ``status``, "solved", "failed" or "interrupted", unless the run sets another than "running" itself; of a
-        failure its ``message``; and in the dict ``cost`` what the clock says.
+        Object with ``status``, ``message`` and ``cost``. Its status becomes "failed" or "interrupted", or "solved" if
+        it is still "running" at the end. A failure sets its message. The times of the clock are added to the dict
+        ``cost``.
     clock : Clock
-        Made where the run began.
+        Clock that was created at the start of the run.
     done : callable, optional
-        How far the run came, in words, for the message of an interruption.
+        Function that returns a text of the progress for the message of an interruption.
     """
     try:
         yield

@@ -1,4 +1,4 @@
-"""The data of a solution: what a run fills in while it goes, and what ``run.json`` says of it."""
+"""The data of a solution: attributes that a run fills in, and their form in ``run.json``."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ SOLVER = dict.fromkeys(
     "method factorization nsteps nfev njev nlu residual duality_gap above_lowest smallest_pivot slack_nodes "
     "energy_drift momentum_drift angular_momentum_drift".split()
 )
-"""What a solver reports; None for what it does not know."""
+"""Statistics of a solver; None for those that it does not know."""
 
 
 OTHER_ERRORS = {"smoothing": "smoothing moves", "discretisation": "discretisation error", "neglected": "orbit neglects"}
-"""Errors of a result that have keys of their own, and the words before them; ± holds the first two."""
+"""Errors of a result with separate keys, and the words before them; ± contains the first two."""
 
 
 class Names(dict):
-    """A dict whose unknown keys are answered with the nearest one."""
+    """A dict whose errors on unknown keys name the nearest key."""
 
     def __missing__(self, key):
         raise KeyError(f"{key!r} is not among them, {nearest(key, self)}")
 
 
 class Result(NamedTuple):
-    """A result of a run: value, its error (None where none is known), unit, time and place.
+    """A result of a run: value, error (None if it is not known), unit, time and position.
 
     ``error`` is the sum of all ``parts`` that are known, see `refweb.results.error_budget`: each of these is a number,
     or "none" for one of the ``reasons``, or "not estimated". ``verdict`` is what the number is worth, None where parts
@@ -64,7 +64,7 @@ class Result(NamedTuple):
     proven: bool = False
 
     def bounded(self, lower, upper):
-        """The result where only what lies from ``lower`` to ``upper`` is possible."""
+        """The result with ± cut to the possible values from ``lower`` to ``upper``."""
         if self.error is None or not np.isfinite(self.error):
             return self
         error = min(self.error, max(self.value - lower, upper - self.value, 0.0))
@@ -73,7 +73,7 @@ class Result(NamedTuple):
         return self._replace(error=error, within=(max(low, lower), min(high, upper)) if cut else None)
 
     def plain(self):
-        """Convert to a dict, without the errors that were not looked for; an infinite end of an interval is None."""
+        """Convert to a dict, without errors that were not computed; an infinite end of an interval is None."""
         extra = {key: value for key in OTHER_ERRORS if (value := getattr(self, key)) is not None}
         if self.where is not None:
             extra["at"] = self.at
@@ -89,7 +89,7 @@ class Result(NamedTuple):
 
 
 def read_results(given):
-    """Results by name of what ``run.json`` says of them; a `TypeError` where no run has said that."""
+    """Results by name from their dicts in ``run.json``; raise a `TypeError` for other content."""
     results = {name: Result(**entry) for name, entry in given.items()}
     for name, entry in results.items():
         if not (
@@ -109,73 +109,71 @@ def read_results(given):
 
 @dataclass(eq=False, repr=False)
 class SolutionData:
-    """Data of a scene that is solved, or being solved.
+    """Data of a run, during it and after it.
 
     Attributes
     ----------
     scene : refweb.Scene
-        What was solved.
+        The scene of the run.
     state : refweb.results.state.State
         The last state.
     columns : list of str
         Names of the columns of ``history.csv``, with units.
     steps : list of dict
-        Results and solver figures of each load step.
+        Results and solver statistics of each load step.
     solver, cost, web : dict
         As in ``run.json``.
     versions : dict of str to str
         Versions of refweb, Python and the libraries that solved it, by name.
     status : {"running", "solved", "failed", "interrupted"}
-        How it ended; ``message`` says why.
+        How the run ended; ``message`` has the reason.
     findings : list of refweb.findings.Finding
-        Remarks, warnings and refusals: what a reader of the results has to know, by code.
+        Remarks, warnings and refusals on the results, by code.
     table : dict of str to ndarray, optional
-        The history, where it is held in memory; of load steps always.
+        The history, if it is kept in memory; always for load steps.
     path : pathlib.Path, optional
-        The result folder that a run wrote while it went.
+        The result folder of the run.
     utilisation : refweb.results.strength.Utilisation, optional
-        Largest stress over strength, in dynamics over time, its line and its ±; None where no line has a strength.
+        Largest stress over strength, in dynamics over time, with its line and ±; None if no line has a strength.
     margin : dict, optional
         The smallest margin of safety, in dynamics over time, in statics over load steps, see
-        `refweb.results.state.margin_of`; None where no line has a strength.
+        `refweb.results.state.margin_of`; None if no line has a strength.
     bodies : dict
-        Of each body that the web may touch, by name: its deepest ``overlap`` [m], ``time`` and ``line`` of that, the
-        overlap ``allowed``, and the ``stiffness`` of its contact, ``chosen`` by refweb or given; of a mesh the
-        ``surface_error`` [m], by which its field misses the surface.
+        Entry for each body that the web may touch, by name: deepest ``overlap`` [m] with its ``time`` and ``line``, the
+        ``allowed`` overlap, the ``stiffness`` of contact, and ``chosen``, True if refweb chose it. A body from a mesh
+        has the ``surface_error`` [m], the error of its distance field at the surface.
     pairs : dict
-        Of each two bodies that have touched each other, by names: the deepest ``overlap`` [m], its ``time``, the
-        overlap ``allowed`` and the ``stiffness`` of their contact.
+        Entry for each two bodies that have touched each other, by names: deepest ``overlap`` [m], its ``time``, the
+        ``allowed`` overlap and the ``stiffness`` of their contact.
     lines : dict
-        Of lines that touch lines the deepest ``overlap`` [m], their ``radius`` [m] and the ``stiffness`` [N/m];
+        Contact of lines with lines: the deepest ``overlap`` [m], ``radius`` of the lines [m] and ``stiffness`` [N/m];
         empty without ``[self_contact]``.
     passage : dict
-        "certified" where nothing can have passed, or why that is not certain: of ``lines`` through lines, of lines
-        through ``bodies``, and of ``pairs`` of bodies through each other.
+        Penetration checks: "certified" if it is proven that nothing has passed through, else the reason for doubt.
+        ``lines`` is for lines through lines, ``bodies`` for lines through bodies, ``pairs`` for bodies through bodies.
     reduced : dict
-        Results of a dynamic run; `results` has those of either kind.
+        Results of a dynamic run; `results` has those of any run.
     horizon : dict
-        How long the motion is determined, see `refweb.studies.predictability.horizon`; empty where that was not asked
-        for.
+        Horizon of the motion, see `refweb.studies.predictability.horizon`; empty if it was not asked for.
     divergence : refweb.dynamics.divergence.Divergence, optional
-        Exponential growth of the difference of a run and its twin; None where there is none.
+        Exponential growth of the difference from the step-refinement run; None without such growth.
     further : list of dict
-        Further runs that have told of parts of errors, see `refweb.studies.further_runs`: ``part``, ``text``, ``cpu_s``
-        and ``status`` of each.
+        ``part``, ``text``, ``cpu_s`` and ``status`` of each further run, see `refweb.studies.further_runs`.
     events : list of dict
-        Of each event its ``name``, the ``time`` it happened at [s], None if it did not, and the ``error`` of that.
+        ``name`` of each event, its ``time`` [s] (None if it did not happen), and the ``error`` of that.
     throw : dict
-        What came of a throw, see `refweb.Throw`; empty where that was not asked for.
+        Numbers of a throw, see `refweb.Throw`; empty if they were not asked for.
     breaks : list of dict, optional
-        Of each element that has broken, in the order in which they did, its ``line``, ``element``, ``time`` [s] and the
-        ``error`` of that, the ``place`` of its middle [m] and the ``energy`` [J] that it held; None where nothing may.
+        Entry for each broken element, in the order of the breaks: ``line``, ``element``, ``time`` [s] with its
+        ``error``, ``place`` of its middle [m] and its stored ``energy`` [J]; None if no line can break.
     broken_before : list of int
-        Lines that were broken before the run began.
+        Lines that were broken at the start of the run.
     twin_end : (ndarray, ndarray), optional
-        Displacement [m] and velocity [m/s] at which the twin run ended, each of shape (rows, 3); None where there was
-        none.
+        Displacement [m] and velocity [m/s] at the end of the step-refinement run, each of shape (rows, 3); None without
+        such a run.
     frames : list of (int, refweb.results.state.State)
-        Row numbers and states of a run that writes no folder. One that does keeps none: its frames are files, which
-        are read when they are looked at.
+        Row numbers and states of a run without a folder. A run with a folder keeps none in memory: its frames are
+        files, which are read when they are needed.
     """
 
     scene: Scene
@@ -210,21 +208,21 @@ class SolutionData:
 
     @property
     def warnings(self) -> list[str]:
-        """Texts of the findings, but for the refusal that ``message`` has."""
+        """Texts of the findings, without the refusal that is in ``message``."""
         return texts(self.findings)
 
     @property
     def results(self) -> dict[str, Result]:
-        """Results by name, each a `refweb.results.solution.Result`; of the last load step."""
+        """Results by name, each a `refweb.results.solution.Result`; in statics those of the last load step."""
         return Names(self.steps[-1]["results"] if self.steps else self.reduced)
 
     @property
     def history(self) -> dict[str, np.ndarray]:
         """Columns of the history by name, a dict of arrays with one entry per row.
 
-        First ``time`` [s], in statics ``step``, then every observable and the energies [J], in dynamics the momentum of
-        all that is free and the impulse of the supports [N s] as well. A dynamic run that writes a folder holds none of
-        it in memory: it is read from there.
+        The first column is ``time`` [s], in statics ``step``. Then follow all observables and the energies [J], in
+        dynamics also the momentum of free nodes and bodies and the impulse of the supports [N s]. The history of a
+        dynamic run with a folder is read from its file.
         """
         if self.table is not None:
             return self.table

@@ -1,4 +1,4 @@
-"""State of a net at an instant, and everything that can be read off it."""
+"""State of a net at an instant, and the quantities that follow from it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class State:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        System of all effects.
     time : float
         Time [s]; in statics the load step.
     x : ndarray, shape (rows, 3)
@@ -41,7 +41,7 @@ class State:
         return force, per_cell.tension, contact, felt
 
     def overlap(self, body):
-        """Depth of the deepest contact of each element with a body [m], 0 where they do not touch, shape (cells,)."""
+        """Depth of the deepest contact of each element with a body [m], 0 without contact, shape (cells,)."""
         term, cells = self.system.contact_forces.lines_on(body)
         return self._forces[2][term][cells]
 
@@ -74,7 +74,7 @@ class State:
 
     @cached_property
     def element_strain(self):
-        """Strain of each element, its largest over quadrature points [1], shape (cells,)."""
+        """Strain of each element, the largest over its quadrature points [1], shape (cells,)."""
         from ..effects.elasticity import strains
 
         strain = strains(self.system.at(self.time).net, self.x).max(axis=1)
@@ -98,7 +98,7 @@ class State:
 
     @cached_property
     def slack_nodes(self):
-        """Free nodes that no taut line holds, whose position is not unique; bars hold under compression as well."""
+        """Free nodes without a taut line or a bar, whose position is not unique."""
         net = self.system.net
         fixed = self.system.supported.all(axis=1)
         fixed[net.web.bare] = True  # by a link
@@ -107,7 +107,7 @@ class State:
 
     @cached_property
     def reaction(self):
-        """Force of the supports on nodes, of contact on bodies [N], shape (rows, 3)."""
+        """Force of the supports on nodes, and of contact on bodies [N], shape (rows, 3)."""
         force = np.where(self.system.supported, -self.system.balance(self.time, self.x, self.v)[0], 0.0)
         felt = self._forces[3]
         for body in self.system.net.bodies:
@@ -116,7 +116,7 @@ class State:
 
     @cached_property
     def utilisation(self):
-        """Stress over strength, shape (lines,); None where no line has a strength."""
+        """Stress over strength, shape (lines,); None if no line has a strength."""
         net = self.system.net
         if not np.isfinite(net.strength).any():
             return None
@@ -124,7 +124,7 @@ class State:
 
     @cached_property
     def margin(self):
-        """Smallest margin of safety, see `margin_of`; None where no line has a strength."""
+        """Smallest margin of safety, see `margin_of`; None if no line has a strength."""
         net = self.system.net
         if not np.isfinite(net.strength).any():
             return None
@@ -133,9 +133,9 @@ class State:
 
     @cached_property
     def energies(self):
-        """Energies by column of the book [J]: those of the effects that are present, and their total.
+        """Energies of the effects by column of the energy balance, and their total [J].
 
-        Work is that of dead loads, and left out where other loads act, whose work depends on the path.
+        Work is that of dead loads. It is left out if other loads act, since their work depends on the path.
         """
         book = {}
         for term in (f for f in self.system.terms if f.energy is not None):
@@ -147,26 +147,26 @@ class State:
 
 
 def margin_of(net, element, used, time):
-    """The margin of safety at an element, as ``run.json`` holds it.
+    """The margin of safety at an element, as in ``run.json``.
 
     Parameters
     ----------
     net : refweb.net.net.Net
         The net.
     element : int
-        Its number.
+        Number of the element.
     used : float
-        Its largest stress over the allowed one, strength × knot_factor / safety_factor [1].
+        Its largest stress over the allowed stress, strength × knot_factor / safety_factor [1].
     time : float
-        When that was [s], in statics the load step.
+        Time of the largest stress [s], in statics the load step.
 
     Returns
     -------
     dict
-        ``value``, the allowed stress over the largest one less 1; the stress ``used`` over the one ``allowed`` [Pa];
-        the ``line``, its largest ``stress`` [Pa], ``area`` [m²] and ``strength`` [Pa]; the ``time``; and ``error``, the
-        ± of ``used``, None as long as it is not known. ``value``, ``allowed`` and ``strength`` are None where they are
-        infinite.
+        ``value`` is the allowed stress over the largest stress, less 1. ``allowed`` is the allowed stress [Pa], and
+        ``used`` the largest stress over it [1]. ``line`` is the line; ``stress`` [Pa], ``area`` [m²] and ``strength``
+        [Pa] are its largest stress, area and strength. ``time`` is the time. ``error`` is ± of ``used``, None if it is
+        not known. ``value``, ``allowed`` and ``strength`` are None where they are infinite.
     """
     allowed, strength = float(net.allowed[element]), float(net.strength[element])
     return {
@@ -183,11 +183,11 @@ def margin_of(net, element, used, time):
 
 
 MUCH = 0.2
-"""Strain above which a remark is made: cables have broken before, and a linear law says nothing of them."""
+"""Strain above which a finding warns: real cables break below it, and a linear law does not describe them."""
 
 
 def strain_remark(strain):
-    """A warning where the largest strain, (value, line), exceeds `MUCH`."""
+    """Find a largest strain, (value, line), above `MUCH`."""
     if strain[0] > MUCH:
         yield Finding(
             "large-strain",
@@ -198,7 +198,7 @@ def strain_remark(strain):
 
 
 def floor_remark(net, stress):
-    """A warning where the smooth law's floor exceeds 1 % of the largest stress [Pa]."""
+    """Find a floor of the smooth law above 1 % of the largest stress [Pa]."""
     if (smooth := net.laws == SMOOTH).any():
         lines = net.line_data[smooth]
         floor = float((Law("smooth").floor(lines.ea, lines.slackness, lines.smoothing) / net.area[smooth]).max())

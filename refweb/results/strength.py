@@ -1,4 +1,4 @@
-"""Largest stress over strength of a run, its ±, and what is said of it where it is near 1."""
+"""Largest stress over strength of a run, its ±, and findings on it."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ import numpy as np
 from ..findings import Finding
 
 ALIKE = 1e-6
-"""Relative difference of two stresses of one line up to which they are the same."""
+"""Relative difference up to which two stresses of one line count as equal."""
 UTILISATION = ("utilisation",)
-"""Key of the utilisation beside names of results, none of which it can be."""
+"""Key of the utilisation among names of results; it is a tuple, so that no result has this name."""
 
 
 class Utilisation(NamedTuple):
-    """Largest stress over strength, in dynamics over time, in statics of the last load step.
+    """Largest stress over strength, in dynamics over time, in statics at the last load step.
 
     Attributes
     ----------
     value : float
         The largest stress over strength [1].
     line : int
-        Its line.
+        Line of the largest value.
     error : float or None
-        Its ± [1], None where none is known. It is that of a result which observes the same stress, with all parts that
-        are known of that, else that of time steps or rounding and, where these were looked for, of other parts.
+        ± of the value [1], None if it is not known. It is that of a result that observes the same stress, if there is
+        one. Else it has the part of time steps or of rounding, and other parts that were computed.
     parts : dict or None
-        Parts of ± as of a `refweb.results.solution.Result`; None where the run has not come to its end.
+        Parts of ±, as for a `refweb.results.solution.Result`; None before the end of the run.
     smoothing : float or None
-        Error of the smooth law [1], where it was looked for.
+        Error of the smooth law [1], if it was computed.
     proven : bool
-        Whether ± of an equilibrium is a bound from duality.
+        True if ± of an equilibrium is a bound from duality.
     """
 
     value: float
@@ -42,7 +42,7 @@ class Utilisation(NamedTuple):
     proven: bool = False
 
     def plain(self):
-        """Convert to a dict, as ``run.json`` has it."""
+        """Convert to a dict, as in ``run.json``."""
         entry: dict[str, Any] = {"value": self.value, "line": self.line, "error": self.error}
         if self.parts is not None:
             entry["parts"] = self.parts
@@ -50,13 +50,13 @@ class Utilisation(NamedTuple):
 
 
 def read_utilisation(given):
-    """The `Utilisation` of what ``run.json`` says of it."""
+    """The `Utilisation` from its dict in ``run.json``."""
     known = {key: given[key] for key in ("error", "parts", "proven") if key in given}
     return Utilisation(given["value"], given["line"], **known)
 
 
 def strength_remark(utilisation):
-    """A warning where the largest stress over strength, a `Utilisation`, exceeds 1, or may do so within its ±."""
+    """Find a `Utilisation` that exceeds 1, or may exceed 1 within its ±."""
     if utilisation is None:
         return
     value, line, error = utilisation[:3]
@@ -71,7 +71,7 @@ def strength_remark(utilisation):
 
 
 def of_observable(scene, system, results, used):
-    """(Result, factor) of a result that is the utilisation over a factor, with a known ±; None where there is none."""
+    """(Result, factor) of a result with a known ± that is the utilisation over a factor; None without such a result."""
     net = system.net
     cells = np.flatnonzero(net.line == used.line)
     limits = {"stress": net.strength[cells], "tension": net.strength[cells] * net.area[cells]}

@@ -1,4 +1,4 @@
-"""Results of a study in words: rows for each result, condition and index, for the console and the page."""
+"""Results of a study as text: rows for each result, condition and index, for the console and the page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def on_count(summary):
 
 
 def on_design(study):
-    """Design of a study, in words."""
+    """Design of a study as text."""
     varied = ", ".join(f"{path} ({_varied(values)})" for path, values in study["parameters"].items())
     how = {"grid": "each with each", "zip": "one beside the other"}.get(study["sample"])
     if how is None:
@@ -41,14 +41,14 @@ def _varied(values):
 
 
 def of_group(of):
-    """The values that a group of cases has in common, in words."""
+    """Text of the values that a group of cases has in common."""
     return ", ".join(f"{path.rpartition('.')[2]} = {quote(value)}" for path, value in of.items())
 
 
 def rows_of_spread(entry):
-    """A row for each result: its mean, the shares of ± and of the samples in that, its spread, its quantiles.
+    """A row for each result: its mean with errors by ± and by the number of samples, its spread, quantiles.
 
-    Where runs have given verdicts, how often each was given stands behind.
+    If runs have verdicts, the last column has the number of each.
     """
     rows, columns = [], []
     judged = any(set(of_result.get("verdicts", ())) - {"none"} for of_result in entry["results"].values())
@@ -76,7 +76,7 @@ def rows_of_spread(entry):
 
 
 def on_spread(entry):
-    """Sentences on results whose ± is not small beside their spread."""
+    """Sentences on results whose ± is not small against their spread."""
     for name, of_result in entry["results"].items():
         spread = of_result.get("deviation", of_result["largest"] - of_result["least"])
         rounding = 1e-14 * max(abs(of_result["largest"]), abs(of_result["least"]))
@@ -93,7 +93,7 @@ def on_spread(entry):
 
 
 def rows_of_conditions(entry):
-    """A row for each condition: its probability with its interval, and how many cases decide it."""
+    """A row for each condition: its probability with its interval, and the number of cases that decide it."""
     rows = []
     for name, of_condition in entry["conditions"].items():
         if of_condition["share"] is None:
@@ -124,7 +124,7 @@ def rows_of_conditions(entry):
 
 
 def rows_of_indices(entry):
-    """A row for each result and parameter: Sobol's indices of first order and total."""
+    """A row for each result and parameter: first-order and total-effect Sobol index."""
     rows = []
     for name, indices in (entry.get("indices") or {}).items():
         for path, kinds in indices.get("of", {}).items():
@@ -134,7 +134,7 @@ def rows_of_indices(entry):
 
 
 def on_indices(entry):
-    """Reason why results have no indices, and warning where ± is not small beside the spread."""
+    """Reason why results have no indices, and warning if ± is not small against the spread."""
     for name, indices in (entry.get("indices") or {}).items():
         if "reason" in indices:
             yield f"{name} has no indices: {indices['reason']}"

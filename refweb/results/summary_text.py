@@ -1,4 +1,4 @@
-"""Summary of a run in words: rows of results, load steps and modes, and sentences on the rest.
+"""Summary of a run as text: rows of results, load steps and modes, and sentences on the rest.
 
 A summary is the content of ``run.json``. The console and the page of a run show the same.
 """
@@ -11,11 +11,11 @@ from .error_budget import DETERMINED, shares
 from .units import larger, other_errors, position_text, readable, scale_of, with_error
 
 FEW_BREAKS = 5
-"""Number of breaks that are told one by one."""
+"""Largest number of breaks that are listed."""
 
 
 class Rows(NamedTuple):
-    """Rows of text below names of columns; the `last` row, where there is one, is a remark on the columns."""
+    """Rows of text below names of columns; an optional `last` row is a remark on the columns."""
 
     columns: list
     rows: list
@@ -23,7 +23,7 @@ class Rows(NamedTuple):
 
 
 def rows_of_results(results, dynamic):
-    """Results with their ±, where and, in dynamics, when they are, and their verdicts."""
+    """Results with their ±, position, time (in dynamics) and verdict."""
     rows, judged = [], any(result.get("parts") for result in results.values())
     for name, result in results.items():
         value = readable(result["value"], result["error"], result["unit"], result.get("within"))
@@ -35,7 +35,7 @@ def rows_of_results(results, dynamic):
 
 
 def verdict_of(result):
-    """Verdict of a result in a few words: "determined, 3 digits", "wide"; without one how many digits ± leaves."""
+    """Verdict of a result in a few words: "determined, 3 digits", "wide"; without a verdict its number of digits."""
     verdict, digits = result.get("verdict"), result.get("digits")
     if verdict == DETERMINED and digits == 0:
         return f"{verdict}, {result['verdict_text']}"
@@ -44,14 +44,14 @@ def verdict_of(result):
 
 
 def on_verdicts(results):
-    """Sentences on results that are not determined: why, and what to ask instead."""
+    """Sentences on results that are not determined: the reason, and results to ask for instead."""
     for name, result in results.items():
         if result.get("verdict") not in (None, DETERMINED):
             yield f"{name}: {result['verdict']}: {result['verdict_text']}"
 
 
 def rows_of_steps(steps):
-    """A row for each load step, of results in columns of one unit each, and last where they stand."""
+    """A row for each load step, with results in columns of one unit each; the last row has their positions."""
     loads = "load" in steps[-1]
     names = ["step", *(["load [N]"] if loads else [])]
     columns = {name: [step["results"][name] for step in steps] for name in steps[-1]["results"]}
@@ -73,7 +73,7 @@ def rows_of_steps(steps):
 
 
 def rows_of_modes(step):
-    """A row for each mode: frequency with its ±, where it moves and what is to be known of it."""
+    """A row for each mode: frequency with its ±, position of its largest displacement, and remarks."""
     rows, results, squared = [], list(step["results"].values()), step["squared"]
     for k, result in enumerate(results):
         value, error = abs(result["value"]), result["error"]
@@ -89,7 +89,7 @@ def rows_of_modes(step):
 
 
 def on_web(web):
-    """(How many nodes, lines and cells a web has, how long, large and heavy it is), of what ``web_of`` finds."""
+    """(Text of the numbers of nodes, lines and cells, text of length, size and mass), from the dict of ``web_of``."""
     area = f"{web['area']:.4g} m², " if web["cells"] else ""
     counts = f"{web['nodes']} nodes, {web['lines']} lines, {web['cells']} cells"
     return counts, f"{web['cable_length']:.6g} m of cable, {area}{web['mass']:.4g} kg"
@@ -106,7 +106,7 @@ def on_results(results):
 
 
 def on_run(summary):
-    """(Name, sentence) of what else is known: horizon, contact, breaks, strength."""
+    """(Name, sentence) of horizon, contact, breaks and strength."""
     if horizon := summary.get("horizon"):
         yield "horizon", _horizon(horizon)
         for name, r in horizon.get("ensemble", {}).items():
@@ -141,7 +141,7 @@ def on_run(summary):
 
 
 def on_solver(solver):
-    """Sentences on what a solver did, and how far its books close."""
+    """Sentences on the work of a solver, and on its energy and momentum balance."""
     if solver["residual"] is not None:
         text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"
         text += f" by {solver['factorization'].partition(',')[0]}" if solver.get("factorization") else ""
@@ -160,14 +160,14 @@ def on_solver(solver):
 
 
 def on_cost(cost):
-    """Cost of a run; compiling, which happens once, apart."""
+    """Cost of a run; compiling, which happens once, is separate."""
     text = f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"
     compiling = cost.get("compile_s") or 0.0
     return text + (f", of which compiling {compiling:.1f} s, once" if compiling >= 0.1 else "")
 
 
 def between(interval, unit):
-    """An interval in words; an end of None is infinite."""
+    """An interval as text; an end of None is infinite."""
     lower, upper = interval
     if lower is None or upper is None:
         ends = [f"{word} {end:.6g} {unit}" for word, end in (("above", lower), ("below", upper)) if end is not None]
@@ -180,7 +180,7 @@ def _position(result):
 
 
 def _breaks(breaks):
-    """(Name, sentence) of the first breaks, and how many there are."""
+    """(Name, sentence) of the first breaks, and of their number."""
     if not breaks:
         yield "breaks", "none"
     for n, entry in enumerate(breaks[:FEW_BREAKS]):
@@ -194,7 +194,7 @@ def _breaks(breaks):
 
 
 def _of_strength(worst):
-    """Sentence on the largest stress over strength, with its ± and what that holds."""
+    """Sentence on the largest stress over strength, with its ± and the parts of that."""
     if (error := worst.get("error")) is None:
         digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
         return f"utilisation {worst['value']:{digits}} at line {worst['line']}, its ± is not known"
@@ -203,7 +203,7 @@ def _of_strength(worst):
 
 
 def _of_throw(thrown):
-    """A number of a throw, or whether something is so, in words."""
+    """A number or a statement of a throw as text."""
     if "unit" not in thrown:
         if thrown["value"] is not None:
             return "yes" if thrown["value"] else "no"

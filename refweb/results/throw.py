@@ -1,4 +1,4 @@
-"""Numbers of a throw: how long and how far on the mouth of a net is open, and what it covers of a target at the end."""
+"""Numbers of a throw: opening of the mouth of a net over time and distance, and its cover of a target at the end."""
 
 from __future__ import annotations
 
@@ -11,33 +11,34 @@ from ..tables import Table, real, table, text
 NO_TWIN = "there is no step refinement"
 UNITS = {"largest_area": "m²", "deployment_time": "s", "travelled": "m", "effective_period": "s", "covered": "1"}
 FLAGS = ("inside", "closed")
-"""Names of what is so or is not."""
+"""Names of statements that are true or false."""
 
 
 @table
 class Throw(Table):
-    """Numbers that a throw is judged by, in ``run.json`` and `Solution.throw`, each with its ±.
+    """Numbers of a throw, in ``run.json`` and `Solution.throw`, each with its ±.
 
-    The definitions are refweb's own. Of the area of the mouth over time, as rows have it, with a parabola through the
-    three rows around the largest: ``largest_area``; ``deployment_time``, when that is; ``travelled``, by how much
-    another observable has changed until then; ``effective_period``, how long the area is at least ``share`` of the
-    largest around that time. What is not over at the end of the run, or was so at its start, is a lower bound, and says
-    so: the number less its ± is the least that it may be.
+    The definitions are refweb's own. Four numbers follow from the area of the mouth over the rows of the history, with
+    a parabola through the three rows around the largest. ``largest_area`` is the largest area, and ``deployment_time``
+    its time. ``travelled`` is the change of another observable until then. ``effective_period`` is the time around it
+    in which the area is at least ``share`` of the largest. A number is a lower bound, and marked as such, if the
+    largest area is at the end of the run, or if the period reaches the start or the end. The number less its ± is then
+    the least possible value.
 
-    Of a ``target`` at the end of the run: ``inside``, whether its centre is in the convex hull of the web's nodes;
-    ``closed``, whether the area of the mouth is at most ``closed`` of the largest; ``covered``, the share of directions
-    from its centre that the net covers. With Ω the solid angle of the mouth, as a fan from the mean of its nodes, that
-    is 1 − Ω/4π where the centre lies on the side of the mouth that the mean of all nodes is on, and inside the hull,
-    and else Ω/4π: the net seen through its outline.
+    Three results describe the capture of a ``target`` at the end of the run. ``inside`` is true if its centre is in the
+    convex hull of the web's nodes. ``closed`` is true if the area of the mouth is at most ``closed`` of the largest.
+    ``covered`` is the share of directions from the centre of the target that the net covers. Let Ω be the solid angle
+    of the mouth, as a fan from the mean of its nodes. The share is 1 − Ω/4π if the centre is in the hull, on the same
+    side of the mouth as the mean of all nodes. Else it is Ω/4π: the net is seen through its outline.
 
-    ± holds what differs in the twin run and what a history of half the rows would make of the same motion. What is
-    inside or closed is decided by a ``margin`` with a ± of its own: the depth of the centre in the hull [m], and the
-    area at which the mouth counts as closed less that at the end [m²]. It is true or false where the margin exceeds its
-    ±, and else undecided, ``value`` being None; ``drawn`` is what this run has. Where it is undecided whether the
-    centre is inside, or on which side of the mouth, ± of ``covered`` holds both. Without a twin, behind the time at
-    which lines break in another order in the twin, and where an event ends only one of them there is no ±, ``reason``
-    says why, and nothing is known of what is inside or closed. Studies have these numbers among their results, 1 and 0
-    for what is so and what is not, see `refweb.sweeps.case.cells_of`.
+    ± contains the difference from the step-refinement run, and the difference from a history of half the rows. A
+    ``margin`` with its ± decides ``inside`` and ``closed``. It is the depth of the centre in the hull [m], and the area
+    at which the mouth counts as closed less the area at the end [m²]. The statement is true or false if the size of the
+    margin exceeds its ±. Else it is undecided, and ``value`` is None; ``drawn`` is the statement for this run. ± of
+    ``covered`` contains both shares if it is undecided where the centre is. There is no ± without a step-refinement
+    run, after the time at which lines break in another order in it, and if an event ends only one of the two runs. Then
+    ``reason`` says why, and statements are undecided. Studies have these numbers among their results, with 1 for true
+    and 0 for false.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ class Throw(Table):
     travel : str, optional
         Name of an observable of a length, whose change is the distance travelled.
     share : float
-        Of the largest area, from which on the net is effective, 0 < share < 1.
+        Share of the largest area from which on the net is effective, 0 < share < 1.
     target : str, optional
         Name of a body.
     closed : float
@@ -73,13 +74,13 @@ class Throw(Table):
 
     @property
     def numbers(self):
-        """Names of what it finds."""
+        """Names of the numbers."""
         of_target = ["inside", "closed", "covered"] if self.target is not None else []
         travelled = ["travelled"] if self.travel is not None else []
         return ["largest_area", "deployment_time", *travelled, "effective_period", *of_target]
 
     def on(self, observables, system, solve):
-        """Refuse what the scene does not have."""
+        """Refuse observables and bodies that the scene does not have."""
         if solve.kind != "dynamic":
             raise InputError("a throw has no meaning in statics: leave it out")
         names = [o.name for o in observables]
@@ -109,17 +110,17 @@ class Throw(Table):
         Parameters
         ----------
         observables : sequence of refweb.Observe
-            Those of the scene.
+            Observables of the scene.
         rows : ndarray, shape (rows, columns)
-            Times and, in their order, observables.
+            Times and observables, in their order.
         state : refweb.results.state.State
-            At the end.
+            State at the end.
         twin : (ndarray, refweb.results.state.State), optional
-            The same of the twin.
+            Rows and state of the step-refinement run.
         factor : float
-            ± over what differs in the twin.
+            ± over the difference from the step-refinement run.
         known : float
-            Time from which on the twin tells nothing of the run [s].
+            Time after which the step-refinement run shows no error of the run [s].
         """
         names = [o.name for o in observables]
         values, half = self._of(rows, names), self._of(rows[_every_other(len(rows))], names)
@@ -149,7 +150,7 @@ class Throw(Table):
         }
 
     def _of(self, rows, names):
-        """Values by name; ``bounds`` are names of those that are lower bounds, ``settled`` is when values are [s]."""
+        """Values by name; ``bounds`` are the names of lower bounds, ``settled`` the times of final values [s]."""
         times, area = rows[:, 0], rows[:, 1 + names.index(self.area)]
         top = int(area.argmax())
         near = slice(top - 1, top + 2) if 0 < top < len(area) - 1 else slice(top, top + 1)
@@ -191,7 +192,7 @@ class Throw(Table):
 def _mean_difference(rows, refined):
     """Root mean square of the difference of two columns (time, value) in the second half of the time.
 
-    At the end alone two runs may agree by chance.
+    A difference at the end alone may be small by chance.
     """
     count = min(len(rows), len(refined))
     late = (rows[:count, 0] == refined[:count, 0]) & (rows[:count, 0] >= 0.5 * rows[count - 1, 0])
@@ -199,24 +200,24 @@ def _mean_difference(rows, refined):
 
 
 def _every_other(count):
-    """Numbers of every other row of a count, the last one among them."""
+    """Numbers of every second row of a count, and of the last row."""
     return np.unique([*range(0, count, 2), count - 1])
 
 
 def _error_of(name, values, half, refined, factor):
-    """± of a number, or of the margin that decides on what is so."""
+    """± of a number, or of the margin of a statement."""
     value = values[name]
     return float(factor * abs(value - refined[name]) + abs(value - half.get(name, value)) + 4e-16 * abs(value))
 
 
 def _decided(values, errors):
-    """Tell if ± leaves no doubt on which side of the mouth the centre is, and whether it is inside."""
+    """Tell if ± decides on which side of the mouth the centre is, and if it is inside."""
     inside, side = (abs(values[name]) > errors[name] for name in ("inside", "side"))
     return inside and (side or values["inside"] < 0.0)
 
 
 def _entry(name, value, error, bounds):
-    """A number with its ±, or whether something is so, for ``run.json``."""
+    """A number with its ±, or a statement, for ``run.json``."""
     if name in FLAGS:
         drawn = value > 0.0 or (name == "closed" and value == 0.0)
         decided = error is not None and abs(value) > error
@@ -246,7 +247,7 @@ def _vertex(times, values):
 def depth_in_hull(points, point):
     """Depth of a position below the nearest face of the convex hull of points [m], negative outside.
 
-    The hull of points in a plane has no inside: it is the distance from the plane, negative.
+    The hull of points in a plane has no inside: the depth is minus the distance from the plane.
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -260,14 +261,14 @@ def depth_in_hull(points, point):
 
 
 def in_hull(points, point):
-    """Tell if a position is in the convex hull of points; that of points in a plane has no inside."""
+    """Tell if a position is in the convex hull of points; the hull of points in a plane has no inside."""
     return depth_in_hull(points, point) > 0.0
 
 
 def side_of_mouth(outline, nodes, centre):
     """Distance of a centre from the plane of a mouth [m], negative where the mean of all nodes is on the other side.
 
-    It is at most the distance of that mean, which decides as well.
+    Its size is at most the distance of that mean from the plane, which may leave the side undecided as well.
     """
     normal, middle = np.cross(outline, np.roll(outline, -1, axis=0)).sum(axis=0), outline.mean(axis=0)
     size = np.linalg.norm(normal)
@@ -280,8 +281,8 @@ def side_of_mouth(outline, nodes, centre):
 def solid_angle(outline, centre):
     """Size of the solid angle [sr] of a closed polygon seen from a place, as a fan from the mean of its corners.
 
-    Of each triangle after A. van Oosterom, J. Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng.
-    30 (1983) 125–126.
+    Source, for each triangle: A. van Oosterom, J. Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed.
+    Eng. 30 (1983) 125–126.
     """
     a, b = outline - centre, np.roll(outline, -1, axis=0) - centre
     c = np.broadcast_to(outline.mean(axis=0) - centre, a.shape)

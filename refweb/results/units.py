@@ -1,4 +1,4 @@
-"""Numbers that people read: values with their ± in readable units, in one notation."""
+"""Numbers as text for readers: values with their ± in readable units, in one notation."""
 
 import math
 
@@ -8,18 +8,18 @@ PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "
 _SCALED = ("m", "N", "Pa", "J", "s", "m/s", "W")
 """Units that take prefixes."""
 FIXED = 1e-4
-"""± below which it is written with a power of ten."""
+"""± below which ± is written with a power of ten."""
 MOST_DIGITS = 10
-"""Largest number of significant digits of a value that has a ±; others have 6."""
+"""Largest number of significant digits of a value with ±; a value without ± has 6."""
 
 
 def prefixed(size):
-    """(factor, prefix) of the largest factor that is not above a size; nano for what is smaller."""
+    """(factor, prefix) of the largest factor that is not above a size; nano for smaller sizes."""
     return next((pair for pair in PREFIXES if size >= pair[0]), PREFIXES[-1])
 
 
 def scale_of(size, unit):
-    """(factor, name) of the readable unit of a size: ``(1e-3, "mm")``; the name is empty of what has none."""
+    """(factor, name) of the readable unit of a size: ``(1e-3, "mm")``; the name is empty for numbers without a unit."""
     factor, prefix = prefixed(abs(size)) if unit in _SCALED and size else (1.0, "")
     return factor, "" if unit == "1" else f"{prefix}{unit}"
 
@@ -27,7 +27,7 @@ def scale_of(size, unit):
 def with_error(value, error):
     """A number with its ±: ``100.66 ± 0.55``, ``2.9972910 ± 1.7e-06``, ``0 ± 90``; without one ``31.4848``.
 
-    ± has two digits, and the value as many as that leaves: none of a value far below it.
+    ± has two digits; the value ends at the same decimal place.
     """
     if not error or not math.isfinite(error) or not math.isfinite(value):
         return f"{value:.6g} ± {error}" if error else f"{value:.6g}"
@@ -44,7 +44,7 @@ def with_error(value, error):
 def readable(value, error, unit, within=None):
     """A value with its error in the unit of the larger of both: ``31.4848 mm``, ``100.66 ± 0.55 mm``, ``0 ± 90 mm``.
 
-    ``within`` are the least and the largest value of those that are possible, where ± goes beyond them.
+    ``within`` has the ends of value ± error if these are cut to possible values.
     """
     factor, name = scale_of(larger(value, error), unit)
     text = f"{with_error(value / factor, error and error / factor)} {name}".rstrip()
@@ -55,12 +55,12 @@ def readable(value, error, unit, within=None):
 
 
 def larger(value, error):
-    """The larger of a value and its ±, which is None where it is not known: it decides on the unit."""
+    """The larger of a value and its ±, which selects the unit; ± may be None."""
     return max(abs(value), error or 0.0)
 
 
 def other_errors(results):
-    """Errors besides ±, in words, a text for each kind; of results as ``run.json`` has them."""
+    """Errors besides ±: a text for each kind, for results as in ``run.json``."""
     for key, words in OTHER_ERRORS.items():
         parts = [f"{n} by {readable(r[key], None, r['unit'])}" for n, r in results.items() if r.get(key) is not None]
         if parts:
@@ -68,7 +68,7 @@ def other_errors(results):
 
 
 def position_text(where, at):
-    """Position of a result, in words: ``node 1757``; empty where it has none."""
+    """Position of a result as text: ``node 1757``; empty without a position."""
     return "" if where is None else f"{at} {where}"
 
 

@@ -1,4 +1,4 @@
-"""A state as meshes: points, cells and what is known of them, for its web and its bodies, and their VTU files."""
+"""A state as meshes of its web and its bodies: points, cells and data of both; and their VTU files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from .files import write_atomically
 
 POINT_DATA: tuple[str, ...] = ("displacement", "velocity", "reaction", "mass", "support")
-"""Names of what is known of nodes; ``support`` is 1 where all components are held, else 0."""
+"""Names of data of nodes; ``support`` is 1 if all components are supported, else 0."""
 SHAPE_SIZE = 0.05
 """Largest displacement of a drawn mode over the diagonal of the net's bounding box."""
 CELL_DATA: tuple[str, ...] = ("tension", "stress", "strain", "natural_length", "slack")
@@ -21,9 +21,9 @@ def meshes(state, shape=None):
     Parameters
     ----------
     state : refweb.results.state.State
-        What is drawn.
+        State of the frame.
     shape : ndarray, shape (nodes, 3), optional
-        A mode that is drawn on it.
+        Mode shape that is added to the positions.
 
     Returns
     -------
@@ -33,10 +33,10 @@ def meshes(state, shape=None):
 
 
 def web_mesh(state, shape=None):
-    """The web of a state: current positions, its lines in the web's own numbering, float64.
+    """The web of a state: current positions, and lines in the numbering of the web, as float64.
 
-    Elements of order 2 and 3 are quadratic and cubic cells; those of a line that is divided follow each other. A
-    ``shape`` is drawn on it.
+    Elements of order 2 and 3 are quadratic and cubic cells. The elements of one line follow each other. A mode
+    ``shape`` is added to the positions.
     """
     import meshio
 
@@ -67,9 +67,9 @@ def write_mesh(path, mesh):
 
 
 def frame_data(state, shape=None):
-    """Points, and point and cell data by name, of a state's web, as VTU has them; one cell per element.
+    """Points, and point and cell data by name, of the web of a state as in VTU files; one cell per element.
 
-    The ``shape`` of a mode, of shape (nodes, 3), is point data as well, and is added to points and displacement.
+    The ``shape`` of a mode (nodes, 3) is point data as well, and is added to points and displacement.
     """
     net = state.system.at(state.time).net
     fields = (state.position, *(getattr(state, name) for name in ("x", "v", "reaction")), net.mass)
@@ -99,10 +99,10 @@ def frame_data(state, shape=None):
 
 
 def _drawn(net):
-    """Weights of a cell's nodes at the places where VTK has the nodes of a line of that order, shape (nodes, nodes).
+    """Weights of a cell's nodes at the nodes of a VTK cell of the same order, shape (nodes, nodes).
 
-    VTK's cubic has its inner nodes at thirds, this element at the Gauss–Lobatto points: the curve through the element's
-    own nodes would have 10 % less sag than the element.
+    VTK's cubic cell has its inner nodes at thirds, the element of order 3 at the Gauss–Lobatto points. A VTK cell
+    through the nodes of the element would have 10 % less sag than the element.
     """
     order = net.order
     places = np.array([0.0, 1.0, *np.arange(1, order) / order])

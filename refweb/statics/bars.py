@@ -1,4 +1,4 @@
-"""The lines of a net as bars: a straight line is one, a curved one has a bar at each quadrature point."""
+"""The lines of a net as bars: a straight line is one bar, a curved line has a bar at each quadrature point."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Bars:
         return np.maximum(self.stiffness * (self._stretch + along), 0.0)
 
     def lent(self, share):
-        """Stiffness that slack bars are lent [N/m]: that of a smooth law, η a share of the mean strain of the taut."""
+        """Fictitious stiffness of slack bars [N/m], by a smooth law: η is ``share`` of the mean strain of taut bars."""
         slack, taut = self._strain < 0.0, self._strain > 0.0
         width = share * self._strain[taut].mean() if taut.any() else 0.0
         if not (width > 0.0 and slack.any()):
@@ -60,7 +60,7 @@ class Bars:
         return np.where(slack, self.stiffness * 2.0 * width**2 / ((root + abs(self._strain)) * root), 0.0)
 
     def besides(self, tension, along):
-        """Stiffness across the bars by other tensions, and a stiffness ``along`` them that is added.
+        """Change of the stiffness across the bars by other tensions, plus a stiffness ``along`` the bars.
 
         A block per element, shape (cells, 3 nodes, 3 nodes).
         """

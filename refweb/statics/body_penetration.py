@@ -1,7 +1,8 @@
-"""Lines that pass through bodies from one equilibrium to the next, which no equilibrium shows.
+"""Penetration check of statics: lines that pass through bodies between two equilibria.
 
-Between two equilibria there is no motion to look at. A line whose straight way from the one to the other leads through
-the core of a body has passed it, or has slid around it: which of the two, no load step says, and smaller ones would.
+Statics has no motion between two equilibria, so each point is taken to move in a straight line. A line that moves
+through the core of a body in this way has passed through the body or has slid around it. The load steps do not tell
+which; smaller ones would.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from ..results.state import State
 from ..system.static_system import waiting
 
 PARTS = 8
-"""Number of looks at a way as long as a body is thick."""
+"""Number of positions that are checked on a path as long as a body is thick."""
 MOST = 64
-"""Largest number of nodes about whose nearest place to a body it is looked."""
+"""Largest number of nodes around whose nearest approach to a body positions are checked."""
 
 
 class Passage:
@@ -29,9 +30,9 @@ class Passage:
     scene : refweb.Scene
         With a stiffness of contact for each body.
     system : refweb.system.system.System
-        That of the scene.
+        System of the scene.
     x : ndarray, shape (rows, 3), optional
-        Displacement before the first [m], by default that of the web as it is.
+        Displacement before the first equilibrium [m], by default zero.
 
     Attributes
     ----------
@@ -45,12 +46,12 @@ class Passage:
         self._x = np.zeros((system.rows, 3)) if x is None else x
 
     def record(self, state):
-        """Note an equilibrium, a `refweb.results.state.State`.
+        """Take the next equilibrium, a `refweb.results.state.State`, and check the path that leads there.
 
         Raises
         ------
         SolverError
-            For a line whose way there leads through the core of a body.
+            For a line whose path leads through the core of a body.
         """
         net = self._system.net
         for i, body in enumerate(net.bodies):
@@ -62,7 +63,7 @@ class Passage:
         self._x = state.x
 
     def _looks(self, body, path):
-        """Shares of a way (rows, 3) at which lines may be deepest: about where its nodes are nearest to a body."""
+        """Shares of a path (rows, 3) at which lines may be deepest: around the nearest approach of nodes to a body."""
         net = self._system.net
         position, shift = net.points + self._x, path[: net.nodes] - path[body.row]
         begin = position[: net.nodes] - position[body.row]
@@ -76,7 +77,7 @@ class Passage:
         return np.unique(around[(around > 0.0) & (around < 1.0)])
 
     def _look_back(self, body, deep, state):
-        """Look at the way that leads to an equilibrium."""
+        """Check the path that leads to an equilibrium."""
         system, path = self._system, state.x - self._x
         looks = self._looks(body, path) if math.isfinite(body.thickness) else []
         before = State(system, state.time, self._x).overlap(body) if len(looks) else deep

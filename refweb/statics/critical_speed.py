@@ -1,18 +1,18 @@
-"""The angular speed at and above which a net that turns has no stable equilibrium.
+"""Critical speed: the angular speed at and above which a rotating net has no stable equilibrium.
 
-Far out every tension law is linear: a net that is stretched without limit has the potential ½ Σ (EA/L) |d|² of the
-vectors d of its lines, less terms that grow no faster than |d|, and the centrifugal one, −½ Σ m |Ω × r|². The least Ω
-at which their sum is not positive definite,
+Every tension law is linear at large strains. A net that is stretched without limit has the potential ½ Σ (EA/L) |d|² of
+the vectors d of its lines, less terms that grow no faster than |d|. The centrifugal potential is −½ Σ m |Ω × r|². The
+least Ω at which the sum of both is not positive definite,
 
     A y = Ω² C y,      A of unit tensions EA/L,   C of masses across the axis,
 
-is a sharp limit, also in an orbit, where Ω² C are masses times the G of `refweb.effects.orbit`. Below it the whole
-potential has a least value, above it none. And as no law here has dσ/dε > E or T/l > EA/L, no tangent of the lines
-exceeds A: at and above the limit no equilibrium is stable, wherever it may be.
+is a sharp limit. In an orbit, Ω² C is replaced by the masses times the matrix G of `refweb.effects.orbit`. The total
+potential has a least value below the limit, and none above it. No law here has dσ/dε > E or T/l > EA/L, so that no
+tangent of the lines exceeds A. Therefore no equilibrium is stable at or above the limit.
 
-Counts of negative pivots (Sylvester's law of inertia) compare A with Ω²C. A part of the net that nothing holds across
-the axis is an exception in its translations alone, which A does not resist: such a part moves on in a straight line, as
-seen from outside, and turns steadily where its centre of mass is on the axis.
+Counts of negative pivots (Sylvester's law of inertia) compare A with Ω²C. Translations of a part that no support holds
+across the axis are an exception, since A does not resist them. In the inertial frame such a part moves in a straight
+line; it rotates steadily if its centre of mass is on the axis.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def _centrifugal(system):
 
 
 def check_speed(system, t):
-    """Refuse a frame that turns at the limit or above it, with that limit."""
+    """Refuse a frame that rotates at the critical speed or above; the message names this speed."""
     net, factor = system.at(t).net, Factor(system.pattern)
     taken, allowed = _centrifugal(system), drifting(system)
     axial = net.line_data.ea / net.natural_length

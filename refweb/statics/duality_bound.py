@@ -1,24 +1,24 @@
-"""A bound on the error of a static solution, from convex duality.
+"""Proven bound on the error of a static solution, from convex duality.
 
-For the tension-only law the potential Π(x) = Σ ½ k (l − L)₊² − f·x, k = EA/L, is convex in the positions. Element
-forces s, vectors that balance the loads at every free node, give the dual value D(s) ≤ min Π. The gap is a sum over
-lines of terms that are never negative,
+For the tension-only law the potential Π(x) = Σ ½ k (l − L)₊² − f·x, k = EA/L, is convex in the positions. Let s be
+vectors of element forces that balance the loads at every free node. They give the dual value D(s) ≤ min Π. The duality
+gap is a sum over lines of terms that are never negative,
 
     Π − D = Σ ½ k (l − L)₊² + |s|²/2k + L|s| − s·d,      d the line's vector, l = |d|,
 
-evaluated here without cancellation: with T = k (l − L)₊, (T − |s|)²/2k on taut lines, |s|²/2k + |s|(L − l) on slack
-ones, plus (|s| l − s·d) for the direction. The stress energy of the element forces is quadratic and its gradient
-Lipschitz with k, so Σ |T t − s*|²/2k ≤ Π − Π* ≤ gap, which bounds every tension: |T − T*| ≤ √(2 k gap).
+It is evaluated without cancellation, with T = k (l − L)₊: (T − |s|)²/2k on taut lines, |s|²/2k + |s|(L − l) on slack
+lines, plus (|s| l − s·d) for the direction. The stress energy of the element forces is quadratic, and its gradient is
+Lipschitz with k. Hence Σ |T t − s*|²/2k ≤ Π − Π* ≤ gap, which bounds every tension: |T − T*| ≤ √(2 k gap).
 
 A force density q > 0 is the same with k = q and L = 0. Of curved elements every quadrature point is such a line, a bar
 of natural length w L whose vector is w dx/dξ.
 
-The balancing correction of the computed forces is what a displacement p makes of them, s += D B p with the vectors B p
-of the lines, where Bᵀ D B p is unbalanced. With the tangent, D = k t⊗t + (T/l)(1 − t⊗t), the correction is the one of
-the least gap to second order, and Newton's method leaves a factorization of that or of one near it. Where this does not
-end at rounding, D = k on taut lines and next to nothing on slack ones, with a factorization of its own, does. Any
-solution proves a bound, the smaller of the two is taken. The correction is kept in extended precision, where the
-platform has it, since what it leaves unbalanced enters the gap multiplied by a displacement.
+The computed forces are corrected until they balance the loads: s += D B p, where B p are changes of the vectors of the
+lines and Bᵀ D B p equals the unbalanced force. With the tangent, D = k t⊗t + (T/l)(1 − t⊗t), the correction has the
+least gap to second order. Newton's method leaves a factorization of this tangent or of a similar one. Where this
+correction does not reach rounding, another one does: D = k on taut lines and nearly zero on slack lines, with a new
+factorization. Any solution p proves a bound, and the smaller bound is taken. The correction is kept in extended
+precision where the platform has it, because the remaining unbalanced force enters the gap times a displacement.
 """
 
 from __future__ import annotations
@@ -32,9 +32,10 @@ from ..system.factorization import Factor
 from .bars import Bars
 
 ROUNDS, MOST, CLOSE = 5, 8, 1e-2
-"""Corrections of forces, iterations of conjugate gradients for each by a tangent near theirs, and what these leave."""
+"""Largest number of corrections of forces; largest number of conjugate gradient iterations for each, and their
+tolerance."""
 SHARP = 4.0
-"""Gap over what rounding makes of it at least, up to which nothing is to be gained."""
+"""Largest gap, over the least gap by rounding, that is not worth another correction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,7 @@ class DualityBound:
     strain_energy : float
         Bound on the error of the strain energy [J].
     sharp : bool
-        Whether the gap is at most `SHARP` times what rounding makes of it.
+        True if the gap is at most `SHARP` times the least gap by rounding.
     """
 
     gap: float
@@ -65,11 +66,11 @@ def duality_bound(system, equilibrium, factor=None):
     Parameters
     ----------
     system : refweb.system.system.System
-        One that is ``convex``.
+        A system that is ``convex``.
     equilibrium : refweb.statics.equilibrium.Equilibrium
         Its state.
     factor : refweb.system.factorization.Factor, optional
-        Used again where there is one; where it holds a tangent, ``shift`` is its prestress τ [N].
+        A factorization that is used again; if it holds a tangent, ``shift`` is its prestress τ [N].
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
     bars = Bars(net, x)
@@ -86,12 +87,12 @@ def duality_bound(system, equilibrium, factor=None):
 
 
 class _Balance:
-    """Forces of the bars that balance the outer ones, and what they prove.
+    """Forces of the bars that balance the outer forces, and the bounds that they prove.
 
     Parameters
     ----------
     system : refweb.system.system.System
-        As it stands at the load step.
+        The system of the scene.
     bars : Bars
         Its bars at the displacement x.
     x, outer : ndarray, shape (rows, 3)
@@ -109,7 +110,7 @@ class _Balance:
         self._least_gap = self._rounding + np.finfo(np.longdouble).eps * bars.tension.sum() * self._reach
 
     def by_laplacian(self, factor):
-        """Solution and weights of the bars' own stiffness in every direction, of slack ones nearly none."""
+        """Solver and weights for bars with the same stiffness in every direction, nearly zero for slack bars."""
         system, bars, net = self._system, self._bars, self._system.net
         weight = bars.stiffness * np.where(bars.tension > 0.0, 1.0, 1e-9)
         unit = np.einsum("q,qa,qb->qab", net.weights**2, net.gradients, net.gradients)
@@ -120,7 +121,7 @@ class _Balance:
         return factor.solve, lambda change: weight[:, None] * change
 
     def by_tangent(self, factor):
-        """Solution and weights of the tangent that a factor holds, or nearly holds."""
+        """Solver and weights for the present tangent, with the factorization of it or of a similar one."""
         system, bars = self._system, self._bars
         across = bars.tension / np.where(bars.length > 0.0, bars.length, 1.0)
         along = np.where(bars.tension > 0.0, bars.stiffness - across, 0.0)[:, None] * bars.direction
@@ -139,10 +140,10 @@ class _Balance:
         return solve, weigh
 
     def bound(self, solve, weigh):
-        """The `DualityBound` by a correction of the forces at hand.
+        """The `DualityBound` by a correction of the computed forces.
 
-        It is what ``weigh`` makes of the changes of the bars' vectors by displacements that ``solve`` finds from
-        what is unbalanced. Both are approximate; what stays unbalanced enters the gap.
+        ``solve`` finds a displacement from the unbalanced force; ``weigh`` turns the changes of the bars' vectors into
+        a correction of forces. Both may be approximate: the remaining unbalanced force enters the gap.
         """
         bars = self._bars
         correction, unbalanced = np.zeros(self._force.shape, dtype=np.longdouble), self._unbalanced(self._force)
@@ -164,7 +165,7 @@ class _Balance:
         return DualityBound(gap, tension, 2.0 * np.sqrt(strain_energy * gap) + gap, sharp)
 
     def _rows(self, p):
-        """A displacement of the unknowns as one of the rows, shape (rows, 3)."""
+        """Displacement of all rows, shape (rows, 3), from that of the unknowns."""
         y = np.zeros((self._system.rows, 3))
         y.ravel()[self._system.free] = p
         return y

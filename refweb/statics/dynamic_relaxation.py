@@ -1,4 +1,4 @@
-"""Static equilibrium by dynamic relaxation: the explicit way, independent of any tangent.
+"""Static equilibrium by dynamic relaxation: an explicit method, independent of any tangent.
 
 Central differences with fictitious masses, chosen so that a step of 1 is at `SAFETY` of the bound of stability in every
 row, and kinetic damping: whenever the kinetic energy passes a peak, all velocities are set to zero.
@@ -30,14 +30,16 @@ from .equilibrium import (
 )
 
 SAFETY = 0.6
-"""Half a kick from rest takes the stiffest vibration 2 `SAFETY`² of the way to its middle. Where it goes beyond, a net
-may chatter between taut and slack, at rest again after every other step, and hardly move."""
+"""Step size over the critical time step. Half a kick from rest moves the stiffest vibration by 2 `SAFETY`² of its
+distance from equilibrium. A net that moves beyond equilibrium may jump between taut and slack, and be at rest after
+every second step."""
 
 STALLED, TOUCHING = 2_000_000, 500_000
-"""Steps in which the residual has to fall by a tenth; the second with contact, where each costs ten times as much."""
+"""Steps within which the residual must fall by a tenth. The second number is for systems with contact, whose steps cost
+ten times as much."""
 
 LOOK = 2000
-"""Steps between two looks at the residual."""
+"""Steps between two evaluations of the residual."""
 
 
 @functools.cache
@@ -87,11 +89,11 @@ def solve(system, load_steps, progress=None, limit=10_000_000, tolerance=TOLERAN
     load_steps : sequence of float
         Values of t.
     progress : callable, optional
-        Called with a line of text as it goes.
+        Called with a line of text at each evaluation of the residual.
     limit : int
         Largest number of steps for one load step.
     tolerance : float
-        Residual to stop at.
+        Residual at which the relaxation ends.
 
     Yields
     ------

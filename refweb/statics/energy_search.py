@@ -1,6 +1,7 @@
 """Line search down the energy, for forces with a potential.
 
-Near the end differences of the energy drown in rounding, and the slope, force times step, is looked at instead.
+Differences of the energy become smaller than rounding near the end. Then the slope, force times step, is compared
+instead.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ class EnergySearch:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts, with a potential.
+        System whose forces have a potential.
     t : float
         Load step.
     x : ndarray, shape (rows, 3)
-        Where the iteration starts [m].
+        Displacement at the start of the iteration [m].
     """
 
     def __init__(self, system, t, x):
@@ -38,14 +39,14 @@ class EnergySearch:
         shift : float
             Prestress τ of the tangent that p comes from [N].
         stats : dict
-            ``nfev`` grows by what is evaluated.
+            Its ``nfev`` grows by the number of evaluations.
 
         Returns
         -------
         x : ndarray, shape (rows, 3)
             Displacement after the step [m].
         shift : float
-            The next τ [N]: less after a step that went as its model said, more after one that had to be cut.
+            The next τ [N]: smaller after a step that its model has predicted well, larger after a step that was cut.
         """
         system, slope, energy = self._system, r @ p, self._energy
         step, drowned = system.rows_of(p), 0.5 * slope < 1e-9 * abs(energy)

@@ -35,14 +35,14 @@ class Stability(NamedTuple):
     Attributes
     ----------
     sign : {-1, 0, 1, None}
-        −1 where the tangent drives the web away or a disturbance grows, 0 where some direction has no stiffness to
-        rounding, 1 where the equilibrium is stable, None where that is not decided.
+        −1 if the tangent has negative stiffness or a disturbance grows, 0 if some direction has no stiffness to
+        rounding, 1 if the equilibrium is stable, None if that is not decided.
     why : str
-        Of −1 what drives it away, of None what is missing, in words.
+        Reason in words: the cause of the instability for −1, the missing information for None.
     gyroscopic : bool
-        Whether Coriolis forces hold what the tangent does not, as long as nothing damps motion in the frame.
+        True if only Coriolis forces make the equilibrium stable; damping in the frame would end this.
     loose : bool
-        Whether some direction may have no stiffness.
+        True if some direction may have no stiffness.
     """
 
     sign: int | None
@@ -69,16 +69,16 @@ class Equilibrium:
         ``nsteps`` iterations, ``nfev`` force and energy evaluations, ``njev`` tangents, ``nlu`` factorizations,
         ``residual`` [1], ``smallest_pivot``, the sign of `stability`.
     stability : Stability, optional
-        Whether it is stable; None where its energy is convex, and so it is.
+        Stability; None where the energy is convex, so that the equilibrium is stable.
     may_turn_over : bool
-        Whether there may be other equilibria as lines can push, see `refweb.statics.snap_through`.
+        True if there may be other equilibria because lines can push, see `refweb.statics.snap_through`.
     duality_bound : refweb.statics.duality_bound.DualityBound, optional
-        Of energy and tension, for the tension-only law.
+        Bounds of energy and tension, for the tension-only law.
     deviations : ndarray, shape (k, rows, 3), optional
-        Displacements by which x may be off [m]: the first what is left of the residual, the others what the rounding of
-        forces may come to, but for moves at no cost; None where no tangent is at hand.
+        Possible errors of x [m]: the first from the residual, the others from the rounding of forces. Moves without
+        stiffness are left out. None where there is no tangent.
     floating : refweb.statics.floating.Floating, optional
-        What may move at no cost; None where nothing does, or nothing tells.
+        Components that may move without stiffness; None where there are none, or where that is not known.
     """
 
     step: float
@@ -94,13 +94,13 @@ class Equilibrium:
 
 
 def add_spent(stats, more):
-    """Add what another iteration has spent to the ``stats`` of one."""
+    """Add the counts of another iteration to ``stats``."""
     for key in ("nsteps", "nfev", "njev", "nlu"):
         stats[key] += more.get(key, 0)
 
 
 def check_supported(system, t):
-    """Refuse a load that no support carries, a frame that turns too fast, and links."""
+    """Refuse a load that no support carries, a frame that rotates too fast, and links."""
     if system.constraints:
         raise InputError('[[link]] needs kind = "dynamic" and method = "ida": statics does not hold lengths')
     if carried := carried_off(system, t, system.unsupported_parts):
@@ -116,7 +116,7 @@ def check_supported(system, t):
 
 
 def carried_off(system, t, parts):
-    """Parts that the outer forces carry off, and the remedy, in words; None where forces balance."""
+    """Text that names a part on which the outer forces do not balance, and the remedy; None where they balance."""
     outer = system.outer_force(t)
     for rows, axis, _ in parts:
         resultant = np.sum(outer[rows, axis])
@@ -136,7 +136,7 @@ def carried_off(system, t, parts):
 
 
 def where_nothing_touches(system, t, error):
-    """A `NotFound` with what is carried off where nothing touches anything, if anything is."""
+    """The error with a part on which forces do not balance without contact, if there is such a part."""
     from ..system.unsupported_parts import find_parts
 
     carried = carried_off(system, t, find_parts(system, touching=False))
@@ -148,8 +148,8 @@ def where_nothing_touches(system, t, error):
 def force_scale(system, t, x, tension):
     """Scale of residuals [N]: the largest of nodal load, weight and contact, and of tension.
 
-    At least 1/`LIMIT` of what rounding of the displacements makes of EA, which is more than those where a net is slack
-    under loads below 1e-7 EA.
+    The scale is at least 1/`LIMIT` times the force that rounding of the displacements causes. That is the largest of
+    all where a net is slack under loads below 1e-7 EA.
     """
     stiffness = system.net.axial / system.natural_length(t)
     rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()

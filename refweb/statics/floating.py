@@ -1,10 +1,9 @@
 """Open positions of an equilibrium: the parts that float, their directions, and their range.
 
-For the tension-only law under dead loads the tensions of taut lines and their directions are unique. Two equilibria
-then differ by translations of *parts*, connected by lines whose tension is proven to be above 0; a part that no support
-holds along an axis floats along it, as far as its slack lines let it, |d| ≤ L. For other laws, and where other forces
-act, what may move at no cost is the null space of the tangent. Tensions, reactions and energies do not change where
-parts float.
+For the tension-only law under dead loads, the tensions of taut lines and their directions are unique. Two equilibria
+then differ by translations of *parts*. A part is connected by lines whose tension is proven to be above 0. A part that
+no support holds along an axis floats along it, as far as its slack lines allow, |d| ≤ L. For other laws or forces, the
+null space of the tangent is open. Tensions, reactions and energies do not change as parts float.
 """
 
 from __future__ import annotations
@@ -19,9 +18,9 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from ..effects.elasticity import strains
 
 SAMPLES = 3
-"""Number of moves at no cost that stand for all of them, at random."""
+"""Number of random moves without stiffness that represent all such moves."""
 OPEN = 1e-3
-"""Component of a move at no cost, over its largest, from which on it counts as open."""
+"""Least component of a move without stiffness, over its largest component, that counts as open."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +30,11 @@ class Floating:
     Attributes
     ----------
     free : ndarray of bool, shape (rows, 3)
-        Components that may move at no cost.
+        True for components that may move without stiffness.
     moves : ndarray, shape (k, rows, 3)
-        Such moves, at random, the largest component of each 1.
+        Random moves of this kind; the largest component of each is 1.
     parts : refweb.statics.floating.Parts, optional
-        What floats as a whole; None where only the tangent is known.
+        Parts that float as a whole; None where only the tangent is known.
     """
 
     free: np.ndarray
@@ -44,7 +43,7 @@ class Floating:
 
     @property
     def rows(self):
-        """Rows of which some component is open."""
+        """Rows with an open component."""
         return np.flatnonzero(self.free.any(axis=1))
 
 
@@ -63,9 +62,9 @@ class Parts:
     pairs : ndarray of int, shape (pairs, 2)
         Rows that a line joins.
     longest : ndarray, shape (pairs,)
-        How far apart the rows of each may be [m]: the natural length, of a taut line its length.
+        Largest distance of the rows of each pair [m]: the natural length, for a taut line its length.
     straight : bool
-        Whether each line is one bar, whose length is the distance of its ends.
+        True if each line is one bar, whose length is the distance of its ends.
     """
 
     of: np.ndarray
@@ -77,9 +76,10 @@ class Parts:
 
     @cached_property
     def reach(self):
-        """Least and largest position that chains of lines leave to each row [m], shape (2, rows, 3).
+        """Least and largest position of each row that chains of lines allow [m], shape (2, rows, 3).
 
-        A row that floats is no farther from one that is held than the lines between them are long: an outer bound.
+        The distance of a floating row from a fixed row is at most the length of the lines between them. This is an
+        outer bound.
         """
         rows = len(self.of)
         limits = np.array([self.position, self.position])
@@ -112,7 +112,7 @@ class Parts:
 
 
 def _least_of_each(graph):
-    """The graph with the shortest of the lines between the same two rows, where a sparse matrix would sum them."""
+    """The graph with the shortest line between each two rows, where a sparse matrix would add their lengths."""
     order = np.lexsort((graph.data, graph.col, graph.row))
     row, col, data = graph.row[order], graph.col[order], graph.data[order]
     first = np.append(True, (np.diff(row) != 0) | (np.diff(col) != 0))
@@ -120,9 +120,9 @@ def _least_of_each(graph):
 
 
 def between_slack_lines(system, equilibrium):
-    """Floating parts of an equilibrium with a duality bound, a `Floating`; None where nothing floats.
+    """The `Floating` parts of an equilibrium with a duality bound; None where no part floats.
 
-    A line is taut where the bound proves it: its tension exceeds its error, at each quadrature point.
+    A line counts as taut where its tension exceeds its proven error at each quadrature point.
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
     tension = net.line_data.ea[:, None] * strains(net, x)
@@ -146,16 +146,16 @@ def between_slack_lines(system, equilibrium):
 
 
 class NullSpace:
-    """Moves that a tangent K leaves at no cost, by the factorization of K + τ G.
+    """Moves without stiffness of a tangent K, by the factorization of K + τ G.
 
-    G is the geometric stiffness of a unit tension in every line, which is definite where the net holds together: in the
-    eigenvectors of K v = λ G v the matrix (K + τ G)⁻¹ τ G is τ/(λ + τ), which is 1 where λ = 0 and nearly 0 where λ is
+    G is the geometric stiffness of a unit tension in every line; it is definite where the net is connected to supports.
+    In the eigenvectors of K v = λ G v, the matrix (K + τ G)⁻¹ τ G is τ/(λ + τ): 1 where λ = 0, and nearly 0 where λ is
     far above τ.
 
     Parameters
     ----------
     factor : refweb.system.factorization.Factor
-        Of K + τ G.
+        Factorization of K + τ G.
     weight : scipy.sparse.csc_array, shape (n, n)
         τ G.
     """
@@ -164,7 +164,7 @@ class NullSpace:
         self._factor, self._weight = factor, weight
 
     def part(self, p):
-        """Part of a displacement of the unknowns that costs nothing, shape (n,); None where the factor breaks down."""
+        """Part of a displacement that has no stiffness, shape (n,); None where the factorization breaks down."""
         for _ in range(2):
             p = self._factor.solve(self._weight @ p)
             if p is None:
@@ -172,7 +172,7 @@ class NullSpace:
         return p
 
     def solve(self, force):
-        """Displacement that a force makes but for moves at no cost, along which it is left out; None as above."""
+        """Displacement under a force, without moves of no stiffness; None where the factorization breaks down."""
         p = self._factor.solve(force)
         for _ in range(2):
             if p is None or (none := self.part(p)) is None:

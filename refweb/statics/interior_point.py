@@ -1,19 +1,20 @@
-"""Primal–dual interior point: equilibria in which many lines go slack, or of very different stiffness.
+"""Primal–dual interior-point method: equilibria in which many lines go slack, or lines differ much in stiffness.
 
-Where a net is slack, Newton's method on the energy meets one group of lines after another that snaps taut under its
-step. The equilibrium of lines that only pull under dead loads is a cone program: with the extension z of a line, its
-vector d = B (X + u) and k = EA/L
+Newton's method on the energy is slow on a slack net, since each step makes another group of lines taut. The equilibrium
+of tension-only lines under dead loads is a cone program. With the extension z of a line, its vector d = B (X + u) and k
+= EA/L it reads
 
     min Σ ½ k z² − f·u,    (L + z, d) in the second-order cone,
 
-whose multipliers are the tension k z and the force on the line. It is followed by Mehrotra's predictor and corrector
-with the scaling of Nesterov and Todd (Andersen, Roos and Terlaky, *Math. Program.* 95 (2003) 249–277,
-doi:10.1007/s10107-002-0349-3), which sees no stiffness: what is eliminated for each line leaves a positive definite
-3 × 3 block, in the pattern of the tangent, and one factorization an iteration. What is eliminated is written in sums of
-one sign, and the change of multipliers by what it is close to, W⁻¹ c: with p = W c in its place it stalls at a gap of
-1e-6, with differences of what is eliminated at 1e-7, and so it ends at 1e-14. Nets of 16 to 64 nodes and of stiffnesses
-1 : 1 to 1 : 1e6 take 20 to 25 factorizations to 1e-7. A path in strains, g for taut and w for slack ones with g w = η²,
-takes 17 where all lines are alike and ends nowhere where stiffnesses are 1 : 1e6.
+and its multipliers are the tension k z and the force on the line. The solver follows the central path by Mehrotra's
+predictor and corrector with the scaling of Nesterov and Todd (Andersen, Roos and Terlaky, *Math. Program.* 95 (2003)
+249–277, doi:10.1007/s10107-002-0349-3). Its convergence hardly depends on the stiffnesses. The extension and the
+multipliers of each line are eliminated. This leaves a positive definite 3 × 3 block in the pattern of the tangent, and
+an iteration takes one factorization. The eliminated terms are written as sums of one sign, and the change of
+multipliers by W⁻¹ c, to which it is close. In this form the iteration ends at a gap of 1e-14; it stalls at 1e-6 with p
+= W c instead, and at 1e-7 with differences of eliminated terms. Nets of 16 to 64 nodes with stiffnesses from 1 : 1 to 1
+: 1e6 take 20 to 25 factorizations to 1e-7. A central path in strains, g of taut and w of slack lines with g w = η²,
+takes 17 where all lines are alike. It does not converge where stiffnesses are 1 : 1e6.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ from ..system.factorization import Factor
 from .equilibrium import NotFound, add_spent
 
 CENTRED = 0.99
-"""Share of the way to the surface of the cone that a step takes."""
+"""Largest step over the step to the surface of the cone."""
 FAR = 1e3
-"""Times the best that was reached at which an iteration has lost its way."""
+"""Residual over the best residual so far at which the iteration ends as diverged."""
 SHORT = 0.3
-"""Share of a step below which another is tried."""
+"""Length of a step below which a step without corrector is tried."""
 NEAREST = 1e-100
-"""Distance from the surface, of vectors in m or N, at which rounding has brought one there."""
+"""Least distance of vectors [m] or [N] from the surface of the cone; below it they lie on the surface by rounding."""
 
 
 NEARER = 1e-7, 1e-11, 1e-16
@@ -38,12 +39,12 @@ NEARER = 1e-7, 1e-11, 1e-16
 
 
 def by_interior_point(newton, t, x):
-    """Equilibrium from the central path; the nearer its end, the better Newton's start.
+    """Equilibrium by Newton's method from points of the central path, each nearer to its end than the one before.
 
     Parameters
     ----------
     newton : refweb.statics.newton.Newton
-        Of a system under dead loads.
+        Newton's method of a system under dead loads.
     t : float
         Load step.
     x : ndarray, shape (rows, 3)
@@ -52,12 +53,12 @@ def by_interior_point(newton, t, x):
     Returns
     -------
     refweb.statics.equilibrium.Equilibrium
-        With all that was spent in its stats.
+        Equilibrium with the counts of all iterations in its stats.
 
     Raises
     ------
     refweb.statics.equilibrium.NotFound
-        Where Newton's method does not end from the nearest point either; all that was spent is in its stats.
+        If Newton's method does not converge from the nearest point either; its stats have the counts of all iterations.
     """
     inner, spent = InteriorPoint(newton.system, t, x, newton.anchors), dict(nsteps=0, nfev=0, njev=0, nlu=0)
     nearer = NEARER if inner.loaded else NEARER[-1:]  # without load all that is left is too much
@@ -78,7 +79,7 @@ def by_interior_point(newton, t, x):
 
 
 class InteriorPoint:
-    """Load step of a net, followed along the central path; the lines of it are the bars of `Net.bars`.
+    """Central path of a net at a load step; its lines are the bars of `Net.bars`.
 
     Parameters
     ----------
@@ -89,12 +90,12 @@ class InteriorPoint:
     x : ndarray, shape (rows, 3)
         Start [m], supports in place.
     anchors : ndarray of int
-        Places of the pattern's diagonal to hold, see `refweb.statics.newton.Newton`.
+        Indices of diagonal entries that are anchored, see `refweb.statics.newton.Newton`.
 
     Attributes
     ----------
     loaded : bool
-        Whether there is any load on what is free.
+        True if a load acts on a free row.
     nlu : int
         Number of factorizations so far.
     """
@@ -114,7 +115,7 @@ class InteriorPoint:
         self._begin()
 
     def _begin(self):
-        """Inside of the cones: as much tension as there is load, or as what is taut already has."""
+        """Set a start inside of the cones: each tension is that of the taut line, at least the largest load."""
         line = self._lines()
         reach = np.linalg.norm(line, axis=1)
         taut = self._stiffness * np.maximum(reach - self._natural, 0.0)
@@ -128,9 +129,10 @@ class InteriorPoint:
         return self._bars @ (self._reference + self.x)
 
     def follow(self, tolerance, limit=80):
-        """Go on until forces, lengths and what the cones leave open are below ``tolerance``; return the displacement.
+        """Iterate until the residuals and the gap are below ``tolerance``; return the displacement.
 
-        ``limit`` bounds the iterations of this call; where they run out, or lead away, it ends at the best so far.
+        ``limit`` bounds the iterations of this call. The best displacement so far is returned where they run out or
+        diverge.
         """
         best, nearest = np.inf, self._arrange()
         with np.errstate(all="ignore"):  # where rounding has come to the surface, steps may lead anywhere
@@ -147,13 +149,13 @@ class InteriorPoint:
         return tuple(value.copy() for value in (self.x, self._z, self._s, self._y))
 
     def _open(self):
-        """Residuals of the equations: of force at rows [N], of tension of bars [N], of the vectors in cones [m]."""
+        """Residuals of the equations: force at rows [N], tension of bars [N], cone vectors [m]."""
         force = self._outer + self._bars.T @ self._y[:, 1:]
         pull = self._y[:, 0] - self._stiffness * self._z
         return force, pull, np.column_stack([self._natural + self._z, self._lines()]) - self._s
 
     def _worst(self):
-        """Largest of what is left of the equations and of the gap, over loads, lengths and energies [1]."""
+        """Largest residual, or the gap, over loads, lengths and energies [1]."""
         force, pull, apart = self._open()
         scale = max(self._load, self._y[:, 0].max())
         gap = (self._s * self._y).sum()
@@ -195,7 +197,7 @@ class InteriorPoint:
         return length > 1e-6
 
     def _factorize(self, blocks):
-        """Factorize what is left for displacements when extensions are eliminated."""
+        """Factorize the matrix of displacements that remains when extensions are eliminated."""
         values = self.system.assemble_lines(self._by_cell(blocks))
         stiffest = values[self.system.pattern.diagonal].max(initial=0.0)
         values[self.anchors] += 1e-10 * stiffest
@@ -229,10 +231,10 @@ class InteriorPoint:
 
 
 class _Eliminated:
-    """Terms of W⁻² = a (2 ŵ ŵᵀ − J), ŵ = (w₀, −w), of a line when its extension is eliminated, in sums of one sign.
+    """Terms of W⁻² = a (2 ŵ ŵᵀ − J), ŵ = (w₀, −w), of a line with eliminated extension, in sums of one sign.
 
-    With k of the line, the extension's pivot k − a + 2 a w₀²; across the line the block is a, along it, unit t = w/|w|,
-    a (k (2 w₀² − 1) + a)/(k + a (2 w₀² − 1)).
+    With k of the line, the pivot of the extension is k − a + 2 a w₀². The block is a across the line, and a (k (2 w₀² −
+    1) + a)/(k + a (2 w₀² − 1)) along it, unit vector t = w/|w|.
     """
 
     def __init__(self, scaling, stiffness):
@@ -256,7 +258,7 @@ class _Eliminated:
         return along + self._across[:, None] * vectors
 
     def lifted(self, tension):
-        """Force on each line that its tension makes by way of the extension."""
+        """Force on each line that its tension causes through the eliminated extension."""
         return (tension * self._lift / self._pivot)[:, None] * self._rest
 
     def extension(self, tension, turn):
@@ -277,7 +279,7 @@ class _Scaling:
         self.point = self.multiply(y)
 
     def multiply(self, vectors, sign=1.0):
-        """W v, or with a sign of −1 the same of the mirrored w."""
+        """W v; with a sign of −1 the same for the mirrored w, which is W⁻¹ v."""
         first, rest = self.w[:, 0], sign * self.w[:, 1:]
         along = (rest * vectors[:, 1:]).sum(axis=1)
         head = first * vectors[:, 0] + along

@@ -1,14 +1,14 @@
 """Range of a part that floats: a small convex problem.
 
-The equilibria of a net of tension-only lines under dead loads are the translations t of its floating parts that leave
-no slack line longer than it is, c = ½ (L² − |d + t_a − t_b|²) ≥ 0. The largest t of one part along an axis e satisfies,
-with multipliers λ ≥ 0 and A t the change of a line's vector,
+The equilibria of a net of tension-only lines under dead loads are translations t of its floating parts. No slack line
+may become longer than its natural length, c = ½ (L² − |d + t_a − t_b|²) ≥ 0. With multipliers λ ≥ 0 and the change A t
+of a line's vector, the largest t of one part along an axis e satisfies
 
     Σ Aᵀ (λ d) = e,    λ c = 0,
 
-which a primal–dual interior point follows through λ c = μ. Its matrix keeps the multipliers as unknowns, so that lines
-that are as long as they can be do no harm. By weak duality e·t + Σ λ c is never below the largest where the first
-equation holds: that is what is given.
+which a primal–dual interior-point method solves through λ c = μ. Its matrix keeps the multipliers as unknowns, so that
+lines at their limit do no harm. By weak duality e·t + Σ λ c is never below the largest t where the first equation
+holds. This sum is returned.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 CLOSE, MOST = 1e-10, 200
-"""Largest λ c and unbalanced λ d of the end, over what they are measured against; most iterations."""
+"""Relative tolerance of λ c and of the balance of λ d at the end; largest number of iterations."""
 SHARE = 0.1
 """μ over the mean of λ c before a step."""
 
@@ -30,9 +30,9 @@ class Interval:
     Parameters
     ----------
     parts : refweb.statics.floating.Parts
-        Of the equilibrium.
+        Floating parts of the equilibrium.
     part, axis : int
-        Which, and along which axis.
+        Number of the part, and axis.
     """
 
     def __init__(self, parts, part, axis):
@@ -70,7 +70,7 @@ class Interval:
         self._turns = coo_array((np.concatenate(signs), (np.concatenate(rows), np.concatenate(columns))), shape).tocsc()
 
     def limits(self, now):
-        """Least and largest position [m] of what is ``now`` at a position; None where rounding leaves them open."""
+        """Least and largest position [m] of a row that is at ``now``; None if rounding hides them."""
         if not self.bounded:
             return -np.inf, np.inf
         ends = now - self._farthest(-1.0), now + self._farthest(1.0)
@@ -118,6 +118,6 @@ def _dot(a, b):
 
 
 def _longest_step(value, change):
-    """Step that leaves a hundredth of what falls the most, at most 1."""
+    """Largest step, at most 1, that leaves a hundredth of the value that falls most."""
     down = change < 0.0
     return min(1.0, 0.99 * (value[down] / -change[down]).min(initial=np.inf))

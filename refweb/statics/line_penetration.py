@@ -1,7 +1,8 @@
-"""Lines that lie deep in lines at an equilibrium, or meet on the way from one to the next.
+"""Penetration check of statics: lines that lie deep in lines, or meet between two equilibria.
 
-Between two equilibria there is no motion to look at. Two lines that meet on their straight ways from the one to the
-other have passed, or have slid around each other: which of the two, no load step says, and smaller ones may.
+Statics has no motion between two equilibria, so each point is taken to move in a straight line. Two lines that meet in
+this way have passed through each other or have slid around each other. The load steps do not tell which; smaller ones
+may.
 """
 
 from __future__ import annotations
@@ -19,16 +20,16 @@ class LinePassage:
     Parameters
     ----------
     system : refweb.system.system.System
-        With a term of lines against lines.
+        System with a force term of lines against lines.
     chosen : bool
-        Whether the stiffness is refweb's choice.
+        True if refweb chose the stiffness.
 
     Attributes
     ----------
     deepest : refweb.effects.self_contact.penetration.Passage
         The deepest overlap.
     why : str
-        Why it is not certain that nothing has passed.
+        Reason why it is not certain that no line has passed through another.
     """
 
     def __init__(self, system, chosen):
@@ -37,14 +38,14 @@ class LinePassage:
         self.deepest, self.why = Passage(system, UNFOLLOWED, chosen), UNFOLLOWED
 
     def record(self, state):
-        """Note an equilibrium, a `refweb.results.state.State`.
+        """Take the next equilibrium, a `refweb.results.state.State`; check its overlaps and the path to it.
 
         Raises
         ------
         TooSoft
-            For an overlap above the radius, where refweb chose the stiffness.
+            For an overlap above the limit, where refweb chose the stiffness.
         SolverError
-            For one, where the stiffness was given.
+            For an overlap above the limit, where the scene gives the stiffness.
         """
         term, still = self._term, np.zeros((self._system.rows, 3))
         depth = np.zeros((len(term.cells), 1))

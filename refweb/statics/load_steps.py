@@ -1,8 +1,9 @@
-"""Equilibria at load steps, each from the one before, by Newton's method and by ways around where it finds none.
+"""Equilibria at load steps, each from the one before, by Newton's method, else by other methods.
 
-Where all loads are dead the interior point of `refweb.statics.interior_point` leads near an equilibrium. Where Newton's
-method does not end from there either, a series of softer nets does for the tension-only law, and many small steps where
-lines push. Among bars, which push without limit, Newton's method is alone.
+Where Newton's method fails and all loads are dead, `refweb.statics.interior_point` leads near an equilibrium. If
+Newton's method does not converge from there either, a series of softer nets follows for the tension-only law without
+rotation. Otherwise Newton's method gets many more iterations. With bars, or with loads that are not dead, only Newton's
+method is used.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, where_nothing_t
 from .newton import Newton
 
 MOST = 400
-"""Largest number of factorizations from the last state, where no interior point can take over."""
+"""Largest number of factorizations from the last state, where the interior-point method cannot be used."""
 PATIENCE = 3000
-"""Largest number of factorizations of the smooth law where the central path has led to nothing."""
+"""Largest number of factorizations of the smooth law after the interior-point method has failed."""
 SOFTEST = 1e-2
-"""Load over EA of the first net of those that grow stiffer."""
+"""Load over EA of the first net in a series of nets of growing stiffness."""
 
 
 def solve(system, load_steps, progress=None):
@@ -41,7 +42,7 @@ def solve(system, load_steps, progress=None):
     Raises
     ------
     SolverError
-        Where there is no equilibrium, or none is found; the states before have been yielded.
+        If there is no equilibrium, or none is found; the load steps before have been yielded.
     """
     full_system, system = system, at_rest(system)
     newton, states = Newton(system, progress, load_steps[0]), []
@@ -70,7 +71,7 @@ def solve(system, load_steps, progress=None):
 
 
 def _start(system, t, states):
-    """Displacement that a load step starts from: as built, or ahead of the last equilibria where no line pushes."""
+    """Start of a load step: zero, the last displacement, or an extrapolation where no line pushes."""
     if not states:
         return np.zeros((system.rows, 3))
     if not system.dead or any((state.tension < 0.0).any() for state in states):
@@ -81,7 +82,7 @@ def _start(system, t, states):
 
 
 def _equilibrium(newton, t, x, warm):
-    """Equilibrium from the last state, or by a way around."""
+    """Equilibrium from the last state, or by another method."""
     laws, spent = newton.system.net.laws, dict(nsteps=0, nfev=0, njev=0, nlu=0)
     path = newton.system.dead and bool((laws < LINEAR).all())
     pulling = bool((laws == TENSION_ONLY).all())
@@ -113,7 +114,7 @@ def _equilibrium(newton, t, x, warm):
 
 
 def _by_stiffening(newton, t, x, spent):
-    """Equilibrium from those of softer nets, in which no line snaps taut; slack parts turn far under tiny loads."""
+    """Equilibrium from those of softer nets, in which no line snaps taut; slack parts move far under tiny loads."""
     system, load = newton.system, np.abs(newton.system.outer_force(t)).max()
     softer = SOFTEST * newton.axial / load if load > 0.0 else 1.0
     while softer > 1.0:
@@ -126,7 +127,7 @@ def _by_stiffening(newton, t, x, spent):
 
 
 def _by_patience(newton, t, x):
-    """Equilibrium of the smooth law by many small steps; where none is found, the message says how slack lines push."""
+    """Equilibrium of the smooth law by many iterations; an error says with which force slack lines push."""
     try:
         return newton.solve(t, x, limit=PATIENCE)
     except NotFound as error:

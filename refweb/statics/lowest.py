@@ -1,16 +1,15 @@
-"""Check if an equilibrium has the lowest energy; find the lower of two where that is not proven.
+"""Check if an equilibrium has the lowest energy; search a lower one where that is not proven.
 
-Of a law whose tension rises with the strain ε and is 0 at ε = 0, the energy W(ε) is at least W(max(ε, 0)), which is
-convex in the positions. Under dead loads a state in which no line pushes is the lowest of that convex potential, and so
-of the potential itself: proven, at no cost. Where lines push, another start is tried: the equilibrium of the same net
-without smoothing, whose energy is convex, and from there Newton's method to the law's own. Forces s of lines that
-balance the loads, as those of that equilibrium do, bound what a state x may lie above the lowest, in the way of
-`refweb.statics.duality_bound`, by
+Let the tension of a law rise with the strain ε and be 0 at ε = 0. Then its energy W(ε) is at least W(max(ε, 0)), which
+is convex in the positions. Under dead loads, an equilibrium in which no line pushes minimises that convex potential.
+Hence it also minimises the potential of the law: this is proven without computation. Where lines push, Newton's method
+is tried from another start: the equilibrium of the same net without smoothing, whose energy is convex. Its line forces
+s balance the loads. As in `refweb.statics.duality_bound`, they bound the energy of a state x above the lowest by
 
     Σ L (W(ε) + |s| (1 + ε_s) − W(ε_s)) − s·d,
 
-a sum of terms that are never negative, with T(ε_s) = |s| and the vector d of a line: what the lines that push hold, and
-next to nothing besides.
+a sum of terms that are never negative, with T(ε_s) = |s| and the vector d of a line. Nearly all of this bound is the
+energy of the lines that push.
 """
 
 from __future__ import annotations
@@ -23,26 +22,26 @@ from ..net.tension_laws import LINEAR, Law
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent
 
 NOTHING = 1e-9
-"""Energy over that of the lines and of the loads which counts as none."""
+"""Energy, over that of lines and loads, up to which it counts as zero."""
 SURE = 1e-3
-"""Energy that may be missing, over that of the lines and of the loads, from which on it is told."""
+"""Bound of the energy above the lowest, over that of lines and loads, from which a finding reports it."""
 
 
 def lowest(newton, state):
-    """The equilibrium that is lowest as far as is known, with ``above_lowest`` [J] and ``starts`` in its stats.
+    """The lowest known equilibrium, with ``above_lowest`` [J] and ``starts`` in its stats.
 
     Parameters
     ----------
     newton : refweb.statics.newton.Newton
-        Of a system under dead loads.
+        Newton's method of a system under dead loads.
     state : refweb.statics.equilibrium.Equilibrium
-        What it has found.
+        The equilibrium that it has found.
 
     Returns
     -------
     refweb.statics.equilibrium.Equilibrium
-        Whose stats say how far it may lie above the lowest, 0 where it is proven to be that and None where nothing
-        bounds it, and the energies [J] of the equilibria from two starts, where a second one was tried.
+        Its ``above_lowest`` bounds the energy above the lowest: 0 where it is proven to be the lowest, None without a
+        bound. Its ``starts`` are the energies [J] of the equilibria from two starts, where a second start was tried.
     """
     system = newton.system
     pushes = bool((state.tension < 0.0).any())
@@ -73,7 +72,7 @@ def lowest(newton, state):
 
 
 def _without_smoothing(newton, state):
-    """The equilibrium of the same net at η = 0, by the interior point where Newton's method does not end."""
+    """The equilibrium of the same net at η = 0, by Newton's method, else by the interior-point method."""
     numbers = newton.system.net.line_data.copy()
     numbers.smoothing[:] = numbers.g0[:] = 0.0
     numbers.r0[:] = np.abs(numbers.slackness)

@@ -1,24 +1,25 @@
 """Static equilibrium by Newton's method on the potential energy, from any start.
 
-The tangent of a flat tensionless net is singular, and load stepping or a diagonal shift starts from nothing. Here the
-Newton matrix is K + τ G, where G is the geometric stiffness of a *unit tension in every line*: a fictitious prestress τ
-that leaves as the iteration converges. It resists relative motion, not motion, so that the first step already has the
-shape of a loaded membrane. On the square web of 1677 nodes under 1 N the shift τG takes 7 or 8 factorizations from
-flat for every smoothing from 1e-2 to 0, where a shift of the diagonal takes 15 or 16. A line search on the energy makes
-every step a descent. Lines under compression make K indefinite: K itself is used where its shifted pivots are positive,
-its positive semidefinite part where they are not. In a frame that turns τ grows instead until they are: there the part
-that is left out would be most of K.
+The tangent of a flat net without tension is singular. Here the Newton matrix is K + τ G, where G is the geometric
+stiffness of a *unit tension in every line*. The fictitious prestress τ vanishes as the iteration converges. G resists
+relative motion alone, so that the first step already has the shape of a loaded membrane. On the square web of 1677
+nodes under 1 N, the shift τG takes 7 or 8 factorizations from flat for every smoothing from 1e-2 to 0. A shift of the
+diagonal takes 15 or 16. A line search on the energy makes every step a descent. Lines under compression make K
+indefinite. If the shifted pivots of K are not all positive, its positive semidefinite part is used instead. In a
+rotating frame τ grows until they are positive, because the positive semidefinite part would omit most of K.
 
-A step turns lines, which stretches them by the square of the angle, and lines are stiff: behind a step their tensions
-are mostly what that has made of them, and a tangent with these is none of the equilibrium. So where all lines pull
-alone, the geometric stiffness takes the tensions that the step itself has led to expect, T + k δl (Magisano, Leonetti
-and Garcea, Comput. Methods Appl. Mech. Eng. 313, 2017, doi:10.1016/j.cma.2016.10.023). Forces and energies are those
-at hand, so that equilibria are the same. A hexagon web of 40 000 cells from flat takes 14 steps so, 45 without.
+A step turns lines, which stretches them by the square of the angle. Lines are stiff, so that this stretch dominates
+their tensions after the step, and a tangent with these tensions is far from that of the equilibrium. Therefore, if all
+lines are tension-only, the geometric stiffness uses the tensions to first order in the step, T + k δl (Magisano,
+Leonetti and Garcea, Comput. Methods Appl. Mech. Eng. 313, 2017, doi:10.1016/j.cma.2016.10.023). Forces and energies use
+the actual tensions, so that the equilibria are the same. A hexagon web of 40 000 cells takes 14 steps from flat in this
+way, and 45 steps without.
 
-A bar that is a little slack has no stiffness, so that a step may stretch it by hundreds of times what it is slack by,
-and is cut to a few hundredths. From flat slack bars are lent what a smooth law has, less as the residual falls: the
-first load step of triangle webs takes 8, 10 and 11 factorizations at 30 150, 120 300 and 270 450 unknowns where it took
-11, 14 and 15. Squares and hexagons, with hardly any slack bars, take as many as without.
+A bar that is slightly slack has no stiffness. A step may stretch it by hundreds of times its slack, and the line search
+then cuts the step to a few hundredths. Therefore, in a start from flat, slack bars get the stiffness of a smooth law,
+which decreases with the residual. The first load step of triangle webs with 30 150, 120 300 and 270 450 unknowns takes
+8, 10 and 11 factorizations with this stiffness, and 11, 14 and 15 without. Webs of squares and hexagons have hardly any
+slack bars and take equally many.
 
 Free bodies turn by rotation vectors, see `refweb.system.resting_bodies`. A step turns none by more than `MOST_TURN` of
 `refweb.system.system`, in contact moves none by more than half its thickness, and τ does not fall where it is cut so;
@@ -47,22 +48,23 @@ from .equilibrium import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supporte
 from .floating import NullSpace
 
 SMALL = 1000
-"""Number of unknowns below which every step has a factorization of its own, which costs next to nothing."""
+"""Number of unknowns below which every step has a new factorization, since it costs little."""
 NEAR = 0.1
-"""Residual at which a tangent is near enough to that of the equilibrium to be used again."""
+"""Residual up to which the factorization of a tangent may be used again in the next steps."""
 SETTLED = 1e-3
-"""Residual from which on tensions are those at hand and τ goes with the residual: last steps are to square it."""
+"""Residual below which tangents use the actual tensions and τ is proportional to the residual: the last steps then
+converge quadratically."""
 LENT, FADES = 0.1, 3.0
-"""η by which slack bars are lent stiffness from flat, over the mean strain of taut ones, and the factor on the residual
-that it goes with where that is below 1."""
+"""η of the stiffness of slack bars in a start from flat, over the mean strain of taut bars. It decreases with the
+second factor times the residual, where this product is below 1."""
 CLOSE, END = 1e-4, 1e-14
-"""The least that conjugate gradients leave of a step, and the residual that the last one aims at."""
+"""Least relative tolerance of conjugate gradients in a step; residual that the last step aims at."""
 ROUGH = 0.03
-"""What they leave of deviations, which are estimates."""
+"""Relative tolerance of conjugate gradients for deviations, which are estimates."""
 
 
 class Ahead(NamedTuple):
-    """Tension of every bar that a tangent is made with [N], and the share by which slack ones are lent stiffness."""
+    """Tension of every bar in a tangent [N], and η of the stiffness of slack bars over the mean strain of taut bars."""
 
     tension: np.ndarray
     lent: float
@@ -86,7 +88,7 @@ class Newton:
     progress : callable, optional
         Called with a line of text after each iteration.
     first : float, optional
-        Load step whose natural lengths prestress and scales are those of; by default as built.
+        Load step whose natural lengths set prestress and scales; by default the natural lengths as built.
 
     Attributes
     ----------
@@ -97,7 +99,7 @@ class Newton:
     grows : bool
         Whether τ grows until the tangent is definite: where centrifugal forces act, and where bodies are free.
     anchors : ndarray of int
-        Places of the pattern's diagonal that hold parts without support, whose loads balance.
+        Indices of diagonal entries that anchor parts without support, on which the loads balance.
     scale : float
         Largest force of the equilibria so far [N].
     """
@@ -132,8 +134,8 @@ class Newton:
         x : ndarray, shape (rows, 3)
             Start [m].
         warm : bool
-            Whether x is near an equilibrium, as after a load step: the first prestress τ is then 1e-4 of the one that
-            (load/EA)^(2/3) EA suggests, the tension scale of a flat net.
+            True if x is near an equilibrium, as after a load step. The first prestress τ is then 1e-4 of the tension
+            scale of a flat net, (load/EA)^(2/3) EA.
         limit : int
             Largest number of factorizations.
 
@@ -221,13 +223,13 @@ class Newton:
         return values
 
     def _factorize(self, values, shift):
-        """Factorize, and hold what can be used again, by its shift."""
+        """Factorize; the factorization can be used again where it has a shift."""
         self.factor.update(values, None if self.system.pattern.size < SMALL else shift)
 
     def _tension_ahead(self, net, x, y, p, before):
-        """The `Ahead` of the bars where a part of the step p has led from x to y, to first order; none is slack < 0.
+        """The `Ahead` of the bars after a part of the step p from x to y, to first order; no tension is negative.
 
-        ``before`` is the `Ahead` that the step was made with, None where it was with those at x.
+        ``before`` is the `Ahead` of the tangent of the step, None where that used the tensions at x.
         """
         bars, all_rows = Bars(net, x), self.system.rows_of(p)
         before = bars.tension if before is None else before.tension
@@ -252,7 +254,7 @@ class Newton:
         raise NotFound(f"singular tangent at step {t:g}: no shift up to {shift:.3g} N makes it definite", stats)
 
     def _step_by_factor_at_hand(self, t, iterate, r, shift, error, stats, ahead):
-        """The same step by a factorization of another tangent; None where it takes long or leads up."""
+        """The same step by the factorization of an earlier tangent; None if that takes long or leads uphill."""
         if not self._can_use_again(iterate.tension):
             return None
         stats["njev"] += 1
@@ -265,7 +267,7 @@ class Newton:
         return self.factor.shift is not None and not (self.follows or self.grows or (tension < 0.0).any())
 
     def _by_factor_at_hand(self, values, b, tolerance):
-        """Solutions y of the matrix of ``values``, shape (n,) or (n, k), as conjugate gradients find them."""
+        """Solutions with the matrix of ``values``, shape (n,) or (n, k), by conjugate gradients."""
         times = self.system.pattern.matrix(values).__matmul__
         return conjugate_gradients.solve(times, self.factor.precondition, b, tolerance, self.factor.solutions)
 
@@ -276,7 +278,7 @@ class Newton:
         return r @ p > 0.0 and not (self.grows and self.factor.negative_pivots() > self.drifting)
 
     def _polished(self, t, iterate, shift, error, scale, stats):
-        """Take one more step with the factorization at hand, kept where it lowers the residual."""
+        """Take one more step with the last factorization; keep it where it lowers the residual."""
         r = iterate.force.ravel()[self.system.free]
         if self._can_use_again(iterate.tension):
             p = self._by_factor_at_hand(
@@ -305,7 +307,7 @@ class Newton:
         return 1e-12 * self.axial
 
     def factorize_at(self, state):
-        """Factorize K at an equilibrium, but for what stiffness counts as none."""
+        """Factorize K at an equilibrium, plus a negligible stiffness."""
         self._factorize(self._matrix(state.step, state.x, self._tiny, False), self._tiny)
         state.stats["nlu"] += 1
 
@@ -319,10 +321,11 @@ class Newton:
         return -1
 
     def deviations(self, state):
-        """`Equilibrium.deviations`: what the tangent makes of the residual and of rounding, of either sign at random.
+        """`Equilibrium.deviations`: displacements under the residual and under rounding errors of random sign.
 
         Rounding of a line's ends and of its tension leaves a force of machine precision times T + k |x| at its nodes.
-        Moves at no cost are left out; where no duality bound tells what floats, the null space of the tangent does.
+        Moves without stiffness are left out; they follow from the duality bound or, without one, from the null space of
+        the tangent.
         """
         system, asked = self.system, self.follows or state.stats.get("smallest_pivot") is not None
         if not asked and (by_factor := self._deviations_by_factor_at_hand(state)) is not None:
@@ -341,7 +344,7 @@ class Newton:
         return None if any(p is None for p in deviations) else np.array([system.rows_of(p) for p in deviations])
 
     def _deviations_by_factor_at_hand(self, state):
-        """The same where nothing floats, as its duality bound proves; None where that does not say or takes long."""
+        """The same with the last factorization, if the duality bound proves that no part floats; else None."""
         if state.duality_bound is None or state.floating is not None or not self._can_use_again(state.tension):
             return None
         forces = np.column_stack(self._disturbing(state))
@@ -353,7 +356,7 @@ class Newton:
         return deviations
 
     def _disturbing(self, state):
-        """Forces on the unknowns [N]: what is left of the residual, and what rounding makes, of random sign, thrice."""
+        """Forces on the unknowns [N]: the residual, and three times the rounding errors with random signs."""
         system, net = self.system, self.system.net
         stiffness = net.axial / system.natural_length(state.step)
         moved = np.linalg.norm(state.x, axis=1)[net.cells].max(axis=1)

@@ -1,8 +1,9 @@
-"""Start of the next load step: the last equilibria, extrapolated.
+"""Start of the next load step: extrapolation of the last equilibria.
 
-The displacement of a flat web under a load F goes with F^(1/3), as tension goes with its square and the load with both;
-that of a prestressed web with F. Both are tried, from the last two equilibria and, where the loads are 0 at load step
-0, from the last one alone. What has the least energy is taken, if need be the last equilibrium as it is.
+The displacement of a flat web under a load F is proportional to F^(1/3): its tension grows with the square of the
+displacement, and the load with the product of both. The displacement of a prestressed web is proportional to F. Both
+powers are tried with the last two equilibria and, where the loads are 0 at load step 0, with the last one alone. The
+candidate of least energy is taken; the last equilibrium itself is one of them.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 POWERS = (1.0, 1.0 / 3.0)
-"""Of the load step, with which displacements may go."""
+"""Powers of the load step to which displacements may be proportional."""
 
 
 def predicted(system, t, states):
@@ -19,11 +20,11 @@ def predicted(system, t, states):
     Parameters
     ----------
     system : refweb.system.system.System
-        Under dead loads, so that the least energy is nearest.
+        System under dead loads, so that the candidate of least energy is the best.
     t : float
         The load step.
     states : list of refweb.statics.equilibrium.Equilibrium
-        Those before, the last one last.
+        Equilibria of the load steps before, in order.
     """
     last = states[-1]
     start, lowest = last.x, _energy(system, t, last.x)
@@ -41,7 +42,7 @@ def predicted(system, t, states):
 
 
 def _energy(system, t, x):
-    """Energy with what moves as prescribed at load step t [J]."""
+    """Energy with prescribed motions at load step t [J]."""
     x = x.copy()
     system.drive(t, x)
     return system.energy(t, x)

@@ -1,4 +1,4 @@
-"""Remarks on load steps: each kind of remark once, with the load steps that it is made at."""
+"""Findings of load steps: each kind once, with the load steps at which it was found."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..results.strength import strength_remark
 
 
 class Remarks:
-    """Remarks of load steps, by kind."""
+    """Findings of load steps, by kind."""
 
     def __init__(self):
         self._made, self._steps = {}, 0
@@ -23,14 +23,14 @@ class Remarks:
             self._made.setdefault(finding.code, []).append((step, finding))
 
     def renew(self, step, code, findings):
-        """Take the findings of one code at a load step anew."""
+        """Replace the findings of one code at a load step."""
         made = [entry for entry in self._made.pop(code, []) if entry[0] != step]
         made += [(step, finding) for finding in findings]
         if made:
             self._made[code] = made
 
     def findings(self):
-        """Each code as it was last found, with its load steps unless it was found at all of them."""
+        """The last finding of each code, with its load steps unless it was found at all of them."""
         for made in self._made.values():
             steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
             at = f" (load step {steps})" if len(made) < self._steps else ""
@@ -157,11 +157,10 @@ def _bars_push(state):
 
 
 def collapse_remark(state):
-    """A warning where lines that do not push have let a net collapse.
+    """Find a net that has collapsed because its lines do not push.
 
-    It has where a node has moved by more than the size of the web, the diagonal of the box around it, beyond what
-    [[motion]] moves, while its lines are strained by less than that: it hangs at a distance of its own size, and holds
-    no shape that it was given.
+    A net has collapsed if a node has moved farther than the size of the web, beyond the displacements of [[motion]],
+    while all strains are below 1. The size is the diagonal of the box around the web.
     """
     system, net = state.system, state.system.net
     if (net.laws == LINEAR).all() or net.forming.any():

@@ -1,8 +1,8 @@
-"""Line search for forces without a potential: a step goes as far as it makes the next step shorter.
+"""Line search for forces without a potential: a step is cut until it makes the next step shorter.
 
-Loads that turn with the net have no energy to search along. A step p = J⁻¹r, J the tangent with its prestress, is taken
-as long as |J⁻¹r(x + ap)| < |p|, the natural monotonicity test [1]_, a residual in units of displacement that neither
-the scale of forces nor that of stiffnesses changes.
+Follower loads have no energy that a line search could lower. A part a of the step p = J⁻¹r, with the tangent J and its
+prestress, is taken if |J⁻¹r(x + ap)| < |p|. This is the natural monotonicity test [1]_: a residual in units of
+displacement, which depends neither on the scale of forces nor on that of stiffnesses.
 
 References
 ----------
@@ -20,9 +20,9 @@ class ResidualSearch:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        System of the iteration.
     factor : refweb.system.factorization.Lu
-        That of the tangent that each step comes from.
+        Factorization of the tangent of each step.
     t : float
         Load step.
     """

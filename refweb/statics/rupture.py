@@ -1,7 +1,7 @@
-"""Statics ends where the first line breaks, and says at which load step that is.
+"""Refusal of equilibria with a broken line, with the load step of the first break.
 
-What comes behind a break depends on how the web moves then; that is dynamics. The load step is found by Brent's method
-on equilibria between the last load step at which nothing breaks and the first at which something does.
+The state after a break depends on the motion of the web; that is dynamics. Brent's method finds the load step of the
+break. It searches equilibria between the last load step without a break and the first with one.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import numpy as np
 from ..errors import SolverError
 
 FINE = 1e-6
-"""Error of the load step over that at which the break was seen."""
+"""Error of the load step of a break, over the load step at which it was found."""
 TRIALS = 30
-"""Largest number of equilibria that are looked for to find it."""
+"""Largest number of equilibria in the search for a break."""
 
 
 def shares(system, equilibrium):
@@ -27,7 +27,7 @@ def refuse_break(system, solve, equilibrium, before):
     Parameters
     ----------
     system : refweb.system.system.System
-        With a `refweb.effects.base.BreakLimits`.
+        System with a `refweb.effects.base.BreakLimits`.
     solve : callable
         The method of statics, see `refweb.registry.STATICS`.
     equilibrium : refweb.statics.equilibrium.Equilibrium
@@ -60,7 +60,7 @@ def refuse_break(system, solve, equilibrium, before):
 
 
 def _first(system, solve, equilibrium, before):
-    """(Load step, element) of the first break, as far as equilibria before it are found."""
+    """(Load step, element) of the first break, or those of ``equilibrium`` if none before it is found."""
     known = [equilibrium]
 
     def over(step):

@@ -26,9 +26,9 @@ class Simulation:
     Parameters
     ----------
     scene : refweb.Scene
-        What is solved.
+        The scene that is solved.
     system : refweb.system.system.System
-        That of the scene.
+        System of the scene.
     solution : refweb.Solution
         Its ``steps``, ``state``, ``solver``, ``utilisation`` and, without a folder, ``frames`` grow as load steps are
         solved.
@@ -36,9 +36,9 @@ class Simulation:
     Attributes
     ----------
     columns : list of str
-        Names of what stands in a history row.
+        Names of the columns of the history.
     rows : list of list of float
-        The history so far.
+        History rows so far.
     """
 
     def __init__(self, scene, system, solution):
@@ -54,15 +54,15 @@ class Simulation:
         self.columns += [f"{name} [J]" for name in static_energies(system)]
 
     price = None
-    """CPU time of errors that are to fall: those of statics are found, not chosen."""
+    """Expected CPU time of smaller errors: None, since errors of statics are found, not chosen."""
 
     @property
     def done(self):
-        """Text that says how far the run came."""
+        """Text of the number of load steps that were solved."""
         return f"{len(self.rows)} load steps"
 
     def follow(self, folder, tell):
-        """Solve; write rows and frames to ``folder``, where there is one, as they come."""
+        """Solve all load steps; write each row and frame to ``folder`` at once, if there is a folder."""
         scene, solution, steps = self.scene, self.solution, self.scene.solve.load_steps
         solve, smoothing = load(STATICS[scene.solve.method]), self._smoothing()
         solution.solver = {**SOLVER, "method": scene.solve.method, **self._totals}
@@ -90,7 +90,7 @@ class Simulation:
             yield Finding("lines-in-doubt", f"lines may have passed through lines: {self._lines.why}", "self_contact")
 
     def _smoothing(self):
-        """Function that finds the error of smoothing, None where there is none to be found."""
+        """The `refweb.statics.smoothing_error.Smoothing` of the scene, None if it is not needed."""
         scene = self.scene
         smooth = (self.system.net.laws == SMOOTH).any()
         if not smooth or scene.solve.method != "newton" or scene.accuracy.error == "none":
@@ -100,7 +100,7 @@ class Simulation:
         return Smoothing(scene, self._shares.values())
 
     def _accept(self, equilibrium, smoothing):
-        """Write down an equilibrium; its history row."""
+        """Record an equilibrium; return its history row."""
         scene, solution, state = self.scene, self.solution, State(self.system, equilibrium.step, equilibrium.x)
         rest = at_rest(self.system)
         if equilibrium.stability is None and not rest.convex:  # of a method that knows no tangents
@@ -147,9 +147,9 @@ class Simulation:
         refuse_break(self.system, load(STATICS[self.scene.solve.method]), equilibrium, before)
 
     def _record_shares(self, equilibrium, state, smoothed):
-        """Write down the largest stress over strength and the margin of safety, with their errors.
+        """Record the largest stress over strength and the margin of safety, with their errors.
 
-        ``smoothed`` are errors of the smooth law, None where they are not known, of each number in ``_shares``.
+        ``smoothed`` has the error of the smooth law of each number in ``_shares``, None where it is not known.
         """
         solution, used, errors = self.solution, self._shares["strength"].of(state), []
         for share, moved in zip(self._shares.values(), smoothed, strict=True):
@@ -162,14 +162,14 @@ class Simulation:
             solution.margin = {**state.margin, "error": errors[-1][1]}
 
     def _smoothed(self, equilibrium, state, smoothing):
-        """Errors of the smooth law of results, and of what is in ``_shares``; None where they are not known."""
+        """Errors of the smooth law of all results and of the numbers in ``_shares``; None where they are not known."""
         observed = [*(o.observable for o in self.scene.observables), *self._shares.values()]
         if smoothing is None:
             return [None] * len(observed)
         return smoothing.errors(equilibrium, [o.of(state).value for o in observed])
 
     def _results(self, equilibrium, state, smoothed):
-        """The observables of an equilibrium by name, with their errors, of which those of the smooth law are given."""
+        """The results of an equilibrium by name, with their errors; ``smoothed`` are those of the smooth law."""
         observables = self.scene.observables
         values = [o.value(state) for o in observables]
         errors = [o.error(state, equilibrium) for o in observables]

@@ -1,12 +1,12 @@
 """The slowest vibrations about an equilibrium whose tangent is not symmetric, and a bound on the growth of the others.
 
-With φ the shape of one, all s of (s² M + s C + K) φ = 0 are those of
+With φ the shape of a vibration, all s of (s² M + s C + K) φ = 0 are those of
 
     μ (a, b) = (−K⁻¹ (ω C a + ω² M b), a),        s = ω/μ,        a = μ φ,        b = φ,
 
-with any ω; without C those of μ φ = K⁻¹ M φ, s² = −1/μ. Arnoldi iteration finds the largest μ, by one solution with K
-in each step. Where something may grow, they are found once more to all digits, and left vectors, by solutions with Kᵀ,
-tell how far rounding moves them.
+with any ω. Without C they are those of μ φ = K⁻¹ M φ, s² = −1/μ. Arnoldi iteration finds the largest μ, with one
+solution of K in each step. Where a vibration may grow, the μ are found again to all digits. Then left eigenvectors, by
+solutions with Kᵀ, show how far rounding changes the μ.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 
 NUMBER, VECTORS = 4, 20
-"""Number of μ that are looked for without C, and of vectors that are kept for it; with C twice as many of both."""
+"""Number of μ to find without C, and number of Arnoldi vectors; with C twice as many of both."""
 CLOSE = 1e-6
-"""Error of these μ, over them."""
+"""Relative error of these μ."""
 ROUNDING = 64.0 * np.finfo(float).eps
 """Error of a matrix over its norm."""
 ABOVE = 1.1
-"""The bound α over what an iteration finds of it, its square to `NEARLY`."""
+"""Bound of α over the value of the iteration, which finds α² to a relative error of `NEARLY`."""
 NEARLY = 0.1
 
 
 class Slowest(NamedTuple):
-    """The s of the slowest vibrations [1/s], which of them grow beyond rounding, and whether there are more."""
+    """The s of the slowest vibrations [1/s], a mask of those that grow beyond rounding, and True if there are more."""
 
     s: Any
     grows: np.ndarray
@@ -36,12 +36,12 @@ class Slowest(NamedTuple):
 
 
 class Weighed:
-    """Solutions with K for what has mass, weighed by the roots of that.
+    """Solutions with K for unknowns with mass, scaled by the square roots of the masses.
 
     Parameters
     ----------
     solver : refweb.system.factorization.Lu
-        Of K.
+        Factorization of K.
     M : sparse matrix, shape (n, n)
         Mass [kg].
     C : sparse matrix, shape (n, n), optional
@@ -57,13 +57,13 @@ class Weighed:
         self.omega = 1.0
 
     def soft(self, force, transposed=False):
-        """Weighed displacement under weighed forces."""
+        """Displacement of the unknowns with mass under forces on them."""
         full = np.zeros(self._size)
         full[self.massive] = force
         return self._solver.solve(full, transposed)[self.massive]
 
     def once(self, u):
-        """K⁻¹ M."""
+        """K⁻¹ M times u, scaled."""
         return self._root * self.soft(self.M @ (u / self._root))
 
     def once_transposed(self, u):
@@ -71,7 +71,7 @@ class Weighed:
         return (self.M @ self.soft(self._root * u, True)) / self._root
 
     def twice(self, u):
-        """The same of (a, b) with C."""
+        """The operator of (a, b) with C, scaled."""
         a, b = np.split(u, 2)
         force = self.C @ (a / self._root) + self.omega * (self.M @ (b / self._root))
         return np.concatenate([-self.omega * self._root * self.soft(force), a])
@@ -118,16 +118,16 @@ def _conditions(right, left):
 
 
 def coupling(solve, A, M):
-    """A bound on α = ‖S^(−1/2) A M^(−1/2)‖ [1/s], but for the chance of its iteration.
+    """A bound on α = ‖S^(−1/2) A M^(−1/2)‖ [1/s]; the iteration starts at random and may miss it by chance.
 
     Parameters
     ----------
     solve : callable
-        Solution with S of a force.
+        Displacement S⁻¹ f under a force f.
     A : sparse matrix
-        Skew.
+        Skew-symmetric matrix.
     M : sparse matrix
-        Diagonal, of mass above 0.
+        Diagonal matrix of masses above 0.
     """
     root = np.sqrt(M.diagonal())
 

@@ -1,7 +1,7 @@
-"""Errors of smoothing, which the solution of a scene does not show.
+"""Errors of smoothing in statics, from equilibria with less smoothing.
 
-With the smooth law results differ from those of η → 0 in proportion to η, so that a tenth of η, found from the same
-state, shows nine tenths of that.
+With the smooth law, results differ from those of η → 0 in proportion to η. An equilibrium with a tenth of η, found from
+the same state, shows nine tenths of this difference.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from .newton import Newton
 
 
 class Smoothing:
-    """The equilibria of a static scene with `SMOOTHING_SHARE` of its smoothing, one for each that is asked for.
+    """Equilibria of a static scene with `SMOOTHING_SHARE` of its smoothing, and the errors that follow.
 
     Parameters
     ----------
     scene : refweb.Scene
         The scene.
     more : sequence of refweb.results.observables.observable.Observable
-        Further numbers whose errors are found, behind those of the scene's observables.
+        Further observables whose errors follow those of the scene's observables.
     """
 
     def __init__(self, scene, more=()):
@@ -30,7 +30,7 @@ class Smoothing:
         self._newton = Newton(at_rest(self._system))
 
     def errors(self, equilibrium, values):
-        """Distance of each value in an equilibrium from the value at η → 0; None where that was not found."""
+        """Difference of each value in an equilibrium from the value at η → 0; None where that was not found."""
         try:
             equilibrium_near = self._newton.solve(equilibrium.step, equilibrium.x, warm=True, limit=60)
         except SolverError:

@@ -1,10 +1,10 @@
-"""Check if a web of lines that can push may turn over, and have another equilibrium on another side.
+"""Check if a web with bars may snap through to another equilibrium.
 
-Such a web snaps through a state in which lines push. Which side of that an equilibrium is on, its own tensions do not
-say: pushed on the near side, the lines pull on the far one. So the web is looked at where unit tensions alone would
-hold it, Σ (y_i − y_j)/L = 0 at each node between the supports as they stand, which depends on no load and no side.
-Where all lines are at least as long there as by nature, the supports keep them stretched, and the web is taken to have
-no other side; where some are shorter, it may have one.
+Such a web snaps through a state in which bars push. The tensions of an equilibrium do not tell on which side of that
+state it is: bars that push on the near side pull on the far side. Therefore the check uses the configuration y in which
+unit tensions balance between the supports, Σ (y_i − y_j)/L = 0 at each node. It depends on no load and on no side. If
+no bar there is shorter than its natural length, the supports keep the bars stretched, and the web is taken to have no
+other equilibrium. If a bar is shorter, it may have one.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from ..net.tension_laws import LINEAR
 from ..system.factorization import Factor
 
 SHORTER = 1e-9
-"""Strain below which a line is shorter than by nature beyond rounding."""
+"""Compressive strain above which a bar counts as shorter than its natural length, beyond rounding."""
 
 
 def may_turn_over(rest, equilibrium):
-    """Tell if lines that push without limit, as bars do, push in an equilibrium, or might in another.
+    """Tell if bars push in an equilibrium, or may push in another one.
 
     Parameters
     ----------
     rest : refweb.system.system.System
-        As statics sees it.
+        The system of statics, see `refweb.system.static_system`.
     equilibrium : refweb.statics.equilibrium.Equilibrium
-        Where it is.
+        The equilibrium.
     """
     net = rest.at(equilibrium.step).net
     bars = net.laws == LINEAR

@@ -1,33 +1,33 @@
-"""Stability of equilibria: a small disturbance grows by itself, or it does not.
+"""Stability of equilibria: check if a small disturbance grows.
 
-With K = −∂f/∂x, C = −∂f/∂v and the mass M, disturbances are those of
+With K = −∂f/∂x, C = −∂f/∂v and the mass M, small disturbances u satisfy
 
     M u'' + C u' + K u = 0,        u = φ exp(s t),        (s² M + s C + K) φ = 0,
 
-and the equilibrium is left by itself where some s has a positive real part.
+and the equilibrium is unstable if some s has a positive real part.
 
-Where K is symmetric and no frame turns, that is where K has a negative eigenvalue, whatever M and losses are: the signs
-of the pivots of LDLᵀ say so. Follower loads and wind have no potential, and their K is not symmetric:
+If K is symmetric and no frame rotates, this is so if K has a negative eigenvalue, for all M and losses; the signs of
+the pivots of LDLᵀ tell. Follower loads and wind have no potential, and their K is not symmetric:
 
 - divergence: a real negative eigenvalue of K φ = λ M φ. There is one wherever the determinant of K is negative, and
   none where the symmetric part S = (K + Kᵀ)/2 is positive definite (Bendixson).
-- flutter: a pair of complex λ, of which one square root has a positive real part. C may hold it [1]_.
+- flutter: a pair of complex λ, of which one square root has a positive real part. C may prevent it [1]_.
 
-In a frame that turns Coriolis forces may hold what K does not, as long as nothing damps motion in the frame.
+In a rotating frame, Coriolis forces may stabilise an equilibrium whose K is indefinite. Damping in the frame ends this.
 
-Of up to `DENSE` unknowns all s are found. Of more, the slowest are, by Arnoldi iteration on K⁻¹, whose start
-has a fixed seed; of the others it is said that they are not asked. But with S positive definite and A = (K − Kᵀ)/2
-nothing grows where C is symmetric and
+Up to `DENSE` unknowns all s are found. Of more unknowns only the slowest s are found, by Arnoldi iteration on K⁻¹ with
+a fixed seed; the answer says that the others are not known. Let S be positive definite and A = (K − Kᵀ)/2. Then nothing
+grows if C is symmetric and
 
     C > α M,        α = ‖S^(−1/2) A M^(−1/2)‖,
 
-as both roots of s² + c s + k + i a lie to the left where c > 0 and c² k > a². Wind does that where it is slower than
-waves across the lines.
+since both roots of s² + c s + k + i a have negative real parts where c > 0 and c² k > a². Drag in wind satisfies this
+if the wind is slower than transverse waves of the lines.
 
-Unknowns without mass follow the others; forces that depend on their velocity are left out. Where nothing has mass, all
-have the same and flutter is not asked: whether the number of ways in which a web diverges is odd depends on no mass.
-Eigenvalues have errors from rounding, by their condition numbers: what is within these counts as none. Lines between
-slack and taut count as taut; where slack ones would not hold the web, nothing is decided.
+Unknowns without mass follow the others; forces that depend on their velocity are left out. If no unknown has mass, all
+get the same mass, and flutter is not checked: the parity of the number of divergent modes depends on no mass. Rounding
+errors of eigenvalues follow from their condition numbers; parts within these errors count as zero. Lines between slack
+and taut count as taut. If the web would be unstable with these lines slack, its stability is not decided.
 
 References
 ----------
@@ -46,34 +46,34 @@ from ..system.factorization import Factor, Lu, negative_pivots
 from .equilibrium import Stability
 
 TINY = 1e-12
-"""Tension of all lines over EA by which the smallest pivot is moved, that of a direction without stiffness."""
+"""Tension of all lines over EA whose stiffness counts as zero in the sign of the smallest pivot."""
 HELD = 1e-10
-"""Stiffness over the largest EA/L that holds what nothing supports."""
+"""Stiffness that anchors parts without support, over the largest EA/L."""
 DENSE = 100
 """Unknowns up to which all s are found."""
 KINK = 1e-12
-"""Strain within which a line that only pulls is between slack and taut."""
+"""Strain within which a tension-only line counts as between slack and taut."""
 ROUNDING = 64.0 * np.finfo(float).eps
 """Error of a matrix over its norm."""
 PIVOT, EIGENVALUE = "a pivot of its tangent is negative", "an eigenvalue of its tangent is negative"
-"""Why."""
+"""Reasons for a sign of −1."""
 NO_RATE = 1e-9
-"""Rate of growth over that of the slowest vibration that counts as none."""
+"""Imaginary part of s over its size up to which it counts as zero."""
 OPEN = 1e3
-"""λ of the slowest vibration over `TINY` of the fastest, up to which it may have no stiffness."""
+"""λ of the slowest vibration, over `TINY` times that of the fastest, up to which it may have no stiffness."""
 
 
 def ask(system, rest, state, solver=None):
-    """Write to an equilibrium whether it is stable, and whether there may be others.
+    """Set the stability of an equilibrium, and whether there may be other equilibria.
 
     Parameters
     ----------
     system, rest : refweb.system.system.System
-        With all that acts, and as statics sees it, see `refweb.system.static_system`.
+        The whole system, and the system of statics, see `refweb.system.static_system`.
     state : Equilibrium
-        Where it is; the sign of its smallest pivot, where that is in its stats, is not asked for again.
+        The equilibrium; the sign of its smallest pivot is not computed again if it is in its stats.
     solver : refweb.system.factorization.Lu, optional
-        Of a tangent that is not symmetric.
+        Factorization of the tangent if that is not symmetric.
     """
     sign = state.stats.get("smallest_pivot")
     if sign is None or (sign == -1 and rest.rotating):
@@ -89,7 +89,7 @@ def ask(system, rest, state, solver=None):
 
 
 def _ask_of_kinks(system, rest, state):
-    """Leave open what lines between slack and taut hold: the tangent takes them as taut, and slack ones may not."""
+    """Leave the stability undecided if it depends on lines between slack and taut, which count as taut."""
     rest = rest.at(state.step)
     net, numbers = rest.net, rest.net.line_data.copy()
     strain = np.linalg.norm(net.bar_vectors(state.x), axis=1) / net.bar_lengths - 1.0
@@ -103,21 +103,21 @@ def _ask_of_kinks(system, rest, state):
 
 
 def by_pivot(sign):
-    """The `Stability` that the sign of the smallest pivot of a symmetric tangent says."""
+    """The `Stability` by the sign of the smallest pivot of a symmetric tangent."""
     return Stability(sign, PIVOT if sign == -1 else "", loose=sign < 1)
 
 
 class Question:
-    """Question of the stability of an equilibrium; K is assembled where nothing else decides it.
+    """Analysis of the stability of an equilibrium; matrices are assembled when they are needed.
 
     Parameters
     ----------
     system : refweb.system.system.System
-        With all that acts, also what depends on velocity alone.
+        The whole system, with forces that depend on velocity.
     rest : refweb.system.system.System
-        As statics sees it, see `refweb.system.static_system`.
+        The system of statics, see `refweb.system.static_system`.
     state : refweb.statics.equilibrium.Equilibrium
-        Where it is.
+        The equilibrium.
     """
 
     def __init__(self, system, rest, state):
@@ -131,7 +131,7 @@ class Question:
     def answer(self, solver=None):
         """The `refweb.statics.equilibrium.Stability`.
 
-        ``solver`` is the `refweb.system.factorization.Lu` of K, where there is one.
+        ``solver`` is the `refweb.system.factorization.Lu` of K, if there is one already.
         """
         if not len(self.rest.free):
             return Stability(1)
@@ -150,13 +150,13 @@ class Question:
 
     @property
     def _symmetric(self):
-        """Tell if K is symmetric but for rounding."""
+        """Tell if K is symmetric up to rounding."""
         values, _, skew = self._parts
         return abs(skew).max(initial=0.0) <= ROUNDING * abs(values).max(initial=0.0)
 
     @cached_property
     def _ridge(self):
-        """Values of what stiffness counts as none."""
+        """Values of a stiffness that counts as zero, in the pattern."""
         rest, net = self.rest, self.rest.at(self.t).net
         axial = net.axial / net.natural_length
         ridge = TINY * rest.at(self.t).across_lines(net.axial)
@@ -189,7 +189,7 @@ class Question:
         return C @ self.rest.carriers.momenta(self.rest, self.x) if self.rest.angles else C
 
     def _reduced(self):
-        """K and C of the unknowns with mass, over the roots of that, dense; and whether those without are held."""
+        """Dense K and C of unknowns with mass, scaled by roots of mass; True if unknowns without mass are stable."""
         import scipy.linalg
 
         heavy, K, C = self._massive(), self.rest.pattern.matrix(self._parts[0]).toarray(), self._velocity()
@@ -215,7 +215,7 @@ class Question:
     # Answers
 
     def _in_frame(self, what):
-        """Stability by a K that does not hold the web in a frame that turns."""
+        """Stability in a rotating frame whose K is indefinite; ``what`` is the reason in words."""
         if len(self.rest.free) > DENSE:
             slow = self._slowest(self._lu, self._velocity())
             grows = slow is not None and slow.grows.any()
@@ -225,7 +225,7 @@ class Question:
         return Stability(-1, what) if growth > 0.0 else Stability(-1, what, gyroscopic=True)
 
     def _unsymmetric(self, solver):
-        """Stability by a K that is not symmetric."""
+        """Stability with a K that is not symmetric."""
         if len(self.rest.free) > DENSE:
             return self._of_many(solver)
         K, C, stands = self._reduced()
@@ -267,7 +267,7 @@ class Question:
 
     @property
     def _lu(self):
-        """LU of K, but for what stiffness counts as none."""
+        """LU of K plus a stiffness that counts as zero."""
         solver = Lu(self.rest.pattern)
         solver.update(self._parts[0] + self._ridge)
         return solver
@@ -288,11 +288,11 @@ class Question:
         return None
 
     def _fastest(self, M):
-        """A bound on all |λ|, where everything has mass [1/s²]."""
+        """A bound on all |λ|, if all unknowns have mass [1/s²]."""
         return (abs(self.rest.pattern.matrix(self._parts[0])).sum(axis=1) / M.diagonal()).max()
 
     def _damps(self, C, M):
-        """Tell if C is symmetric and above α M, so that nothing grows; of lumped mass, which nothing lacks."""
+        """Tell if C is symmetric and above α M, so that nothing grows; False unless all unknowns have lumped mass."""
         if C is None or abs(C - C.T).max() > ROUNDING * abs(C).max():
             return False
         if not self._massive().all() or self.rest.net.consistent_minus_lumped is not None:
@@ -306,12 +306,12 @@ class Question:
 
 
 def _flutter(growth):
-    """Name of a vibration that grows."""
+    """Text for a vibration that grows."""
     return f"flutter: a vibration grows, by {growth:.2g} 1/s"
 
 
 def _eigenvalues(A):
-    """Eigenvalues of a matrix, and what rounding may make of each, to first order."""
+    """Eigenvalues of a matrix, and the rounding error of each to first order."""
     import scipy.linalg
 
     eigenvalues, before, behind = scipy.linalg.eig(A, left=True, right=True)
@@ -326,7 +326,7 @@ def _negative(eigenvalues, off):
 
 
 def _growth(K, C):
-    """Largest real part of s [1/s], of unit masses; 0 where none is positive beyond rounding."""
+    """Largest real part of s [1/s] for unit masses; 0 if none is positive beyond rounding."""
     values, off = _eigenvalues(K)
     if C is None:
         complex_ = abs(values.imag) > off

@@ -1,8 +1,8 @@
-"""Trials within a budget of time: what is expected to be the cheapest comes first.
+"""Trials within a budget of CPU time: the run of least expected cost comes first.
 
-The budget is kept by looking at the clock of `refweb.studies.trials`. Of a method that has had its turns the next comes
-later; a run may take a third of what is left, is left out where it is expected to take more, and is ended where it
-does. The coarsest run of a method may always take a twentieth of the budget.
+The clock of `refweb.studies.trials` measures the time. The more runs a method has had, the later its next run comes. A
+run may take a third of the remaining budget. A run that is expected to take more is left out, and a run that takes more
+is ended. The coarsest run of a method may always take a twentieth of the budget.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from ..errors import InputError, SolverError
 from . import trials
 
 SHARE = 1.0 / 3.0
-"""Largest share of what is left of the budget that a run may take."""
+"""Largest share of the remaining budget that a run may take."""
 TURN = 0.05
-"""Share of the budget that the coarsest run of each method may take, however little is left."""
+"""Share of the budget that the coarsest run of each method may always take."""
 FAIR = 1.5
-"""Factor of an expected price for each rung that the method has behind it."""
+"""Factor on the expected cost for each run that the method has had."""
 CHEAP, REPEATS = 0.2, 3
-"""Runs of less CPU time [s] are repeated; their smallest time counts."""
+"""CPU time [s] below which runs are repeated, and largest number of runs; the least time counts."""
 
 
 def compile_all(ladders, runner):
@@ -35,9 +35,9 @@ def compile_all(ladders, runner):
 
 
 def climb(ladders, runner, deadline, budget, tell):
-    """Run all ladders at once, always the rung that is expected to be the cheapest, while there is time.
+    """Run all ladders side by side while there is time; the setting of least expected cost is always the next.
 
-    Expected prices count `FAIR` times for each rung that a method has behind it, so that all kinds have a turn.
+    The expected cost counts `FAIR` times for each run that the method has had, so that all methods have a turn.
     """
     ahead = {name: 0 for name, ladder in ladders.items() if ladder and ladder[0].status != "refused"}
     while ahead:
@@ -60,7 +60,7 @@ def climb(ladders, runner, deadline, budget, tell):
 
 
 def _expected(ladder, rung, runner):
-    """CPU time to expect of a rung [s]: growing as it did before, or as explicit steps and tolerances do."""
+    """Expected CPU time of a setting [s], by its growth over the settings before, else by a power law."""
     trial = ladder[rung]
     spent = [(t.value, t.cpu_s) for t in ladder[:rung] if t.status == "solved"]
     if not spent:
@@ -73,7 +73,7 @@ def _expected(ladder, rung, runner):
 
 
 def _try(trial, runner, until):
-    """Run a trial, several times where it is cheap, and note how it ended."""
+    """Run a trial, several times if it is cheap, and record how it ended."""
     cheapest = np.inf
     for _ in range(REPEATS):
         began = trials.clock()

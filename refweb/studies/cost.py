@@ -1,4 +1,4 @@
-"""Cost of digits as a value: all runs, their references, the price of digits in words, and the result folder."""
+"""Cost of correct digits: all runs, their references, the cost in words, and the result folder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 COLUMNS = "method setting error_observable error_state cpu_s nfev njev nlu nsteps status".split()
 """Columns of ``cost.csv``."""
 DIGITS = (1, 2, 3, 6, 9, 12)
-"""Digits whose price is told."""
+"""Numbers of digits whose cost is reported."""
 
 
 @dataclass(eq=False)
@@ -35,31 +35,31 @@ class Cost:
     scene : refweb.Scene
         The scene.
     observable : refweb.Observe
-        What is compared, at every history row or load step.
+        Observable that is compared, at every history row or load step.
     trials : list of refweb.studies.trials.Trial
         All runs; ``error_observable`` [unit of the observable] is the largest difference over the rows, and
         ``error_state`` [m] that of the displacements at the end. Of each ``values`` is the observable, shape (rows,),
         and ``x`` the displacement at the end [m], shape (rows of the system, 3).
     web : dict
-        What is written of the web to ``run.json``: numbers of ``nodes``, ``lines`` and ``cells``, ``cable_length`` [m],
-        ``area`` [m²] and ``mass`` [kg].
+        Data of the web for ``run.json``: numbers of ``nodes``, ``lines`` and ``cells``, ``cable_length`` [m], ``area``
+        [m²] and ``mass`` [kg].
     references : tuple of refweb.studies.trials.Trial
-        The two runs that errors are measured with; empty where there are no two.
+        The two reference runs of errors; empty where there are no two.
     independent : bool
-        Whether they are of different kinds.
+        True if the references are of different kinds of methods.
     apart : tuple of float
-        How far they are apart: in the observable, and in displacement [m].
+        Difference of the references: in the observable, and in displacement [m].
     trust : tuple of float
-        What is known of errors: the same, or the median of such differences where that is of the same size. An error
-        below that means nothing.
+        Least errors that can be measured: the same, or the median of such differences where that is of the same size.
+        Smaller errors mean nothing.
     scale : float
         Largest value of the observable over time, which digits are relative to.
     status : {"running", "solved", "failed", "interrupted"}
-        How it ended: "solved" where one run at least is.
+        How the study ended: "solved" if at least one run is solved.
     message : str
-        Why it failed, else empty.
+        Reason of a failure, else empty.
     cost : dict of str to float
-        ``cpu_s`` and ``wall_s`` of all of it [s].
+        ``cpu_s`` and ``wall_s`` of the whole study [s].
     """
 
     scene: Scene
@@ -81,10 +81,11 @@ class Cost:
         return " ".join(_sentence(self))
 
     def price(self, digits, method=None):
-        """The cheapest `Trial` from which on a method keeps so many digits of the observable, None where none does.
+        """The cheapest `Trial` with so many digits, which finer trials of its method have as well; else None.
 
-        Of one method, or of all but DOP853, which no scene can ask for. What the references cannot tell counts as none;
-        other smoothings than the scene's are other laws, and not among the methods.
+        It is that of one method, or of all methods but DOP853, which no scene can ask for. The result is None if the
+        references do not agree to so many digits. Runs with other smoothings than the scene's do not count, since they
+        have other laws.
         """
         limit, best = self.scale * 10.0**-digits, []
         if not self.trust[0] <= limit:

@@ -1,4 +1,4 @@
-"""The work-precision diagram: errors against CPU time, one curve per method, failures and what is not known with it."""
+"""The work–precision diagram: errors against CPU time, one curve per method, with failures and unknown errors."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ STYLES = (
     ("#2f8f8f", ">"),
     ("#a0527a", "h"),
 )
-"""Colour and marker of a method by its place among those that are compared."""
+"""Colour and marker of each method, in their order."""
 OUTSIDER = ("#555555", "P")
-"""Those of a method that is not refweb's."""
+"""Colour and marker of a method that is not refweb's."""
 
 
 def diagram(cost):
@@ -64,7 +64,7 @@ def _curves(plot, cost, key, trust):
 
 
 def _ticked(axis):
-    """Widen a logarithmic axis until it shows two decades at least, the only ones with a number."""
+    """Widen a logarithmic axis to at least two powers of ten, since only these have a number."""
     from matplotlib.ticker import NullFormatter
 
     if axis.get_scale() == "log":

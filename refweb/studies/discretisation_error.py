@@ -1,7 +1,8 @@
-"""Errors of elements: the same scene with every line in more of them.
+"""Discretisation errors: the same scene with more elements in every line.
 
-A scene is solved with every line in two and in four times as many elements: where the first difference is q times the
-second, what is left after the first is q/(q − 1) times that, and `MARGIN` times it where q is not yet constant.
+A scene is solved with two and with four times as many elements. Let the first difference be q times the second. Then
+the error of the scene is q/(q − 1) times the first difference. `MARGIN` is a factor of safety, since q may not be
+constant yet.
 """
 
 from __future__ import annotations
@@ -11,24 +12,24 @@ from dataclasses import replace
 from ..settings import Accuracy
 
 FINER = (2, 4)
-"""Number of elements per line that are compared with, over that of the scene."""
+"""Numbers of elements per line of the finer runs, over that of the scene."""
 SLOWEST, FASTEST = 1.5, 16.0
-"""Bounds on q: slower is no convergence that could be relied on, and faster is chance."""
+"""Bounds on q: a smaller q shows no reliable convergence, and a larger q is chance."""
 MARGIN = 1.25
-"""Factor of safety on what three solutions say (Roache, *Annu. Rev. Fluid Mech.* 29 (1997) 123–160, sec. 4)."""
+"""Factor of safety on the error by three solutions (Roache, *Annu. Rev. Fluid Mech.* 29 (1997) 123–160, sec. 4)."""
 
 
 def discretisation_errors(scene, results, solve):
-    """Results with the error of elements; those that do not converge have all that was seen as their error.
+    """Results with their discretisation error; without convergence it is twice the largest difference of the runs.
 
     Parameters
     ----------
     scene : refweb.Scene
-        As it was solved.
+        The scene as it was solved.
     results : list of dict of str to refweb.results.solution.Result
-        Of each load step, or of the motion.
+        Results of each load step, or of the motion.
     solve : callable
-        Gives such a list of another scene.
+        Function that returns such a list for another scene.
     """
     results_by_mesh = [results]
     for times in FINER:
@@ -49,7 +50,7 @@ def _left(coarse, fine, finest):
 
 
 def left_of(first, second, both):
-    """Error of the first of three values that are ``first`` and ``second`` apart one after another, and ``both``."""
+    """Error of the first of three values, by the differences of 1 and 2, of 2 and 3, and of 1 and 3."""
     if second * SLOWEST > first:
         return 2.0 * max(first, second, both)
     ratio = min(first / second, FASTEST) if second > 0.0 else FASTEST

@@ -1,4 +1,4 @@
-"""A voice from outside for `refweb.studies.work_precision`: scipy's DOP853, its own steps driven by the same forces."""
+"""An independent method for `refweb.studies.work_precision`: scipy's DOP853 with the same forces."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ..errors import InputError, SolverError
 from ..results.state import State
 
 NAME, TOLERANCES = "dop853", (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
-"""Its name among the methods, and relative tolerances from coarse to fine."""
+"""Name of the method, and its relative tolerances from coarse to fine."""
 
 
 class Followed(NamedTuple):
-    """State of a run of DOP853.
+    """Outcome of a run of DOP853.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Followed(NamedTuple):
     nsteps, nfev : int
         Steps and evaluations of forces.
     looking : float
-        What it took to look at the rows [s], which is none of the method's.
+        Time of evaluating the observable at the rows [s], which is not part of the method's cost.
     """
 
     values: np.ndarray
@@ -41,14 +41,14 @@ class Dop853:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        The system that moves.
     begin : refweb.dynamics.initial_state.Start
-        Where from.
+        Initial state.
 
     Raises
     ------
     InputError
-        For what has no mass, and for lengths that are held.
+        For nodes without mass, links and breaks.
     """
 
     def __init__(self, system, begin):
@@ -93,18 +93,18 @@ class Dop853:
         return np.concatenate([rate, over_mass])
 
     def follow(self, times, rtol, observable, clock, check):
-        """Take the system through some times.
+        """Advance the system through the times of all rows.
 
         Parameters
         ----------
         times : ndarray, shape (rows,)
-            Of the rows [s].
+            Times of the rows [s].
         rtol : float
-            Relative tolerance; the absolute ones are rtol times the scales of refweb's own solvers.
+            Relative tolerance; absolute tolerances are rtol times the scales of refweb's solvers.
         observable : refweb.Observe
-            What is looked at.
+            Observable that is evaluated at each row.
         clock, check : callable
-            What tells the time [s]; what is called after each step, and may raise.
+            ``clock`` returns the time [s]; ``check`` is called after each step and may raise.
 
         Returns
         -------
@@ -142,14 +142,14 @@ class Dop853:
         return Followed(values, x, steps, solver.nfev, looking)
 
     def _travel(self, y):
-        """Time in which nothing passes through a body [s]."""
+        """Largest step in which no line can pass through a body [s]."""
         from ..dynamics.integrators.step_limits import TRAVEL
 
         speed = 2.0 * np.abs(y[self._unknowns :]).max(initial=0.0)
         return TRAVEL * self._thickness / speed if speed > 0.0 else np.inf
 
     def _turn_corner(self, solver, ahead):
-        """Give what is free the velocity that a consistent mass gives it at a corner of a motion."""
+        """Change free velocities at a corner of a motion, as the consistent mass requires."""
         system = self.system
         sides = (self._rows(t, solver.y)[1] for t in (ahead * (1.0 + 1e-12), 0.5 * (solver.t_old + ahead)))
         jump = np.where(system.supported, np.subtract(*sides), 0.0)

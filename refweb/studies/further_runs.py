@@ -1,19 +1,19 @@
-"""All parts of the error of results, by further runs within a budget of CPU time.
+"""Error budget of results, by further runs within a budget of CPU time.
 
-A run and its twin tell of time steps alone. Further runs of the same scene tell of the rest: with twice and four times
-the elements, with 4 and 16 times the stiffness of contact, with a tenth of the smoothing and a quarter of the slip
-velocity of friction, with two starts side by side and, where these grow apart, with several. Those that cost least come
-first; one that is expected to take more than what is left of the budget is not begun, and one that is seen to is ended.
-A part of which no run is left is "not estimated".
+A run and its step-refinement run show the error of time steps alone. Further runs of the same scene show the other
+parts. They have twice and four times the elements, 4 and 16 times the stiffness of contact, a tenth of the smoothing,
+or a quarter of the slip velocity of friction. Two runs from starts side by side show chaos; if they separate, an
+ensemble follows. The run of least expected cost comes first. A run that is expected to exceed the remaining budget is
+not begun, and a run that exceeds it is ended. A part without a run is "not estimated".
 
-Two runs are held against each other by their result, and by the mean difference of the observable before, as a run and
-its twin are, see `refweb.dynamics.twin_error`: results may agree by chance.
+Two runs are compared by their result and by the mean difference of the observable before it, since results may agree by
+chance. A step-refinement run is compared in the same way, see `refweb.dynamics.twin_error`.
 
-``python -m validation trust`` holds ± and verdicts against far finer elements, stiffer contact and shorter steps. ±
-holds the truth of 99.8 in 100 of 628 results of 100 random impacts, and of 98.2 in 100 of 228 results of 30 small nets
-that are thrown at a sphere. In the median it is 2.4 and 3.9 times what is off, and no result that is called determined
-is off by more than its digits allow. The four results of captures that are not held are forces of contact, three peaks
-and a mean.
+``python -m validation trust`` compares ± and verdicts with runs of far finer elements, stiffer contact and shorter
+steps. ± contains the true value of 99.8 % of 628 results of 100 random impacts, and of 98.2 % of 228 results of 30
+small nets that are thrown at a sphere. Its median is 2.4 and 3.9 times the true error. No result with the verdict
+"determined" has an error that its digits do not allow. The four results of captures outside ± are forces of contact:
+three peaks and a mean.
 """
 
 from __future__ import annotations
@@ -40,23 +40,23 @@ from .discretisation_error import MARGIN, left_of
 from .predictability import ensemble, horizon, lost_digits
 
 SURE = 1.1
-"""Time that a run takes by its progress, over what is left, at which it is ended."""
+"""Time of a run, extrapolated by its progress, over the remaining budget, at which the run is ended."""
 SEEN = 0.1
-"""Share of a run that has to be done before it is judged by its progress."""
+"""Share of a run after which its time is extrapolated."""
 STIFFER = (4.0, 16.0)
-"""Stiffness of contact that is compared with, over that of the scene."""
+"""Stiffness of contact of further runs, over that of the scene."""
 SLOWER = 0.25
-"""Slip velocity of friction that is compared with, over that of the scene."""
+"""Slip velocity of friction of a further run, over that of the scene."""
 MEMBERS, QUANTILE = 8, 2.5
-"""Number of runs of an ensemble, and how many standard deviations 95 in 100 more runs are from its mean at most."""
+"""Number of runs of an ensemble, and standard deviations from its mean that contain 95 % of further runs."""
 APART = 1e-6
-"""Difference of the starts of an ensemble, over the shortest element: no real net is known better."""
+"""Difference of the starts of an ensemble, over the shortest element: no real net is known more precisely."""
 LOST = 5
-"""Number of digits that a small difference has to cost until a result that is wide counts as chaotic."""
+"""Number of digits that a small difference must cost before a wide result counts as chaotic."""
 FALLS, GROWS = 0.85, 1.5
-"""Factors on a force of contact, with twice the elements and with 4 times the stiffness, below and above which it is
-that of a first touch: that has 0.71 and 2. Finer elements bring it down to what the web as a whole pushes back, stiffer
-contact drives it up without end: whoever refines both finds no limit."""
+"""Limits of the factors on a force of contact with twice the elements, and with 4 times the stiffness, for a first
+touch. A first touch has the factors 0.71 and 2. With finer elements its force falls to that of the web as a whole; with
+stiffer contact it grows without limit. If both are refined there is no limit."""
 
 
 class Variant(NamedTuple):
@@ -65,15 +65,15 @@ class Variant(NamedTuple):
     Attributes
     ----------
     part : str
-        The part of the error that it tells of.
+        Part of the error that the run shows.
     text : str
-        What differs, in words.
+        Text of the difference from the scene.
     scene : refweb.Scene or None
-        What is run; None for runs from starts side by side.
+        Scene of the run; None for runs from starts side by side.
     price : float
         Expected CPU time [s].
     follows : str or None
-        Text of the variant that comes before.
+        Text of the variant that must be solved before.
     """
 
     part: str
@@ -84,22 +84,22 @@ class Variant(NamedTuple):
 
 
 class FurtherRuns:
-    """Further runs of a scene, and what they tell.
+    """Further runs of a scene, and the errors that they show.
 
     Parameters
     ----------
     simulation : refweb.dynamics.simulation.Simulation or refweb.statics.simulation.Simulation
-        That of the scene, at its end.
+        Simulation of the scene, at its end.
     solution : refweb.solution.Solution
-        Its solution; ``further`` grows.
+        Its solution; the list ``further`` grows.
     rows : ndarray, shape (rows, columns)
         Its history.
     clock : refweb.results.run_status.Clock
-        Of all that the budget is for.
+        Clock of the whole budget.
     run : callable
         `refweb.run`.
     tell : callable
-        Called with a text and the share of the budget that is spent.
+        Called with a text and the spent share of the budget.
     """
 
     def __init__(self, simulation, solution, rows, clock, run, tell):
@@ -114,11 +114,11 @@ class FurtherRuns:
 
     @property
     def spent(self):
-        """CPU time that is spent of the budget [s]."""
+        """Spent part of the budget [s]."""
         return self._clock.spent()["cpu_s"]
 
     def follow(self):
-        """Run what the budget allows, cheapest first."""
+        """Run all variants that the budget allows, the cheapest first."""
         waiting = list(variants(self.scene, self.simulation.system, self.solution, self._single))
         done: set[str | None] = {None}
         while ready := [v for v in waiting if v.follows in done]:
@@ -142,7 +142,7 @@ class FurtherRuns:
                     waiting.append(Variant("chance", ENSEMBLE, None, 0.5 * MEMBERS * entry["cpu_s"]))
 
     def _tried(self, variant, left):
-        """Run a variant; how that ended."""
+        """Run a variant; return its status, message and CPU time."""
         before = self.spent
 
         def watched(text, share):
@@ -172,10 +172,10 @@ class FurtherRuns:
             self.solution.horizon["ensemble"] = ensemble(self.simulation, MEMBERS, tell, APART)
 
     def _chaotic(self, observable):
-        """Tell if small differences have grown so much that more steps hardly make ± smaller, or that nothing is left.
+        """Tell if a result is chaotic: it is wide and small differences cost `LOST` digits, or they cost all 12.
 
-        What counts is the time of the result, of a peak the end of the run: a motion beside it may have a higher one
-        later.
+        The lost digits are those at the time of the result, for a peak those at the end of the run: a run beside it may
+        have a higher peak later.
         """
         result = self.solution.results[observable.name]
         time = result.time if observable.reduce == "final" else np.inf
@@ -183,7 +183,7 @@ class FurtherRuns:
         return lost >= LOST and result.error is not None and result.error > ALLOWED * abs(result.value) or lost == 12
 
     def findings(self):
-        """Errors by result, as far as these runs tell: ``parts``, ``reasons`` and ``mesh_only``."""
+        """Errors of each result by these runs: ``parts``, ``reasons`` and ``mesh_only``."""
         errors: dict = {o.name: self._found_of(o) for o in self.scene.observables}
         used = {"parts": self._parts_of(UTILISATION)}
         if self.solution.utilisation is not None and (horizon := self.solution.horizon):
@@ -194,7 +194,7 @@ class FurtherRuns:
         return errors | {UTILISATION: used}
 
     def _without_chance(self, entry):
-        """An entry of `findings` of a result that small differences leave as it is."""
+        """Entry of `findings` for a result that small differences at the start do not change."""
         parts = {**entry["parts"], "chance": "none"}
         return {**entry, "parts": parts, "reasons": {"chance": "small differences at the start leave its digits"}}
 
@@ -203,7 +203,7 @@ class FurtherRuns:
         return abs(value - mean["mean"]) + QUANTILE * mean["deviation"]
 
     def _parts_of(self, name):
-        """Errors of a result by part of the model; of the utilisation, which has no history, by its largest value."""
+        """Errors of a result by part of the model; for the utilisation, which has no history, by its largest value."""
         parts = {}
         for part, texts, factor in TELLING:
             texts = [text for text in texts if text in self._compared]
@@ -226,7 +226,7 @@ class FurtherRuns:
         return entry
 
     def _left(self, name, texts, factor):
-        """Error of a result by one or two runs nearer to the limit; one leaves ``factor`` times the change."""
+        """Error of a result by one or two refined runs; with one run it is ``factor`` times the change."""
         values = [self._compared[text][0][name] for text in (None, *texts)]
         first = abs(values[0] - values[1])
         if len(values) == 2:
@@ -236,7 +236,7 @@ class FurtherRuns:
         return max(left, MARGIN * self._mean_apart(name, texts[-1]))
 
     def _mean_apart(self, name, text):
-        """Mean difference of an observable before its result between the scene and another run; 0 in statics."""
+        """Mean difference of an observable from that of another run, before the time of its result; 0 in statics."""
         if self.static or name == UTILISATION:
             return 0.0
         table, compared = self._compared[None][1], self._compared[text][1]
@@ -246,10 +246,10 @@ class FurtherRuns:
         return largest_mean(table["time"][:count][same], off, end)
 
     def _mesh_only(self, observable):
-        """Tell if a force of contact is that of a first touch; None where that is not to be told.
+        """Tell if a force of contact is that of a first touch; None where no run tells.
 
-        It falls with the mass of a node, and grows with the root of the stiffness; both have to be seen where both have
-        been run. A force that grows with the stiffness alone depends on the model.
+        The force of a first touch falls with the mass of a node and grows with the root of the stiffness. Both must be
+        found if runs for both exist. A force that only grows with the stiffness depends on the model.
         """
         touch = first_touch(self.scene, self.simulation.system, observable)
         if touch is None or not self.solution.results[observable.name].value > 0.0:
@@ -271,12 +271,12 @@ TELLING = (
     ("smoothing", (SMOOTHER,), SMOOTHED / (1.0 - SMOOTHING_SHARE) / MARGIN),
     ("smoothing", (SLIP,), 1.0 / (1.0 - SLOWER)),
 )
-"""Parts of the error, the runs that tell of each, and what a single one leaves over the change that it makes."""
+"""Parts of the error, the runs that show each, and the error by a single run over the change that it makes."""
 HORIZON, ENSEMBLE = "two starts side by side", f"{MEMBERS} starts side by side"
 
 
 def variants(scene, system, solution, single):
-    """Yield the `Variant` of a scene that its error budget asks for; ``single`` is the cost of one run [s]."""
+    """Yield the `Variant` s of a scene that its error budget needs; ``single`` is the CPU time of one run [s]."""
     reasons, static = reasons_of(scene, system, solution), scene.solve.kind == "static"
     plain = scene.replace(accuracy=Accuracy(error="none"), chosen=())
     explicit = not static and INTEGRATORS[scene.solve.method].knob == "safety"
@@ -316,7 +316,7 @@ def slower_slip(scene):
 
 
 def stiffness_of(scene, system):
-    """Stiffness of contact of each body that is touched, and of lines as "self_contact"."""
+    """Stiffness of contact of each body, and of lines as "self_contact"."""
     given = {}
     if scene.contact is not None and scene.contact is not False:
         given |= {body.name: scene.contact.law_of(body)[0] for body in system.net.bodies}
@@ -327,7 +327,7 @@ def stiffness_of(scene, system):
 
 
 def _at_knob(simulation):
-    """The scene with the stiffness that was chosen, the method and the knob that its run came to."""
+    """The scene with the stiffness that refweb chose, and with the final accuracy parameter of its run."""
     scene = simulation.scene.settled()
     if scene.solve.kind == "static":
         return scene

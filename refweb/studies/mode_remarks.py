@@ -1,4 +1,4 @@
-"""Remarks on natural frequencies: on each equilibrium, and on effects that the modes leave out."""
+"""Findings on natural frequencies: on each equilibrium, and on effects that the modes leave out."""
 
 from __future__ import annotations
 

@@ -31,13 +31,13 @@ COLUMNS += ["modal_mass [kg]", "share_x [1]", "share_y [1]", "share_z [1]", "mov
 
 @dataclass(eq=False, repr=False)
 class Modes(Solution):
-    """Natural frequencies and shapes; `state` and what is read off it are the equilibrium at the last load step.
+    """Natural frequencies and shapes; `state` and its arrays are those of the equilibrium at the last load step.
 
     Attributes
     ----------
     spectra : list of refweb.studies.spectrum.Spectrum
-        Modes at each load step, the last with its shapes, the others without (None); of a dynamic scene one, at its
-        equilibrium at t = 0.
+        Modes at each load step. Only the last has shapes, the others have None. A dynamic scene has one spectrum, at
+        its equilibrium at t = 0.
     """
 
     spectra: list = field(default_factory=list)
@@ -49,14 +49,15 @@ class Modes(Solution):
 
     @property
     def error(self):
-        """± of each frequency [Hz], shape (modes,): that of solving, not that of the elements."""
+        """± of each frequency [Hz], shape (modes,): the error of the solver, without the discretisation error."""
         return self.spectra[-1].error
 
     @property
     def shapes(self):
-        """Displacement of each node in each mode at the last load step, the largest 1, shape (modes, nodes, 3).
+        """Displacement of each node in each mode at the last load step, shape (modes, nodes, 3); the largest is 1.
 
-        In a frame that turns nodes go round: ``spectra[-1].later`` is a quarter of a period after that.
+        In a rotating frame nodes move on ellipses: ``spectra[-1].later`` is the displacement a quarter of a period
+        later.
         """
         return self.spectra[-1].shapes[:, : self.state.system.net.nodes]
 
@@ -74,7 +75,7 @@ class Modes(Solution):
         Parameters
         ----------
         folder : path-like
-            Made where it does not exist.
+            Folder, which is created if it does not exist.
         force : bool
             Replace the results of an earlier run.
 
@@ -104,14 +105,14 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
     scene : Scene, path-like or str
         A scene, a scene file or the name of a scene shipped with refweb.
     number : int
-        How many, at most 1000; fewer where the web has fewer.
+        Number of modes, at most 1000; the web may have fewer.
     out : path-like, optional
         Result folder; without it nothing touches the disk.
     force : bool
         Replace the results of an earlier run in ``out``.
     progress : bool or callable
-        Whether a terminal or a notebook shows how far it is, or what is called with a line of text and the share that
-        is done, 0 to 1.
+        True to show the progress in a terminal or a notebook. A callable is called with a line of text and the finished
+        share, 0 to 1.
     announce : callable, optional
         Called with the scene and its system when the input has been accepted.
 
@@ -124,8 +125,8 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
     InputError
         For wrong input; nothing has been written.
     SolverError
-        Where there is no equilibrium, none is found, or nothing can vibrate. What was computed is kept in ``out``,
-        marked "failed".
+        If there is no equilibrium, none is found, or nothing can vibrate. The load steps computed so far stay in
+        ``out``, marked "failed".
     """
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     number = checked("number", number, integer(at_least=1, at_most=MAX_MODES))
@@ -150,7 +151,7 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
 
 
 def _at_rest(system):
-    """The system that vibrates; refuses what has no modes."""
+    """The system that vibrates; refuse links, forces without a potential, and webs without free nodes."""
     rest = at_rest(system)
     if system.net.forming.any():
         raise InputError("[cable] law: lines of form finding do not vibrate: take the scene that refweb.form makes")
@@ -165,7 +166,7 @@ def _at_rest(system):
 
 
 def _follow(result, rest, number, tell):
-    """Equilibrium and modes of one load step after the other."""
+    """Compute the equilibrium and the modes of each load step."""
     scene, remarks, totals = result.scene, Remarks(), dict(nsteps=0, nfev=0, njev=0, nlu=0)
     static = scene.solve.kind == "static"
     method, steps = (scene.solve.method, scene.solve.load_steps) if static else ("newton", (0.0,))
@@ -194,7 +195,7 @@ def _follow(result, rest, number, tell):
 
 
 def _results(computed):
-    """Frequencies of a spectrum by name; a result stands where the displacement of its shape is largest."""
+    """Frequencies of a spectrum by name; the position of each is that of the largest displacement of its shape."""
     values = zip(computed.frequency.tolist(), computed.error.tolist(), computed.nodes.tolist(), strict=True)
     return {
         f"frequency_{k}": Result(f, error, "Hz", computed.step, node) for k, (f, error, node) in enumerate(values, 1)

@@ -1,7 +1,7 @@
-"""K and M of a system at a displacement: how many ω² lie below a mark, and the vectors of the next ones, none missed.
+"""K and M of a system at a displacement: number of ω² below a limit, and the vectors of the next ones, none missed.
 
-Counts of negative pivots (Sylvester's law of inertia) say how many there are. The vectors come from Lanczos iteration
-on (K − σM)⁻¹ with σ just below those wanted, so that a thousand slack nodes cost nothing, and one more count says that
+The number follows from counts of negative pivots (Sylvester's law of inertia). The vectors come from Lanczos iteration
+on (K − σM)⁻¹ with σ just below the wanted ω², so that a thousand slack nodes cost nothing. One more count proves that
 none is missed, which matters where symmetry makes frequencies double. Nodes without mass have no frequency and follow
 the others.
 """
@@ -18,9 +18,9 @@ from ..errors import SolverError
 from ..system.factorization import Factor
 
 STRAIN, ROUNDING = 1e-12, 1e-15
-"""A direction without stiffness: a tension of `STRAIN` EA in all lines, or `ROUNDING` of EA/L at nodes, would rule."""
+"""Stiffness that counts as zero: that of a tension of `STRAIN` EA in all lines, plus `ROUNDING` times EA/L at nodes."""
 DENSE = 200
-"""Unknowns with mass up to which all pairs are found at once."""
+"""Number of unknowns with mass up to which all pairs are computed at once."""
 
 
 class Pencil:
@@ -29,27 +29,27 @@ class Pencil:
     Parameters
     ----------
     system : refweb.system.system.System
-        With a symmetric tangent.
+        System with a symmetric tangent.
     t : float
         Load step or time.
     x : ndarray, shape (rows, 3)
         Displacement [m].
     seed : int
-        Of the vector that the iteration starts from.
+        Seed of the start vector of the iteration.
 
     Attributes
     ----------
     K, M : sparse matrix, shape (unknowns, unknowns)
         Tangent [N/m] and mass [kg].
     massive, massless : ndarray of int
-        Unknowns with mass, and those without.
+        Unknowns with mass, and unknowns without.
     strained : sparse matrix, shape (unknowns, unknowns)
-        Stiffness across lines with a tension of EA each [N/m]; `STRAIN` of it counts as none.
+        Stiffness across lines with a tension of EA each [N/m]; `STRAIN` times it counts as zero.
 
     Raises
     ------
     SolverError
-        Where nothing has mass, or something has neither mass nor stiffness.
+        If no free node has mass, or an unknown has neither mass nor stiffness.
     """
 
     def __init__(self, system, t, x, seed):
@@ -88,12 +88,12 @@ class Pencil:
         self._inner = splu(self.K[self.massless][:, self.massless])
 
     def below(self, shift, ridge=0.0):
-        """Number of eigenvalues below a shift; K has ``ridge`` times what no stiffness means added."""
+        """Number of eigenvalues below a shift; ``ridge`` times the stiffness that counts as zero is added to K."""
         self._factor.update(self._stiffness - shift * self._mass + ridge * self._ridge)
         return self._factor.negative_pivots()
 
     def beside(self, low, sign):
-        """A shift of a sign with at most ``low`` eigenvalues below it; the next one is within 1.5 times the shift."""
+        """A shift of a sign with at most ``low`` eigenvalues below; the next is within 1.5 times the shift."""
         near, far = 1e-24 * self._top, self._top
         while far > 1.5 * near:
             middle = np.sqrt(near * far)
@@ -115,7 +115,7 @@ class Pencil:
         raise SolverError(f"no modes at step {self.t:g}: below ω² = {mark:.4g} 1/s² some modes are not found")
 
     def _nearest(self, shift, size, attempt):
-        """Eigenvalues next above a shift, as far as they are found, and their vectors."""
+        """Next eigenvalues above a shift, and their vectors; the iteration may miss some."""
         self._shift, self._solve, unknowns = shift, self._solver(shift), len(self.massive)
         mass = self.M[self.massive][:, self.massive]
         if unknowns <= DENSE or 3 * size >= unknowns:
@@ -154,16 +154,16 @@ class Pencil:
         return y[self.massive]
 
     def bend(self, shift):
-        """Displacement of the unknowns with mass under forces on them, K less ``shift`` M, as a function of forces."""
+        """Function from forces on unknowns with mass to their displacement, with the stiffness K − ``shift`` M."""
         self._shift, self._solve = shift, self._solver(shift)
         return self._flexible
 
     def follow(self, force):
-        """Displacement of the unknowns without mass under forces on them, all others held."""
+        """Displacement of the unknowns without mass under forces on them; all others are fixed."""
         return self._inner.solve(force)
 
     def moved(self, force):
-        """Displacement of the unknowns under a force, K less the last shift M."""
+        """Displacement of the unknowns under a force, with the stiffness K − shift M of the last shift."""
         return self._solver(self._shift)(force)
 
     def change(self, x):
@@ -171,7 +171,7 @@ class Pencil:
         return self.system.pattern.matrix(self.system.stiffness(self.t, x) - self._stiffness)
 
     def residual(self, squared, vectors):
-        """Norm of K φ − ω² M φ in M⁻¹ of each vector, those without mass following the others."""
+        """Norm of K φ − ω² M φ in M⁻¹ of each vector; unknowns without mass follow the others."""
         rest = self.K @ vectors - squared * (self.M @ vectors)
         ours = rest[self.massive]
         if self._inner is not None:

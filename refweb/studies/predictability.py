@@ -1,9 +1,9 @@
-"""Horizon of a motion: a second run starts a little beside the first.
+"""Horizon of a motion: growth of a small difference between two runs.
 
-A slack net is chaotic: the smallest difference grows, and at some time no digit of a position is left. The twin starts
-with every free unknown moved at random by up to `PERTURBATION` of the shortest element, and is solved with the same
-steps. Where the motions part says how errors of that size grow, rounding included, whatever the integrator. Behind the
-time at which less than one digit is left results are statistical: several runs have a mean and a spread, and no run has
+A slack net is chaotic: the smallest difference grows until no digit of a position is correct. A second run starts with
+every free unknown moved at random by up to `PERTURBATION` of the shortest element. It has the same steps. The
+separation of the two motions shows how errors of this size grow, rounding included, for any integrator. After the time
+at which less than one digit is left, results are statistical: several runs have a mean and a spread, and no run has
 more.
 """
 
@@ -25,13 +25,13 @@ def horizon(simulation, results, members=None, tell=None):
     Parameters
     ----------
     simulation : refweb.dynamics.simulation.Simulation
-        That of a motion which has been run.
+        Simulation of a motion that has been run.
     results : dict of str to refweb.results.solution.Result
         Its results.
     members : int, optional
-        Number of runs that mean and spread are taken of.
+        Number of runs for mean and spread.
     tell : callable, optional
-        Called with a text and the share that is done.
+        Called with a text and the finished share.
 
     Returns
     -------
@@ -72,12 +72,12 @@ def horizon(simulation, results, members=None, tell=None):
 
 
 def _integrator(simulation):
-    """Integrator of the accuracy that the simulation has come to."""
+    """Integrator with the final accuracy parameter of the simulation."""
     return simulation.integrator_at(simulation.standing.knob)
 
 
 def _beside(simulation, seed, size=PERTURBATION):
-    """The `Start` of the run of a seed, a little beside that of the simulation."""
+    """The `Start` of the run of a seed, at a small difference from that of the simulation."""
     system, x = simulation.system, simulation.begin.x
     x = np.zeros((system.rows, 3)) if x is None else x.copy()
     size *= system.net.natural_length.min()
@@ -86,12 +86,12 @@ def _beside(simulation, seed, size=PERTURBATION):
 
 
 def lost_digits(horizon, time):
-    """Number of digits that a difference of `PERTURBATION` has cost at a time [s]: its growth, as a power of ten."""
+    """Number of digits that a difference of `PERTURBATION` costs until a time [s]: the power of ten of its growth."""
     return 12 - max((k for k, when in horizon["digits"] if when is None or when > time), default=0)
 
 
 def ensemble(simulation, count, tell, size=PERTURBATION):
-    """Mean and standard deviation of each result over runs of different seeds, which start ``size`` apart."""
+    """Mean and standard deviation of each result over runs of different seeds, whose starts differ by ``size``."""
     watch, values = simulation.watch, []
     for seed in range(1, count + 1):
         integrator = _integrator(simulation)

@@ -1,9 +1,8 @@
-"""References of errors: of the finest runs of all methods, the two of different kinds that agree best.
+"""References of errors: the two finest runs of different kinds of methods that agree best.
 
-No method alone can set a reference. With one of the two all others are compared, and their difference is how far any
-error can be trusted. Where all finest runs are about as far apart, as they are where motions are chaotic, the best
-agreement may be luck, and the median difference counts. Where there are runs of one kind alone, the two finest of one
-method stand in.
+No method alone can be a reference. All runs are compared with one of the two, and smaller errors than the difference of
+the two mean nothing. If all finest runs differ by about as much, as in chaotic motions, the best agreement may be luck,
+and the median difference counts. If all runs are of one kind, the references are the two finest of one method.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 LUCK = 10.0
-"""Factor between the median difference of the finest runs and the least one, below which the least may be luck."""
+"""Median difference of the finest runs, over the least difference, below which the least may be luck."""
 
 
 def compare(trials):

@@ -1,14 +1,13 @@
-"""Natural frequencies about an equilibrium: the lowest pairs of K φ = ω² M φ, none missed, each with its bound.
+"""Natural frequencies about an equilibrium: the lowest pairs of K φ = ω² M φ, none missed, each with an error bound.
 
-K is the tangent at the equilibrium; across the lines of a net it is that of their tensions. Counts of eigenvalues, see
-`refweb.studies.pencil`, say first what there is: unstable directions, directions without stiffness, and the rest.
+K is the tangent at the equilibrium; across the lines of a net it is that of their tensions. First, eigenvalues are
+counted, see `refweb.studies.pencil`: unstable directions, directions without stiffness, and others.
 
-With M definite there is an eigenvalue within ‖Kφ − ω²Mφ‖ of ω², in the norm of M⁻¹ and with φᵀMφ = 1. To this bound
-come the rounding of K, and what the error that is left in the equilibrium changes in ω²: K is assembled once more after
-another Newton step.
+With M definite there is an eigenvalue within ‖Kφ − ω²Mφ‖ of ω², in the norm of M⁻¹ and with φᵀMφ = 1. The rounding of K
+and the error of the equilibrium are added to this bound. For the latter, K is assembled again after another Newton
+step.
 
-In a frame that turns K has the centrifugal force, and the modes are those of `refweb.studies.turning`, with Coriolis
-forces.
+In a rotating frame K includes the centrifugal force, and `refweb.studies.turning` finds the modes with Coriolis forces.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ class Spectrum:
         Displacements; the largest of a node is 1, and its largest component positive. Those of rotations of bodies are
         angles over it [rad/m].
     later : ndarray, shape (modes, rows, 3), optional
-        In a frame that turns, displacements a quarter of a period after those.
+        In a rotating frame, displacements a quarter of a period later.
     modal_mass : ndarray, shape (modes,)
         φᵀMφ of the shapes [kg]: a shape over its root is mass-normalised.
     shares : ndarray, shape (modes, 3)
@@ -69,7 +68,7 @@ class Spectrum:
 
     @property
     def frequency(self):
-        """√|ω²|/2π [Hz], shape (modes,); negative where ω² is, which is an imaginary frequency."""
+        """√|ω²|/2π [Hz], shape (modes,); negative, which stands for imaginary, where ω² is negative."""
         return _frequency(self.squared)
 
     @property
@@ -89,20 +88,20 @@ def spectrum(system, t, x, number, seed=0):
     Parameters
     ----------
     system : refweb.system.system.System
-        With a symmetric tangent.
+        System with a symmetric tangent.
     t : float
         Load step or time.
     x : ndarray, shape (rows, 3)
         Displacement of the equilibrium [m].
     number : int
-        Modes wanted; there are fewer where the net has fewer.
+        Number of modes; the net may have fewer.
     seed : int
-        Of the vector that the iteration starts from.
+        Seed of the start vector of the iteration.
 
     Raises
     ------
     SolverError
-        Where nothing that has mass has stiffness, or a node has neither.
+        If no unknown with mass has stiffness, or a node has neither.
     """
     pencil = Pencil(system, t, x, seed)
     if (turned := coriolis(system, x)) is not None:

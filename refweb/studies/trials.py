@@ -2,7 +2,7 @@
 
 A `Trial` is a method at one setting. The methods of dynamics are those of `refweb.registry.INTEGRATORS`, in all their
 `refweb.dynamics.integrators.integrator.Variant` s, and scipy's DOP853. They run with one probe, the observable, and
-without peaks, files or twin.
+without peaks, files or step refinement.
 """
 
 from __future__ import annotations
@@ -27,19 +27,20 @@ from ..results.state import State
 from . import dop853
 
 clock = time.process_time
-"""What tells how long a trial has taken, and when there is no time left for more [s]: CPU time, so that nothing depends
-on what else the machine has to do."""
+"""Clock of trials and of the budget [s]. It measures CPU time, so that results do not depend on the load of the
+machine."""
 SETTINGS = {
     "safety": (0.9, 0.5, 0.25, 0.125, 0.0625, 0.03125),
     "rtol": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
 }
-"""Values of an integrator's knob from coarse to fine, for methods that name none of their own."""
+"""Values of accuracy parameters from coarse to fine, for methods that do not name their own."""
 UNKNOWN = 12.0
-"""CPU time of the coarsest implicit run over that of the longest explicit steps, until it has run."""
+"""Expected CPU time of the coarsest implicit run, over that of the longest explicit steps."""
 OUTSIDE, CALL = 4.0, 5e-5
-"""Evaluations of the coarsest run of DOP853 over those of the longest explicit steps, and what each takes more [s]."""
+"""Evaluations of the coarsest run of DOP853 over those of the longest explicit steps, and additional time of each
+[s]."""
 PIECES = 100
-"""Smallest number of pieces of an implicit run, after each of which the clock is looked at."""
+"""Smallest number of parts of an implicit run; the clock is read after each."""
 
 
 class OverBudget(Exception):
@@ -48,23 +49,24 @@ class OverBudget(Exception):
 
 @dataclass(eq=False)
 class Trial:
-    """A method at one setting, and what came of it.
+    """A method at one setting, and its outcome.
 
     Attributes
     ----------
     method, key, value
         Method, and the key that is varied with its value.
     status : {"solved", "failed", "refused", "budget"}
-        Whether it solved; failed on the way; could not take the scene; or was left out for its price.
+        "failed": the run ended with an error. "refused": the method does not take the scene. "budget": the run was left
+        out or ended for its cost.
     message : str
-        Why, where it is not solved.
+        Reason if the trial is not solved.
     kind : str
-        What the method has in common with others whose errors may be alike.
+        Name that methods share if their errors may be alike.
     make : callable, optional
-        In dynamics makes the integrator of the method, of a system, probes and the key that is varied; in statics
-        solves, of the trial, a system, load steps and what is called with a line of text in between.
+        In dynamics, function of a system, probes and the varied key that returns the integrator. In statics, function
+        of the trial, a system, load steps and a callable for lines of text that yields the equilibria.
     cpu_s : float
-        CPU time of the solver's loop [s], compiled before.
+        CPU time of the solver's loop [s], without compiling.
     values : ndarray, shape (rows,)
         The observable at the history rows, or load steps.
     x : ndarray, shape (rows of the system, 3)
@@ -103,7 +105,7 @@ class Ladder(NamedTuple):
     settings : tuple of float
         Its values from coarse to fine.
     kind : str
-        What the method has in common with others whose errors may be alike.
+        Name that methods share if their errors may be alike.
     make : callable, optional
         See `Trial`.
     """
@@ -132,7 +134,7 @@ scene's own."""
 
 
 def _variants(name):
-    """The `Variant` s of a method of the table by what they are called; one, of its own name, where it lists none."""
+    """The `Variant` s of a method by name; one with the name of the method if it lists none."""
     return getattr(load(INTEGRATORS[name].integrator), "variants", {name: Variant()})
 
 
@@ -178,11 +180,11 @@ class Dynamics:
     Parameters
     ----------
     scene : refweb.Scene
-        What moves, and for how long.
+        Scene of the trials, with its duration.
     system : refweb.system.system.System
-        What acts.
+        The system.
     observable : refweb.Observe
-        What is compared at the history rows.
+        Observable that is compared at the history rows.
     """
 
     def __init__(self, scene, system, observable):
@@ -194,7 +196,7 @@ class Dynamics:
         self._ahead = {}  # evaluations of each trial
 
     def compile(self, trial):
-        """Take a step with the integrator of a trial; raises an `InputError` where it does not take the scene."""
+        """Take a step with the integrator of a trial; raise an `InputError` if it does not take the scene."""
         if trial.make is None:
             dop853.Dop853(self.system, self.begin)
             return
@@ -211,10 +213,10 @@ class Dynamics:
         return with_breaks(make, self.system, self.probes)
 
     def expected(self, trial):
-        """Estimate of the CPU time of a trial before any of its method has run [s].
+        """Expected CPU time of the first trial of a method [s].
 
-        That of explicit steps, by the last of them that have run; of implicit ones, whose number nobody knows before, a
-        guess that gives them their turn.
+        The time of explicit steps follows from the last explicit run. The number of implicit steps is not known before
+        a run; their time is a guess that gives them a turn.
         """
         price = self._per_evaluation or step_price(self.system)
         if ahead := self._evaluations(trial):
@@ -224,7 +226,7 @@ class Dynamics:
         return OUTSIDE * longest * (1.0 + CALL / price) if trial.make is None else UNKNOWN * longest
 
     def _evaluations(self, trial):
-        """Evaluations of forces of a trial, None where only a run can tell."""
+        """Number of evaluations of forces of a trial; None if only a run can tell."""
         if trial not in self._ahead:
             integrator = None if trial.make is None else self._integrator(trial)
             known = getattr(integrator, "evaluations", None)
@@ -232,7 +234,7 @@ class Dynamics:
         return self._ahead[trial]
 
     def run(self, trial, deadline):
-        """Run a trial; raises what its method raises, and `OverBudget` at the ``deadline`` of the `clock`."""
+        """Run a trial; raise the errors of its method, and `OverBudget` at the ``deadline`` of the `clock`."""
         if trial.make is None:
             self._run_outside(trial, deadline)
             return
@@ -267,7 +269,7 @@ class Statics:
         self.scene, self.system, self.observable = scene, system, observable
 
     def expected(self, trial):
-        """Nothing is known before a run."""
+        """Expected CPU time of a trial [s]: 0, since nothing is known before a run."""
         return 0.0
 
     def compile(self, trial):
@@ -276,19 +278,19 @@ class Statics:
             self._solved(trial, self.scene.solve.load_steps[:1], math.inf)
 
     def run(self, trial, deadline):
-        """Run a trial; raises what its method raises, and `OverBudget` at the ``deadline`` of the clock."""
+        """Run a trial; raise the errors of its method, and `OverBudget` at the ``deadline`` of the clock."""
         states, stats = self._solved(trial, self.scene.solve.load_steps, deadline)
         trial.values, trial.x = np.array([self.observable.value(state).value for state in states]), states[-1].x
         trial.work = {key: sum(spent[key] for spent in stats) for key in trial.work}
 
     def _system(self, trial):
-        """The scene's system, or that of another smoothing."""
+        """The scene's system, or its system with another smoothing."""
         if trial.key != "smoothing":
             return self.system
         return self.scene.replace(cable=replace(self.scene.cable, law="smooth", smoothing=trial.value)).build()
 
     def _solved(self, trial, steps, deadline):
-        """States of a trial, and what each took; notes the CPU time."""
+        """States of a trial, and the statistics of each; record the CPU time."""
         system, began, states = self._system(trial), clock(), []
         for equilibrium in trial.make(trial, system, steps, lambda text: _check(deadline)):
             states.append(equilibrium)

@@ -1,18 +1,18 @@
-"""Frequencies in a frame that turns, with Coriolis forces: pairs of (K + iωG − ω²M) φ = 0.
+"""Frequencies in a rotating frame, with Coriolis forces: pairs of (K + iωG − ω²M) φ = 0.
 
-G = 2 m Ω × is antisymmetric, so that iG is Hermitian; frequencies come in pairs ±ω with conjugate shapes, of which
-those above 0 are listed. Where K, which has the centrifugal force, is positive definite, all of them are real: with
-u = (φ, ωφ) they are those of a definite pencil [1]_,
+G = 2 m Ω × is antisymmetric, so that iG is Hermitian. Frequencies come in pairs ±ω with conjugate shapes; those above 0
+are listed. K includes the centrifugal force. If K is positive definite, all frequencies are real. With u = (φ, ωφ) they
+are those of a definite pencil [1]_,
 
     B u = 1/ω A u,        A = [K 0; 0 M],        B = [−iG M; M 0],
 
-and as many lie between 0 and s as K + isG − s²M has negative pivots. With the residual r = (K + iωG − ω²M) φ there is
-one whose 1/ω is within |r|/ω, in the norm of K⁻¹, over that of u in A.
+and the number between 0 and s is the number of negative pivots of K + isG − s²M. With the residual r = (K + iωG − ω²M)
+φ, there is a frequency whose 1/ω is within |r|/ω, in the norm of K⁻¹, over the norm of u in A.
 
-Where K is not definite, Coriolis forces may hold what K does not: a free mass has K = −mΩ² and goes straight ahead,
-which is ω = Ω, double and of one shape. Such nets are solved as a whole, by all eigenvalues of the first order system,
-as far as they are `MOST` unknowns. What changes κ = φ*Kφ by e then changes ω, a root of κ + ωγ − ω²μ = 0, by no more
-than the root δ of μδ² + √(γ² + 4κμ) δ = e; that is an estimate, which takes shapes to be good.
+If K is indefinite, Coriolis forces may stabilise the equilibrium. For example, a free mass has K = −mΩ² and moves in a
+straight line, which is a double frequency ω = Ω with one shape. For such nets of up to `MOST` unknowns, all eigenvalues
+of the first order system are computed. Here ω is a root of κ + ωγ − ω²μ = 0. A change of κ = φ*Kφ by e changes ω by at
+most the root δ of μδ² + √(γ² + 4κμ) δ = e. This is an estimate, which takes the shapes as exact.
 
 References
 ----------
@@ -34,24 +34,24 @@ from ..system.factorization import negative_pivots
 from .pencil import DENSE
 
 MOST = 1500
-"""Unknowns with mass up to which nets are solved as a whole where K is not definite; that many take some minutes."""
+"""Number of unknowns with mass up to which nets with indefinite K are solved; so many take some minutes."""
 SMALL = 1e-7
-"""Rate that counts as none, over the largest: the root of what rounding leaves of it squared."""
+"""Rate that counts as zero, over the largest rate: the square root of the rounding of its square."""
 
 
 class Pairs(NamedTuple):
-    """Pairs of a pencil in a frame that turns.
+    """Pairs of a pencil in a rotating frame.
 
     Attributes
     ----------
     squared, bound : ndarray, shape (modes,)
-        ω² [1/s²], negative of a rate of growth where there is one, and the bound on its error.
+        ω² [1/s²], or minus the square of a rate of growth, and the bound on its error.
     residual : ndarray, shape (modes,)
         |(K + iωG − ω²M) φ| in the norm of M⁻¹, with φ*Mφ = 1 [1/s²].
     vectors : ndarray of complex, shape (unknowns, modes)
         Shapes.
     unstable, zero : int
-        Number of modes that grow, and of directions that nothing drives.
+        Number of modes that grow, and of directions without restoring force.
     """
 
     squared: np.ndarray
@@ -81,7 +81,7 @@ def coriolis(system, x):
 
 
 class Gyroscopic:
-    """K, M and G of a pencil in its unknowns with mass; those without follow.
+    """K, M and G of a pencil in its unknowns with mass; unknowns without mass follow.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class Gyroscopic:
         self._weigh = splu(csc_matrix(self.M))
 
     def stiffness(self):
-        """K of the unknowns with mass, the others in equilibrium with them, a dense matrix."""
+        """Dense K of the unknowns with mass; the others are in equilibrium with them."""
         K, pencil = csc_array(self.pencil.K), self.pencil
         massive_stiffness = K[pencil.massive][:, pencil.massive].toarray()
         if len(pencil.massless):
@@ -117,7 +117,7 @@ class Gyroscopic:
 
     @staticmethod
     def form(matrix, vectors):
-        """φ*Aφ of each vector, of a symmetric matrix."""
+        """φ*Aφ of each vector φ, with a symmetric matrix A."""
         return (vectors.conj() * (matrix @ vectors)).sum(axis=0).real
 
     def forms(self, vectors):
@@ -125,7 +125,7 @@ class Gyroscopic:
         return self.form(self.pencil.K, vectors), (vectors.conj() * (1j * (self.G @ vectors))).sum(axis=0).real
 
     def rest(self, rates, vectors):
-        """(K + λG + λ²M) φ of the unknowns with mass, where those without have none."""
+        """(K + λG + λ²M) φ of the unknowns with mass; it is zero for those without."""
         rest = self.pencil.K @ vectors + rates * (self.G @ vectors) + rates**2 * (self.pencil.M @ vectors)
         return rest[self.pencil.massive]
 
@@ -135,7 +135,7 @@ class Gyroscopic:
         return np.sqrt(np.maximum((rest.conj() * inverse).sum(axis=0).real, 0.0))
 
     def below(self, omega):
-        """Number of frequencies between 0 and one, of a definite K."""
+        """Number of frequencies between 0 and ``omega``, for a definite K."""
         real = self.pencil.K - omega**2 * self.pencil.M
         turned = omega * self.G
         both = csc_matrix(triu(block_array([[real, -turned], [turned, real]]), format="csc"))
@@ -143,7 +143,7 @@ class Gyroscopic:
 
 
 def turning_pairs(pencil, G, number, lower):
-    """The lowest `Pairs` of a net in a frame that turns, those that grow first.
+    """The lowest `Pairs` of a net in a rotating frame; modes that grow come first.
 
     Parameters
     ----------
@@ -152,14 +152,14 @@ def turning_pairs(pencil, G, number, lower):
     G : sparse matrix
         That of `coriolis`.
     number : int
-        Pairs wanted; there are as many as unknowns with mass.
+        Number of pairs; there are as many as unknowns with mass.
     lower : callable
-        Of vectors: what rounding and the error of the equilibrium make of φ*Kφ [1/s²].
+        Function of vectors: error of φ*Kφ [1/s²] by rounding and by the error of the equilibrium.
 
     Raises
     ------
     SolverError
-        Where some stay unfound, or K is not definite and there are too many unknowns.
+        If some pairs are not found, or K is indefinite and there are too many unknowns.
     """
     gyroscopic = Gyroscopic(pencil, G)
     if pencil.below(0.0, -1.0) == 0:
@@ -248,7 +248,7 @@ def _some(gyroscopic, wanted, solve, attempt):
 
 
 def _general(gyroscopic, number, lower):
-    """All pairs of the first order system; what grows less than `SMALL` of the fastest rate does not grow."""
+    """All pairs of the first order system; a growth below `SMALL` of the fastest rate counts as zero."""
     gyroscopic.pencil.bend(gyroscopic.pencil.beside(gyroscopic.pencil.below(0.0, -1.0), 1.0))
     root = scipy.linalg.cholesky(gyroscopic.M.toarray(), lower=True)
 

@@ -1,8 +1,8 @@
 """Work and precision: every method on one scene, its errors against its CPU time.
 
-Trials of all methods, from coarse to fine, run within a budget, see `refweb.studies.budget`. Errors are differences to
-one of two references of different kinds, see `refweb.studies.references`; where there are runs of one kind alone, that
-is said.
+Trials of all methods, from coarse to fine, run within a budget, see `refweb.studies.budget`. Errors are differences
+from one of two references of different kinds, see `refweb.studies.references`. A message says if all runs are of one
+kind.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ def cost(
     Parameters
     ----------
     scene : Scene, path-like or str
-        A scene, a scene file or the name of a scene shipped with refweb. Its events and twins are left out.
+        A scene, a scene file or the name of a scene shipped with refweb. Its events and step refinements are left out.
     observe : str, optional
-        Name of the observable that errors are of: a nodal quantity, one of lines, or the slack fraction; by default
-        the first of the scene that is one.
+        Name of the observable whose errors are compared: a nodal quantity, one of lines, or the slack fraction. The
+        default is the first of these in the scene.
     budget : float
-        CPU time that all of it may take [s]; runs have at least half of it, however long kernels take to compile.
+        CPU time of the whole study [s]; runs have at least half of it, however long kernels take to compile.
     out : path-like, optional
         Result folder; without it nothing touches the disk.
     force : bool
@@ -57,7 +57,7 @@ def cost(
     InputError
         For wrong input; nothing has been written.
     SolverError
-        Where no method solves the scene.
+        If no method solves the scene.
     """
     clock, began = Clock(), trials.clock()
     budget = checked("budget", budget, real(above=0, unit="s"))
@@ -93,7 +93,7 @@ def cost(
 
 
 def _observable(scene, name):
-    """Observable of a name, or the first that the state of an instant alone determines."""
+    """Observable of a name; by default the first that the state at an instant determines."""
     if name is None:
         return next(o for o in (*scene.observables, *default()) if not (o.observable.booked or o.average))
     names = {o.name: o for o in scene.observables}

@@ -4,6 +4,6 @@ A study says which values of a scene vary (`refweb.sweeps.study`); its cases fol
 (`refweb.sweeps.design`). A case is a scene and nothing else: it is run wherever there is a worker
 (`refweb.sweeps.case`, `refweb.sweeps.workers`), and what comes back is a row of ``results.csv``
 (`refweb.results.case_rows`). A row is known by the content of its scene, so that a study that goes on, or one whose
-parameters have changed, runs what is missing and nothing else (`refweb.sweeps.sweep`). What rows say together, spread
-and numerical ± apart, says `refweb.sweeps.chances`.
+parameters have changed, runs what is missing and nothing else (`refweb.sweeps.sweep`). `refweb.sweeps.chances`
+evaluates all rows together, with spread and numerical ± apart.
 """

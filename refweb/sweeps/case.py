@@ -1,7 +1,7 @@
 """A case where it is run: a `Job` comes in, and its `Outcome` goes out, and no disk is shared.
 
-The process may be anywhere. What it needs of files travels with the job, and what a run leaves travels back: as cells
-of a row, as its ``run.json``, or its result folder as one archive.
+The process may be anywhere. The files that it needs travel with the job. The outcome travels back: as cells of a row,
+as ``run.json``, or as one archive of the result folder.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ class Job(NamedTuple):
     Attributes
     ----------
     key : str
-        What the case is known by.
+        Key of the case.
     given : dict
         Its scene as a file would have it.
     folder, file : str
         Where paths in it start, and what it is called in messages.
     keeps : {"none", "json", "all"}
-        What is to come back besides cells.
+        Data to return besides cells.
     home : tuple
         Machine and process that sent it.
     files : dict
@@ -165,8 +165,9 @@ def unpacked(content, folder):
 def cells_of(summary):
     """Cells of a row from the content of a ``run.json``: results and, where none has their names, those of a throw.
 
-    What is inside or closed is 1 or 0 as this run has it, and anything from 0 to 1 where ± leaves it undecided. What
-    the twin tells nothing of is one draw of many, as are results behind the horizon.
+    A statement of a throw, such as "inside", is 1 or 0 as in this run; it may be anything from 0 to 1 where ± leaves it
+    undecided. Results after the horizon are one draw of many. So are numbers of a throw for which the step-refinement
+    run shows no ±.
     """
     cells = {"status": summary["status"], "message": summary["message"]}
     horizon = summary.get("horizon") or {}

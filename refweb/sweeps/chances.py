@@ -40,7 +40,7 @@ def chances(study, rows, columns, names):
     Parameters
     ----------
     study : Study
-        What was asked.
+        The study.
     rows : sequence of (Case, dict)
         Cases with their rows.
     columns : sequence of str

@@ -38,7 +38,7 @@ class Case(NamedTuple):
     part : str
         Of Sobol's indices, which matrix of samples it is of: "A", "B", or the path in which A has a column of B.
     key : str
-        What tells its scene apart from all others; empty of a case that is skipped.
+        Key of the content of its scene; empty for a skipped case.
     given : dict, optional
         Its scene as a file would have it.
     """

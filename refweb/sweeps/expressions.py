@@ -93,7 +93,7 @@ FUNCTIONS = {
     "min": lambda *all: Interval(min(value.low for value in all), min(value.high for value in all)),
     "max": lambda *all: Interval(max(value.low for value in all), max(value.high for value in all)),
 }
-"""What a condition may call."""
+"""Functions that a condition may call."""
 _SUMS = {
     ast.Add: lambda a, b: Interval(a.low + b.low, a.high + b.high),
     ast.Sub: lambda a, b: Interval(a.low - b.high, a.high - b.low),

@@ -181,9 +181,9 @@ class Study(Table):
     scene : str
         A scene file, relative to the study, or the name of a scene shipped with refweb.
     parameters : dict
-        What varies, by the paths of ``--set``: a list of cases, of vectors as well; ``{ from, to, count, spacing }``,
-        ``spacing = "log"`` being that of equal ratios; or ``{ distribution, ... }`` by the names that scipy.stats has
-        for distributions and their parameters.
+        Values that vary, by the paths of ``--set``: a list of values, also of vectors; ``{ from, to, count, spacing
+        }``, with equal ratios for ``spacing = "log"``; or ``{ distribution, ... }`` with the names of scipy.stats for
+        distributions and their parameters.
     title : str
         Title, by default the name of the file. Results go to a folder of that name.
     sample : {"grid", "zip", "random", "sobol", "halton", "latin-hypercube"}
@@ -196,7 +196,7 @@ class Study(Table):
     skip : str, optional
         A condition on the parameters: cases of which it holds are not run.
     keep : {"none", "json", "all"}
-        Whether a run leaves its row alone, its ``run.json`` as well, or its whole result folder.
+        Data that are kept of each run: its row alone, also its ``run.json``, or its whole result folder.
     conditions : dict
         Conditions on results and parameters by name, of which the share of the cases is told, and of samples the
         probability. Arithmetic in them carries ± along. A case that ± leaves undecided is neither true nor false: such
@@ -212,8 +212,9 @@ class Study(Table):
     Raises
     ------
     InputError
-        For wrong parameters, samples without a count or without anything to sample, distributions on a grid, lists of
-        different lengths in a zip, and indices of other samples than "sobol", or of a count that is no power of 2.
+        For wrong parameters, samples without a count or without a distribution or range, and distributions on a grid.
+        For lists of different lengths in a zip. For indices with other samples than "sobol", or with a count that is no
+        power of 2.
 
     Examples
     --------

@@ -26,13 +26,13 @@ class Sweep:
     Attributes
     ----------
     study : refweb.sweeps.study.Study
-        What was asked.
+        The study.
     rows : list of dict
         A row for each case, in the order of the cases: cells by column, None where nothing is known.
     columns : list of str
         Names of the columns, see `refweb.results.case_rows`.
     chances : list of dict
-        What the rows say together, see `refweb.sweeps.chances.chances`.
+        Evaluation of all rows together, see `refweb.sweeps.chances.chances`.
     title : str
         Title of the scene.
     status : {"running", "solved", "failed", "interrupted"}
@@ -40,10 +40,10 @@ class Sweep:
     message : str
         Why it has not ended, else empty.
     warnings : list of str
-        What a reader has to know.
+        Warnings on the results.
     cost : dict of str to float
-        What this start of it took [s], ``cpu_s`` without that of its workers; of all rows ``cases_cpu_s`` and, of
-        that, ``cases_compile_s``.
+        Times of this start of the study [s], ``cpu_s`` without its workers; ``cases_cpu_s`` of all rows, and
+        ``cases_compile_s``, the part of compiling.
     path : pathlib.Path, optional
         Its folder.
     """

@@ -1,8 +1,8 @@
 """A study from start to end: what is there already, what is missing, and the folder that grows by whole rows.
 
-The folder of a study is in a state to go on from at every moment. What a case leaves is put into its place before its
-row is, and rows are appended whole, so that a study that is killed has lost what its workers had in their hands, and
-nothing else. A row is known by the content of its scene: it is found again by whichever study asks for it.
+A study can go on from the state of its folder at every moment. The files of a case are put into their place before its
+row is appended, and rows are appended whole. Therefore a study that is killed loses the cases that its workers were
+running, and nothing else. A row is known by the content of its scene: it is found again by whichever study asks for it.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def sweep(
         A scene, a scene file or the name of a scene shipped with refweb. Without parameters the file of a study, the
         name of one shipped with refweb, or a `refweb.Study`.
     parameters : dict, optional
-        What varies by path, as in a study: ``{"body.0.velocity": [[0, 0, 1], [0, 0, 2]]}``.
+        Values that vary by path, as in a study: ``{"body.0.velocity": [[0, 0, 1], [0, 0, 2]]}``.
     out : path-like, optional
         Folder of the study; one that holds rows of a study goes on with what is missing. Without it nothing touches the
         disk.

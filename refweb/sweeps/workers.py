@@ -1,8 +1,8 @@
 """Workers of cases: processes of this machine, or any `concurrent.futures.Executor`, whose workers may die.
 
 `through` hands jobs out and yields what comes of them, each once. A worker that dies takes with it whatever it was
-doing. What was in its hands is then tried again, one job at a time, so that one that kills its worker is told from
-those that were only near it; it is given up when it has done so `TRIES` times.
+doing. Its jobs are then tried again, one at a time, so that a job that kills its worker is told from the jobs that ran
+beside it. A job that has killed `TRIES` workers is given up.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def through(jobs, workers):
     Parameters
     ----------
     jobs : iterable of Job
-        What is to be run.
+        Jobs to run.
     workers : Processes or Given
         Who runs it; told to stop in the end, also where that comes early.
 

@@ -19,7 +19,7 @@ class Breaks(NamedTuple):
     times : ndarray
         When each broke [s].
     energies : ndarray
-        What each held, and what ended with it [J].
+        Energy that each had stored, with the energy of forces that ended with it [J].
     places : ndarray, shape (breaks, 3)
         Where its middle was [m].
     widths : ndarray
@@ -47,7 +47,7 @@ def torn(system, elements, energies):
     elements : ndarray of int
         Elements.
     energies : ndarray
-        What each held [J].
+        Rupture energy of each [J].
 
     Raises
     ------
@@ -117,8 +117,8 @@ def _without(term, data, ends):
 def tear(system, t, x, v, elements):
     """(The system with more of its elements broken, what each held [J]), at displacement x, velocity v and time t.
 
-    What ends is the energy of the system less that of the torn one; of several that break together each has its share
-    of that by what it held itself.
+    The energy that ends is that of the system less that of the torn system. Elements that break together share it in
+    proportion to the energy that each stored.
     """
     energy = sum(system.energy_of(f, t, x)[elements] for f in system.terms if f.over_lines and f.energy is not None)
     stored = [f for f in system.terms if f.balance.column not in ("work", "dissipated_energy")]

@@ -2,9 +2,9 @@
 
 Conjugate gradients on A y = b, with a factorization of M in place of M⁻¹, converge as √κ allows, κ the condition of
 M⁻¹A: between two load steps of a web, whose tensions differ by a factor of two or three, a solution to 1 % takes two or
-three of them. Each costs a ninth (rslab) to a thirtieth (SuperLU) of a factorization at 118 803 unknowns. What they do
-not reach in a few iterations a factorization of A itself does at less cost, and where A or M shows a direction without
-stiffness only that tells more: both end the iteration.
+three of them. Each costs a ninth (rslab) to a thirtieth (SuperLU) of a factorization at 118 803 unknowns. Where a few
+iterations are not enough, a factorization of A itself costs less. Where A or M shows a direction without stiffness,
+only a factorization tells more. Both cases end the iteration.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 class Found(NamedTuple):
     """Solutions of A y = b, shape (n,) or (n, k).
 
-    What is ``left`` of them is √(rᵀM⁻¹r) over that of b, the largest of all k; ``enough`` says whether that is within
+    ``left`` is √(rᵀM⁻¹r) of the residual r over that of b, the largest of all k; ``enough`` says whether it is within
     the tolerance.
     """
 
@@ -37,7 +37,7 @@ def solve(times, precondition, b, tolerance, limit):
     b : ndarray, shape (n,) or (n, k)
         Right-hand sides.
     tolerance : float
-        What may be left.
+        Largest ``left`` that is enough.
     limit : int
         Largest number of iterations. It ends before where those so far show that they will not do.
 

@@ -1,9 +1,9 @@
 """Contact of bodies: its force on each, the depth of lines in each, and the depth of pairs in each other.
 
 Each contact shows, in its cell, how deep it is and the force on the body that it touches, where two bodies touch that
-on the second of them, see `refweb.effects.base.ContactForce.felt`. What a body feels is the sum over its cells, and
-nothing else is: where nothing touches it, that is zero whatever else acts. One kernel sums for all: over the cells that
-are near in a step of the compiled loop, over all in a state.
+on the second of them, see `refweb.effects.base.ContactForce.felt`. The contact force on a body is the sum over its
+cells alone: it is zero where nothing touches the body, whatever else acts. One kernel computes this sum for all bodies:
+over the near cells in a step of the compiled loop, over all cells in a state.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class ContactForces:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        The system.
 
     Attributes
     ----------

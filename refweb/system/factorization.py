@@ -1,13 +1,13 @@
-"""Factorizations of tangents: LDLᵀ, whose D shows the signs of the pivots, and LU of what is not symmetric.
+"""Factorizations of tangents: LDLᵀ, whose D has the signs of the pivots, and LU of matrices that are not symmetric.
 
-Three libraries make LDLᵀ. qdldl goes column by column and is the fastest of those that are always there as long as the
-factor stays in the cache: a factorization of a square web takes 15 ms with it and 27 ms with SuperLU, of scipy, at 7203
-unknowns, 0.46 and 0.18 s at 29 403, 4.6 and 1.4 s at 118 803, on a CPU with 8 MB of cache. SuperLU makes LU; where all
-its pivots are on the diagonal, U is D Lᵀ. It is taken from `LARGEST` unknowns on. rslab (``pip install
-'refweb[fast]'``) works on blocks of columns as well, and keeps its ordering: five load steps of a square web from flat
-take 9.4 s CPU with qdldl and 3.8 s with rslab at 29 403 unknowns, 1.8 and 1.4 s at 10 443; at 4563 factorizations cost
-the same. It is taken from `LARGE` unknowns on, where it is installed. It is young: where the residual of a solution or
-the signs of its pivots are wrong, qdldl takes its place for the rest of the run, and the run says so.
+Three libraries compute LDLᵀ. qdldl works column by column, and is fast while the factor fits into the cache. SuperLU of
+scipy computes LU; if all its pivots are on the diagonal, U is D Lᵀ. It is used from `LARGEST` unknowns on. On a CPU
+with 8 MB of cache, a factorization of a square web takes 15 ms with qdldl and 27 ms with SuperLU at 7203 unknowns. It
+takes 0.46 and 0.18 s at 29 403, and 4.6 and 1.4 s at 118 803. rslab (``pip install 'refweb[fast]'``) works on blocks of
+columns, and keeps its ordering. It is used from `LARGE` unknowns on, if it is installed. Five load steps of a square
+web from flat take 9.4 s CPU with qdldl and 3.8 s with rslab at 29 403 unknowns, 1.8 and 1.4 s at 10 443; at 4563
+factorizations cost the same. rslab is a young library: if the residual of a solution or the signs of its pivots are
+wrong, qdldl replaces it for the rest of the run, with a finding.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Library:
     Parameters
     ----------
     asked : {"auto", "qdldl", "superlu", "rslab"}
-        What the scene asks for.
+        Library that the scene asks for.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ class Pattern:
     cells : list of ndarray of int32, shape (cells, arity)
         One entry per term with stiffness.
     library : refweb.system.factorization.Library
-        What factorizes symmetric matrices.
+        Library that factorizes symmetric matrices.
     also : list of ndarray of int32, shape (cells, arity)
         Other cells that are coupled, by what is no term.
 

@@ -1,4 +1,4 @@
-"""A system as statics sees it."""
+"""The system of statics: free bodies are fixed, and forces that need velocity are left out."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ Where effects prescribe natural lengths, the numbers of the lines are a function
 force and energy asks for those of its own t, and `System.at` is the system as it stands at one time. The net is as
 built throughout. A loop of kernels, which cannot ask, keeps an array of its own and sets lengths in that.
 
-What is evaluated is written to arrays of the caller, by default new ones, so that threads may share a system.
+Values are written to arrays of the caller, by default new ones, so that threads may share a system.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class System:
     supported : ndarray of bool, shape (nodes, 3)
         Components of nodes that do not move, or move as prescribed.
     factorization : {"auto", "qdldl", "superlu", "rslab"}
-        What factorizes its symmetric matrices.
+        Library that factorizes its symmetric matrices.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class System:
     constraints : list of refweb.effects.base.Constraint
         One per effect that keeps distances; no force of the system holds them.
     weakness : refweb.effects.base.Weakness or None
-        Which elements break; None where none does.
+        Limits of elements that may break; None if no element breaks.
     carried : ndarray of bool, shape (rows,)
         Nodes that free bodies carry: those move with these.
     free : ndarray of int
@@ -382,7 +382,7 @@ class System:
     def balance(self, t, x, v):
         """`Forces` with those of links; on supports less those that consistent mass takes to move.
 
-        What supports give is its negative.
+        The reaction of supports is its negative.
         """
         force, per_cell = self.forces(t, x, v)
         if self.constraints:

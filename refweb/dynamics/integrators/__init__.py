@@ -55,6 +55,6 @@ An implicit method finds K = −∂f/∂x and C = −∂f/∂v by ``self.system.
 ``self.system.mass.matrix``, all over the free unknowns. Tangents and factorizations of its own it counts in
 ``self.stats``, as ``njev`` and ``nlu``. ``self.force`` is f, and ``self.acceleration`` M⁻¹f. A method says by
 ``takes_massless`` and ``takes_links`` that its equations have a place for nodes without mass and rigid links, and
-by ``restarts`` that it is to begin anew at corners. What else there is to say about an integrator, also one that takes
-steps by another key than rtol, is in `refweb.dynamics.integrators.integrator.Integrator`.
+by ``restarts`` that it is to begin anew at corners. `refweb.dynamics.integrators.integrator.Integrator` describes all
+attributes of an integrator, also of one that chooses steps by another key than rtol.
 """

@@ -1,16 +1,17 @@
-"""Means of values over windows that slide along a run.
+"""Means of values over windows that move along a run.
 
 The mean of a value q over the window of length w that ends at t is (I(t) − I(t − w))/w, with I the integral of q. I and
-q are kept at `CELLS` times of a window, spaced evenly from t = 0 on, whatever the steps are; at any other time the
-cubic through I and its rate q at the ends of a cell tells I. In a step q is a polynomial: linear where the motion is of
-order 2, else of degree 4 through its values at `PARTS` equal parts. What that leaves open, see `open_share`, is summed
-beside the integral: ± is no less than that of the window. A method that tells the motion at any time halves steps that
-leave open more than `SETTLED`.
+q are stored at `CELLS` times of a window, evenly spaced from t = 0 on, for any steps. At other times I follows from the
+cubic through I and its rate q at the ends of a cell. In a step q is a polynomial: linear if the motion is of order 2,
+else of degree 4 through its values at `PARTS` equal parts. The error of this polynomial, see `open_share`, is summed
+beside the integral, and ± is at least this sum over the window. A method with dense output halves steps with an error
+above `SETTLED`.
 
-Before t = w the mean is that of what has passed, I(t)/t, and the value itself at t = 0. Largest and smallest means are
-those of full windows alone. They are looked for at the ends of cells, at rows and, where the rate of the mean,
-(q(t) − q(t − w))/w, changes its sign between two of these, on the cubic through means and rates there. What that is off
-the parabola through the rates is kept as correction: ± is no less. It shows what many steps in a cell leave open.
+Before t = w the mean is that over the time so far, I(t)/t, and the value itself at t = 0. Largest and smallest means
+are those of full windows alone. They are searched at the ends of cells and at rows. If the rate of the mean, (q(t) −
+q(t − w))/w, changes its sign between two of these, the cubic through means and rates is searched as well. Its
+difference from the parabola through the rates is stored as correction, and ± is at least this. It shows the error by
+many steps in a cell.
 """
 
 from __future__ import annotations
@@ -77,9 +78,9 @@ class Averages(Record):
     integral : ndarray, shape (averaged,)
         Integral at the last look, but for the same constant.
     opens : ndarray, shape (averaged, CELLS + 1)
-        What the integrals of all steps before those at the ends of the last cells leave open.
+        Sum of the errors of all steps until the ends of the last cells.
     open : ndarray, shape (averaged,)
-        The same of all steps.
+        Sum of the errors of all steps.
     within : ndarray, shape (averaged, PARTS + 1)
         Value at the last look, then at the ends of equal parts of the step behind it.
     latest : ndarray, shape (averaged, 2)

@@ -1,22 +1,21 @@
 """Continuous collision detection: each drift of an explicit step is checked before it is taken.
 
-In a drift rows move in straight lines, behind the kick that gives them their velocities. Lines whose overlap and the
-way by which two rows may come nearer are together less than the distance of touch cannot meet. Where they are not, the
-pairs of lines are looked at one by one, see `refweb.effects.self_contact.line_line_ccd`: a step in which two would meet
-is not taken but cut to `SHORTER` of it, until the next row or corner of a table. Where less than `LEAST` of the step
-that is stable is left, the run ends. Of neighbours along the net, which do not push each other, it is told when the
-first two meet.
+In a drift rows move in straight lines, with the velocities of the kick before. Lines cannot meet if their overlap plus
+the largest approach of two rows is less than the distance of contact. Else the pairs of lines are checked one by one,
+see `refweb.effects.self_contact.line_line_ccd`. A step in which two lines would meet is rejected and cut to `SHORTER`
+of its size, until the next row or corner of a table. The run ends if the step falls below `LEAST` of the stable step.
+Neighbours along the net do not push each other; the time at which the first two meet is reported.
 
-A look finds how far rows may go until another is due: as long as the ways of drifts are less together, none is taken.
+A check finds how far rows may move until the next check is needed; there is none while the sum of drifts is less.
 
-A step of higher order has several drifts, and cannot be taken back behind the first. It is looked at before as if it
-were one of order 2, and cut likewise; what comes through in one of its drifts nevertheless is told of.
+A step of higher order has several drifts, and cannot be rejected after the first. It is checked in advance as a step of
+order 2, and cut in the same way. Lines that pass in one of its drifts nevertheless are reported.
 
-Bodies keep lines out of their middle in the same way, see `refweb.effects.contact.line_body_ccd`: the depth of all
-contacts and the way of a drift are together less than the depth there, or lines near bodies are looked at one by one. A
-line that is in the core of a body already is no matter of the step, and told of. Where twice the way of the last drift
-leaves room, the next is not looked at before, which costs a look at all velocities, but behind it: its way is known for
-other reasons. What has come further in it is told of.
+The check of lines with bodies is similar, see `refweb.effects.contact.line_body_ccd`. No line can reach the middle of a
+body if the largest depth of all contacts plus the approach in a drift is less than the depth there. Else lines near
+bodies are checked one by one. A line that is in the core already is reported and does not cut the step. If twice the
+approach of the last drift is still safe, the next drift is checked after it, when its approach is known without a
+search over all velocities. Lines that have moved further in that drift are reported.
 """
 
 from __future__ import annotations
@@ -274,7 +273,7 @@ def look_back_at_drift(time, model, running):
 def passes(time, kick, drift, stages, model, running):
     """Tell if the last drift of a step, behind a kick and some ``stages``, must be rejected, see `comes_through`.
 
-    What a look finds open does for drifts in which rows go as their velocities say.
+    The safe distance of a check suffices if rows move with their velocities alone.
     """
     if goes_freely(model):
         if open_ahead(kick, drift, model, running):
@@ -297,7 +296,7 @@ def reject_step(time, h, model, running):
 def comes_through(time: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
     """Tell if lines would pass through each other or a body's middle in a drift behind a kick, from a time on.
 
-    What is ``then`` is one of `TOLD`, `KEPT_APART` and `FORESEEN`.
+    ``then`` is one of `TOLD`, `KEPT_APART` and `FORESEEN`.
     """
     touch, size, left = model.guard.touch, 3 * model.inertia.linear, model.guard.left
     v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]

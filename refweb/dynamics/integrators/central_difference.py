@@ -2,12 +2,13 @@
 
     v ← v + ½h f/m,   x ← x + h v,   f ← f(t + h, x),   v ← v + ½h f/m
 
-The loop calls the kernels of all effects through tables and tracks peaks, in every step and between steps; Python
-sees history rows only. The step comes from Gershgorin's bound on the largest frequency, 2/√(max row sum of M⁻¹K), with
-K's lines at their taut stiffness and the lines that a body can reach within the row at their contact stiffness.
+The loop calls the kernels of all effects through tables, and it finds peaks at and between steps; Python gets history
+rows only. The critical time step is 2/√(max row sum of M⁻¹K), by Gershgorin's bound on the largest frequency. K has the
+taut stiffness of all lines, and the contact stiffness of the lines that a body can reach within the row.
 
-Below that bound a slack chain in contact can still gain energy by many orders, and look plausible afterwards. So the
-book of energies is checked at every row: ``|ΔE − work|`` above `DRIFT` of the largest energy ends the run.
+With smaller steps a slack chain in contact can still gain energy by many orders, and look plausible afterwards.
+Therefore the energy balance is checked at every row: the run ends if ``|ΔE − work|`` is above `DRIFT` of the largest
+energy.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from .step_bound import safe_step
 from .workspace import Workspace
 
 TWIN_STEPS = math.sqrt(2.0)
-"""Steps of a twin over those of a run: with a method of order 2 it has half the error."""
+"""Steps of a step-refinement run over those of a run: with a method of order 2 it has half the error."""
 SHARED = tuple(CLOCK.names or ())[: (CLOCK.names or ()).index("least_energy")]
 """Numbers that a course and the loop's clock have in common."""
 
@@ -50,17 +51,17 @@ class CentralDifference(Integrator):
     system : refweb.system.system.System
         Of order 1, with lumped mass.
     probes : sequence of refweb.results.probes.Probe
-        What to look at, in every row and, with a sign, in every step.
+        Probes to evaluate in every row and, with a sign, in every step.
     sums : sequence of refweb.dynamics.integrators.integrator.Sum
-        Energies to look at, likewise.
+        Sums of energies to evaluate in every row and, with a sign, in every step.
     events : sequence of refweb.dynamics.integrators.events.Event
-        What to report the time of, to the step.
+        Events whose time is found to the size of a step.
     safety : float
         Share of the step bound, 0 < safety ≤ 1.
     step_size : float, optional
         A fixed step instead [s], at most the bound.
     finer : float
-        Number of steps of each row over what the other arguments make of it, ≥ 1.
+        Factor on the number of steps in each row, ≥ 1.
 
     Raises
     ------
@@ -143,8 +144,8 @@ class CentralDifference(Integrator):
     def spent(self, course):
         """Statistics of a course, for ``run.json``.
 
-        The evaluations are those of forces that follow from displacement: others are evaluated more often in a step.
-        What the first step is looked at inside with is not counted.
+        Only evaluations of forces that depend on displacement count: other forces are evaluated more often in a step.
+        The evaluations inside of the first step do not count.
         """
         looks = self._observed.followed, self._observed.sums, self._observed.windows.slots
         follows = any(len(rows) for rows in looks)  # and evaluates forces where it looks
@@ -204,7 +205,7 @@ class CentralDifference(Integrator):
     def error_share(self, course, finer):
         """Error of a finer run over that of this one.
 
-        By the steps really taken, at order 2: of a higher one peaks, contact and slack lines leave no more.
+        It follows from the actual numbers of steps, with order 2: peaks, contact and slack lines reduce higher orders.
         """
         if not finer.nsteps:
             return 0.5
@@ -285,7 +286,7 @@ class CentralDifference(Integrator):
         return history
 
     def _way_out(self, x, step):
-        """Remedy for too short a step [s]: velocities ask for it where at rest it would be over twice as long."""
+        """Remedy for too short a step [s]; velocities are its cause if the step at rest would be over twice as long."""
         if self.bound(x) * self.safety * self.stretch > 2.0 * step:
             reason = "nothing may pass through a body in one, at the speeds there are"
             return f"{reason}; use a thicker body, slower ones or less damping"
@@ -294,7 +295,7 @@ class CentralDifference(Integrator):
     def _again(self, course, before, running):
         """Function that takes steps from ``before`` [s] again: ``after(state, begun, count)``.
 
-        That is the state (3, rows, 3) which is ``count`` steps behind one that ``begun`` steps have led to.
+        It returns the state (3, rows, 3) that is ``count`` steps after the state of ``begun`` steps.
         """
         running.clock["time"] = before
         model = replace(self._model, nearby=self._model.nearby.without())  # its lists hold for steps in a row
@@ -330,7 +331,7 @@ class CentralDifference(Integrator):
         raise IntegrationError(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
 
     def _refuse_passing(self, course, now):
-        """Say which lines would pass through what in any step that is not far below the stable one."""
+        """Refuse lines that would pass through lines or bodies in any step that is not far below the critical one."""
         if self._model.walls.met[3] == 0:
             from ...effects.contact.penetration import would_pass
 
@@ -345,7 +346,7 @@ class CentralDifference(Integrator):
         )
 
     def _name_drift(self, course, before, running):
-        """Say where energy came in, by the steps from ``before`` [s] on."""
+        """Name the source of an energy drift, by the steps from ``before`` [s] on."""
         from .drift_source import name_of, source_of
 
         system, after, state = self.system, self._again(course, before, running), course.before.copy()

@@ -23,7 +23,7 @@ class Contacts(Record):
     terms : ndarray of `refweb.system.contact_forces.CONTACT_TERM`
         See `refweb.system.contact_forces.ContactForces`.
     felt : ndarray, shape (rows, columns)
-        What bodies feel.
+        Contact forces on bodies and depths.
     first : int
         Number of the row of the system that the first row is of.
     none : ndarray of int32, shape (0, 1)

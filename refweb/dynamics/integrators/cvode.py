@@ -1,15 +1,14 @@
 """Implicit and variable-order dynamics by CVODE of SUNDIALS: x' = v, M v' = f(t, x, v).
 
-Steps and orders follow from the error, for displacements and velocities alike. These are wave problems: BDF of orders 3
-to 5 is unstable near the imaginary axis, where the frequencies of a net lie, so that BDF is limited to order 2; Adams
-methods are the choice for many digits.
+Steps and orders follow from the error of displacements and velocities. BDF of orders 3 to 5 is unstable near the
+imaginary axis, where the frequencies of a net lie. Therefore BDF is limited to order 2, and Adams methods are the
+choice for many digits.
 
 An implicit step solves (I − γJ) z = r with J = [[0, I], [−M⁻¹K, −M⁻¹C]]. Eliminating displacements leaves
 
     (M + γC + γ²K) z_v = M r_v − γK r_x,    z_x = r_x + γ z_v,
 
-a matrix of half the size, symmetric unless an effect says otherwise, and definite once the negative part of K is left
-out.
+a matrix of half the size. It is symmetric unless an effect is not, and definite without the negative part of K.
 """
 
 from __future__ import annotations
@@ -23,9 +22,9 @@ from .sundials import Sundials, Symmetric
 SHORT = 1.0
 """γω of a step up to which corrector iterations are cheaper without any factorization."""
 STILL = 1e-3
-"""Displacement by accelerations within a step, over the tolerance, below which nothing has to be solved for."""
+"""Displacement by accelerations within a step, over the tolerance, below which no system is solved."""
 RENEWED = 50
-"""Evaluations of forces after which ω is looked at anew."""
+"""Evaluations of forces after which ω is estimated again."""
 
 
 class Cvode(Sundials):
@@ -40,9 +39,8 @@ class Cvode(Sundials):
     max_order : int, optional
         Highest order, by default 2 for BDF and 12 for Adams.
     linear_solver : {"auto", "block", "sparse", "dense", "fixed-point"}
-        How linear systems are solved, see `refweb.dynamics.integrators.sundials.LINEAR_SOLVERS`; "auto" is "dense" for
-        few unknowns, else "block", with a factorization only where a step is longer than corrector iterations alone can
-        take.
+        Solver of linear systems, see `refweb.dynamics.integrators.sundials.LINEAR_SOLVERS`. "auto" is "dense" for few
+        unknowns, else "block", with a factorization only if a step is too long for corrector iterations alone.
 
     Raises
     ------

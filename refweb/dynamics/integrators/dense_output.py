@@ -72,7 +72,7 @@ class Inside(Record):
     ends : ndarray, shape (3, 3, rows, 3)
         Position, velocity and force at the ends of the last steps.
     lines : ndarray, shape (cells, columns)
-        What lines show there.
+        Output of the terms over lines there.
     alone : refweb.dynamics.integrators.extremes.Extremes
         Those of the run, with looks of their own.
     where : ndarray of int, shape (2,)
@@ -391,7 +391,7 @@ def look_again(
 ) -> bool:
     """Look for extremes where values turn back near the end of a step; whether steps that follow are looked at inside.
 
-    What was found inside of a ``fresh`` step of order 2 are corrections.
+    Extremes inside of a ``fresh`` step of order 2 become corrections.
     """
     if smooth:
         look_at_tops(now, h, True, inside, total, running.extremes, model, observed, running)

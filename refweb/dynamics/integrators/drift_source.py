@@ -1,8 +1,8 @@
-"""Source of an energy drift: the cell whose energy changes by other than its forces' work.
+"""Source of an energy drift: the cell whose change of energy differs most from the work of its forces.
 
-A kick, a drift and a kick change the kinetic energy by ½ (f₀ + f₁)·Δx of all forces at both ends of the drift, but for
-what two steps in turn give back. So what a cell leaves open in a step is ΔE + ½ (f₀ + f₁)·Δx, with f = −∂E/∂x its own
-forces. A cell that gains energy because others pull at it leaves nothing open.
+A kick, a drift and a kick change the kinetic energy by ½ (f₀ + f₁)·Δx of all forces at both ends of the drift, up to a
+part that two successive steps cancel. Therefore the drift of a cell in a step is ΔE + ½ (f₀ + f₁)·Δx with its forces f
+= −∂E/∂x. A cell that gains energy by the work of others has no drift.
 """
 
 from __future__ import annotations
@@ -10,18 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 SHARE = 1e-3
-"""Part of a drift over which an energy is differentiated, to the square of this."""
+"""Part of a drift over which an energy is differentiated, with an error of its square."""
 MOST = 3e7
-"""Largest number of cells times steps that are looked at: the last ones of a row."""
+"""Largest number of cells times steps that are evaluated: the last steps of a row."""
 
 
 def source_of(system, places):
-    """(term, number of its cell) that leaves most energy open.
+    """(Term, number of its cell) with the largest drift.
 
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        The system.
     places : list of (float, ndarray of shape (rows, 3))
         Time [s] and displacement [m] at the ends of steps in turn.
     """

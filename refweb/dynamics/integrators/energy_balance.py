@@ -1,6 +1,6 @@
-"""The book of energies: what came in as work has to be there as energy, or the run is refused.
+"""Energy balance: work must equal the change of energy, or the run is refused.
 
-A flag of success is not believed: at every history row ``|ΔE − work|`` is held against the largest energy of the run.
+It is independent of the method: at every history row ``|ΔE − work|`` is compared with the largest energy of the run.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ if TYPE_CHECKING:
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
 CLOSING = 0.9
-"""Factor by which a drift above `DRIFT` has to fall from row to row, over the largest energy until then, for the run to
-go on: where a load rises from zero on a web at rest, the first rows hold a few steps' errors against next to nothing.
+"""Factor by which a relative drift above `DRIFT` must fall from row to row, or the run ends. It may be above at first:
+if a load rises from zero on a web at rest, the first rows compare the errors of a few steps with nearly zero energy.
 """
 
 
 def least_energy(net):
-    """The energy that a drift is held against at least [J]: what strains of a few roundings are worth, over `DRIFT`.
+    """Least energy with which a drift is compared [J]: that of strains of a few roundings, over `DRIFT`.
 
-    A web at rest whose lines have exactly their natural length moves by its rounding alone, and books nothing else.
+    A web at rest whose lines have exactly their natural length has only energies by rounding.
     """
     lines = net.line_data
     return float(0.5 * (lines.ea * lines.natural_length).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
@@ -80,8 +80,8 @@ def book_energies(
 ) -> None:
     """Write the energy of each term, the kinetic energy and the work to ``total``; its last place stays.
 
-    ``book`` holds the work of each term and, last, that of all motion; ``working`` says of each term whether that
-    counts as work (1), or as its energy, which is lost (−1), or neither (0).
+    ``book`` has the work of each term and, last, that of all motion. ``working`` is 1 for a term whose power counts as
+    work, −1 if its power is energy lost, else 0.
     """
     count = len(energies)
     total[count], total[count + 1] = 0.0, book[count]
@@ -105,7 +105,7 @@ def no_energy(t, x, cells, data, out):
 
 @kernel(forceinline=True)
 def begin_powers(t, x, v, extra, terms, solved, known, power):
-    """Write the power of each term that is booked by it [W]; where it is ``known``, not of those that kicks solve."""
+    """Write the power of each term with a power [W]; if it is ``known``, without terms that kicks solve."""
     for n in range(terms.powers.shape[0]):
         i, column = terms.powers[n, 0], terms.powers[n, 1]
         if known and among(solved, i):
@@ -140,10 +140,10 @@ def book_powers(
 def book_potential(sign: float, t: float, x: Matrix, terms: ForceTerms, work: Vector) -> None:
     """Add the potential at time t of each term that is booked, times a sign, to its work [J].
 
-    With + before a drift of a step of higher order and − behind it this is the work of dead loads. Such a potential is
-    linear in time between corners of tables. Where time, as a coordinate, goes with the drifts, what the kicks give the
-    momentum that belongs to it is lost in these sums when t goes with the kicks: the book closes as the energy of a
-    scene without loads does, to the order of the method and without a drift that grows.
+    With + before a drift of a step of higher order and − after it, this is the work of dead loads. Such a potential is
+    linear in time between corners of tables. Time is a coordinate that advances with the drifts, while t advances with
+    the kicks here, which omits the momentum of this coordinate. The balance closes as that of a scene without loads: to
+    the order of the method, without a growing drift.
     """
     for n in range(terms.powers.shape[0]):
         i = terms.powers[n, 0]
@@ -163,7 +163,7 @@ def own_energy(total, working):
 
 @kernel(leaf=True, forceinline=True)
 def note_motion(driven, mass, x, v, f, before):
-    """Note position, force and kinetic energy of the rows whose motion is prescribed, ahead of a step."""
+    """Record position, force and kinetic energy of rows with prescribed motion before a step."""
     for d in range(driven.size):
         r = driven[d]
         before[d, 6] = 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
@@ -222,9 +222,9 @@ def change_lengths(t: float, x: Matrix, model: Model, was: Vector, length_force:
 
 @kernel(leaf=True)
 def drifts_away(clock, energy, stored, work, limit):
-    """Note energy, largest energy and drift of a row; whether the run is not to go on.
+    """Record energy, largest energy and drift of a row; return True if the run must end.
 
-    It is not where a number is not finite, or the drift exceeds ``limit`` and does not fall, see `CLOSING`.
+    It must end if a number is not finite, or if the drift exceeds ``limit`` and does not fall, see `CLOSING`.
     """
     clock.largest = max(clock.largest, stored)
     drift = abs(energy - work - clock.energy)

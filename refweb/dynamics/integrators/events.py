@@ -51,9 +51,9 @@ class Event(NamedTuple):
     level : float
         The level that its value passes.
     rising : bool
-        Whether only passing upwards counts.
+        True if only passing upwards counts.
     stop : bool
-        Whether the run ends there.
+        True if the event ends the run.
     at_once : bool
         Whether being above at t = 0 counts, as a contact does.
     during : float
@@ -143,16 +143,16 @@ def ended_by(events):
 
 
 def search(events, piece, value):
-    """Note the events that happen in a piece of a step, and the time of the first that ends the run.
+    """Record the events in a piece of a step, and the time of the first that ends the run.
 
-    Those behind the end of the run are taken back.
+    Events after the end of the run are removed.
 
     Parameters
     ----------
     events : ndarray of `EVENT`
-        What each has come to.
+        State of each event.
     piece : refweb.dynamics.integrators.simpson_balance.Piece
-        Where they are looked for: in its middle and at its end.
+        Piece to search: its middle and its end.
     value : callable
         ``value(piece, slot, sample)`` of a probe or a sum.
 

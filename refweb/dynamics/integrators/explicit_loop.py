@@ -1,9 +1,9 @@
 """The compiled loop of explicit dynamics: steps of kicks and drifts, and history rows.
 
-Its pieces stand beside their equations: `refweb.dynamics.integrators.step` moves, ``energy_book`` books work,
-``extremes`` and ``events`` look, ``step_bound`` says how long a step may be. What every step and every row of a plain
-scene goes through counts no references to arrays, see `refweb.kernels.kernel`: else these would take a third of the
-time of a cable of 100 elements. The loop asks once what a scene has none of.
+Its parts are beside their equations: `refweb.dynamics.integrators.step` moves rows, ``energy_balance`` sums work,
+``extremes`` and ``events`` monitor, and ``step_bound`` finds the critical time step. Kernels that every step and every
+row of a plain scene calls count no references to arrays, see `refweb.kernels.kernel`: counting would take a third of
+the time of a cable of 100 elements.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ if TYPE_CHECKING:
     from .records import Model, Running, Scheme
 
 HELD = -2
-"""What the loop returns where lines would pass whatever the step."""
+"""Return value of the loop if lines would pass with any step."""
 BREATH = 10_000_000
-"""Steps times cells after which a compiled loop returns, some tenths of a second."""
+"""Steps times cells after which a compiled loop returns: some tenths of a second."""
 
 
 @kernel(apart=("stages",))
@@ -74,8 +74,8 @@ def inner_stages(
 ) -> bool:
     """All kicks and drifts of a step of higher order but the last drift, with work and the impulses of forces.
 
-    Time goes with the drifts, and in the potential that is booked with the kicks. A step in which lines would pass is
-    not begun, which it returns.
+    Time advances with the drifts; in the potential of the energy balance it advances with the kicks. A step in which
+    lines would pass is not begun; the return value tells.
     """
     if reject_step(now - h, h, model, running):
         return False
@@ -281,13 +281,14 @@ def advance_rows(
 ) -> int:
     """Advance to each of some times, and write a row of ``history`` there.
 
-    Equal steps lead to each, or to each corner of a table on the way: no step passes one.
+    Equal steps lead to each time, or to each corner of a table before it.
 
-    Returns the rows that are done: fewer than asked for where a number is not finite, or the drift is above ``limit``
-    and does not fall; then ``before`` holds x, v and f at the last corner or row before, of the time ``since``; −1
-    where it takes more than `MAX_STEPS_PER_ROW` steps from there. Where an event ends the run, that row is the last,
-    and its time that of the event. After ``breath`` steps it returns as well, so that an interruption is felt, and goes
-    on in that row. It returns `HELD` where a step is cut too far, see `refweb.dynamics.integrators.ccd`.
+    Returns the number of finished rows. It is smaller than requested if a number is not finite, or if the drift is
+    above ``limit`` and does not fall; then ``before`` has x, v and f at the last corner or row, of the time ``since``.
+    It is −1 if a row takes more than `MAX_STEPS_PER_ROW` steps from there. If an event ends the run, its row is the
+    last, with the time of the event. The loop also returns after ``breath`` steps, so that a run can be interrupted;
+    the next call continues in that row. It returns `HELD` if a step is cut too far, see
+    `refweb.dynamics.integrators.ccd`.
     """
     clock, events, lengths, left = running.clock[0], running.events, model.lengths, breath
     total, stopped = space.total, ended_by(events)

@@ -12,19 +12,18 @@ from .records import aligned
 
 @dataclass(eq=False, kw_only=True)
 class ExplicitState(IntegratorState):
-    """State of an explicit run; a run that goes on from it is the same run bit for bit.
+    """State of an explicit run; a run that continues from it is the same run bit for bit.
 
-    The compiled loop works in its arrays.
+    The compiled loop writes to its arrays.
 
     Attributes
     ----------
     force : ndarray, shape (rows, 3)
-        Force [N], last seen with the velocity at half a step.
+        Force [N], last evaluated with the velocity at half a step.
     power : ndarray, shape (terms,)
-        Power of each term that is booked by it at the last step [W].
+        Power of each term with a power, at the last step [W].
     longest : float
-        By how much two rows may have come nearer to each other in a step, at most [m]; infinite where that is not
-        known.
+        Largest approach of two rows in a step [m]; infinite if it is not known.
     before : ndarray, shape (3, rows, 3)
         Displacement, velocity and force at the row or the corner of a table before.
     """

@@ -1,16 +1,16 @@
-"""Extremes: the largest or smallest value of what is looked at, at steps and between them.
+"""Extremes: largest or smallest values of probes and sums, at steps and between them.
 
-Where the parabola through the last three values of something turns back before the last one, that is looked at where it
-does: on the motion between steps. So a peak is what is really there, also of what has kinks, jumps and bounds. What it
-exceeds the values at steps by is kept as correction, and ± is never less: run and twin may find the same. Where steps
-are of a higher order, and so the motion between them, it is what the value differs from the parabola by.
+If the parabola through the last three values has its extreme before the last one, the probe is evaluated there, on the
+dense output between steps. Therefore a peak is a value of the motion, also for values with kinks, jumps and bounds. Its
+difference from the values at steps is stored as correction. ± is at least this, since run and step refinement may agree
+by chance. With steps of a higher order, the correction is the difference of the value from the parabola.
 
-The first step of a run is looked at inside, as no third value is known there, nor is what went before. Behind a jump of
-velocities the first three values are the first to tell.
+The first step of a run is evaluated inside, since there is no third value. After a jump of velocities extremes are
+searched again from the third value on.
 
-An oscillator in central differences, over 30 phases, has at ωh = 1/4 peaks that are off by 7.80e-3 at most, by 7.81e-3
-where the top of the parabola counts as peak, and its amplitude at steps is off by 7.82e-3 itself. But that parabola
-passes what a kink has, an eighth of a second difference, and finds less than no tension, or more than all lines slack.
+Over 30 phases, the largest error of a peak of an oscillator in central differences at ωh = 1/4 is 7.80e-3. It is
+7.81e-3 with the maximum of the parabola, and the error of the amplitude at steps is 7.82e-3 itself. But the parabola
+exceeds a kink by an eighth of a second difference, so that it gives negative tensions, or slack fractions above 1.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Extremes(Record):
     places : ndarray of int
         Row or element that a probe's stands at.
     corrections : ndarray
-        What each owes to a look between steps, 0 where it was found at a step.
+        Correction of each by evaluation between steps, 0 if it was found at a step.
     recent : ndarray, shape (probes + sums, 3)
         Value of each at the last three looks since its rate may have jumped, not a number before.
     looked : ndarray, shape (3,)

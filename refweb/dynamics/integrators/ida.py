@@ -1,17 +1,17 @@
 """Implicit dynamics by IDA of SUNDIALS, in residual form: with nodes without mass, and with rigid links.
 
-The unknowns are displacements x, velocities v of what has mass, and two multipliers λ, μ of each link:
+The unknowns are displacements x, velocities v of rows with mass, and two multipliers λ, μ of each link:
 
     x' − v + Gᵀμ = 0        M v' − f(t, x, v) + Gᵀλ = 0        g(x) = 0        G v = 0,        G = ∂g/∂x
 
 In this form of Gear, Gupta and Leimkuhler [1]_ links are of index 2: lengths and their rates are both among the
-equations, and μ is 0 but for the error of a step. The error test leaves the multipliers out. The states of a step
-satisfy g = 0 and G v = 0 to about rtol, however long the run; what is observed is the nearest state that does so to
-rounding, with the forces that links have there.
+equations, and μ is 0 up to the error of a step. The error test leaves the multipliers out. The states of a step satisfy
+g = 0 and G v = 0 to about rtol, for runs of any length. Observables use the nearest state that satisfies both to
+rounding, with the forces of links there.
 
-A node without mass has no velocity among the unknowns: its equation is 0 = f, of index 1, and its velocity is x'. To
-keep v and x' − v = 0 as well, of index 2, takes as many steps for the same error, with v in the error test or without.
-A node that nothing holds any more ends the run.
+A node without mass has no velocity among the unknowns: its equation is 0 = f, of index 1, and its velocity is x'. A
+formulation of index 2, with v and x' − v = 0, takes equally many steps for the same error. A node that no line holds
+ends the run.
 
 A step solves J z = r with J = ∂F/∂y + c ∂F/∂y'. Eliminating displacements leaves, where there are no links,
 
@@ -64,8 +64,8 @@ class Ida(Sundials):
     max_order : int
         Highest order of the BDF, 1 to 5; those above 2 are unstable near the frequencies of a net.
     linear_solver : {"auto", "block", "sparse", "dense"}
-        How linear systems are solved, see `refweb.dynamics.integrators.sundials.LINEAR_SOLVERS`; "auto" chooses by
-        size. Links need "sparse" or "dense".
+        Solver of linear systems, see `refweb.dynamics.integrators.sundials.LINEAR_SOLVERS`; "auto" chooses by size.
+        Links need "sparse" or "dense".
 
     Raises
     ------
@@ -246,8 +246,8 @@ class Ida(Sundials):
     def start(self, x=None, v=None):
         """The `IntegratorState` at t = 0.
 
-        Nodes without mass are moved to their equilibrium among all others, and what would stretch links is taken out
-        of the velocities with the least kinetic energy.
+        Nodes without mass are moved to their equilibrium among all others. Parts of velocities that would stretch links
+        are removed with the least kinetic energy.
         """
         system = self.system
         x = np.zeros((system.rows, 3)) if x is None else x.copy()
@@ -304,7 +304,7 @@ class Ida(Sundials):
         return float(reached.t)
 
     def _inspect(self, t, y, yp):
-        """Look at the end of a step: whether nodes without mass have a position, and how far links are off."""
+        """Check the end of a step: positions of nodes without mass, and errors of the lengths of links."""
         x, v = self._rows(t, y, yp)
         if self._links:
             self._drift[:] = np.maximum(self._drift, self._links.drift(x, v))

@@ -1,7 +1,6 @@
 """Force terms whose kicks an explicit step solves for: their record, and the detection of their contacts.
 
-Losses of contact act where its push does, and that push has just been found: of lines with a body only those that show
-a depth there are looked at.
+Losses act only where the push acts, which is evaluated before: only lines with a depth in a body are detected.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from ...kernels import (
 from .neighbour_list import near_of, rows_of
 
 CARRIED = 3
-"""Parts that one of a carried node becomes: its own, that of the body, and that of its rotation."""
+"""Number of parts for an attached node: the part of the node, of the body, and of its rotation."""
 
 
 class ImplicitContacts(Record):

@@ -38,12 +38,12 @@ GROUPS = {"extremes": Extremes, "ledger": MomentumBalance, "averages": Averages}
 
 
 class Sum(NamedTuple):
-    """A weighted sum of what the book of energies holds, to look at in every step.
+    """A weighted sum of the entries of the energy balance, which is evaluated in every step.
 
     Attributes
     ----------
     weights : ndarray, shape (terms + 3,)
-        Of the energy of each term, kinetic energy, work and step size: the columns of `History.sums`.
+        Weights of the energy of each term, kinetic energy, work and step size: the columns of `History.sums`.
     sign : float
         1 for the largest value of all steps, −1 for the smallest, 0 for neither.
     """
@@ -54,7 +54,7 @@ class Sum(NamedTuple):
 
 @dataclass(eq=False, kw_only=True)
 class IntegratorState:
-    """State of a run: all that it takes to go on from there.
+    """State of a run: all data that are needed to continue it.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class IntegratorState:
     extremes : refweb.dynamics.integrators.extremes.Extremes
         Extreme value of each probe and, behind them, of each sum.
     events : ndarray of `refweb.dynamics.integrators.events.EVENT`, shape (events,)
-        What each event has come to.
+        State of each event.
     work : ndarray, shape (terms + 1,)
         Work of each term that is booked by its power and, last, of motion [J].
     impulse : ndarray, shape (3,)
@@ -91,7 +91,7 @@ class IntegratorState:
         along the net: time [s], infinite where there are none, and the four nodes of both; the first line that may have
         passed through a body: time, its two nodes, the row of the body and a number.
     breaks : refweb.system.broken_lines.Breaks, optional
-        What has broken, where anything may.
+        Broken elements, if elements may break.
     """
 
     time: float
@@ -152,7 +152,7 @@ class History:
     Attributes
     ----------
     names : tuple of str
-        What each column is.
+        Names of the columns.
     values : ndarray, shape (rows, columns)
         The rows.
     probed : int
@@ -235,8 +235,8 @@ class Variant(NamedTuple):
         Values of the knob at which it is run, from coarse to fine; by default those of
         `refweb.studies.trials.SETTINGS`.
     kind : str
-        What it has in common with others whose errors may be alike, so that they confirm nothing of each other; empty
-        for what is alone of its kind.
+        Name that variants share if their errors may be alike, so that they do not confirm each other; empty for a
+        variant that is the only one of its kind.
     """
 
     keys: dict = {}
@@ -262,20 +262,20 @@ class Integrator(Protocol):
     retry : float
         Factor on the knob for another run where the book of energies stays open, below 1.
     beside : bool
-        Whether ``advance`` runs compiled and releases the interpreter, so that a twin may run in a thread beside it.
+        True if ``advance`` runs compiled and releases the interpreter, so that a step refinement may run in a thread
+        beside it.
     on_progress : callable
         Called with the time [s] some times a second of ``advance``, or once in some steps; it may raise, which ends the
         run: one of a compiled loop is then as it was at the row before.
 
     Notes
     -----
-    What it has to say besides, it may: ``takes_links = True`` where it holds the lengths of ``[[link]]``;
-    ``follows_lines = True`` where it notes in the course which lines may have passed through each other; ``variants``,
-    a dict of `Variant` s by name, where ``refweb cost`` is to compare several of them or in other settings;
-    ``tolerances``, a dict of absolute ones by unit, "m" and "m/s", of which ± is no less than a multiple; and where
-    kernels are to be compiled before a run, a method ``prepare()``; and where that is known before a run, a method
-    ``evaluations(duration)``, how many evaluations of forces a time [s] takes, and
-    a method ``steps_in(spans)``, how many steps each of some spans of time [s] takes, shape (spans,).
+    Further attributes are optional. ``takes_links = True``: it maintains the lengths of ``[[link]]``. ``follows_lines =
+    True``: it records in the course which lines may have passed through each other. ``variants``: a dict of `Variant` s
+    by name that ``refweb cost`` compares. ``tolerances``: a dict of absolute tolerances by unit, "m" and "m/s"; ± is at
+    least a multiple of these. ``prepare()``: compiles kernels before a run. ``evaluations(duration)``: number of
+    evaluations of forces for a time [s], if it is known before a run. ``steps_in(spans)``: number of steps for each of
+    some spans of time [s], shape (spans,).
     """
 
     method: str

@@ -22,7 +22,7 @@ class Massless:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        The system.
     unknowns : ndarray of int
         Numbers of their displacements among the unknowns.
 
@@ -74,7 +74,7 @@ class Massless:
         Raises
         ------
         SolverError
-            Where a node has no position.
+            If a node has no position.
         """
         v.ravel()[self._at] = 0.0
         self._balance(x, np.zeros_like(v), near)

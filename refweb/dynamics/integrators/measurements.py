@@ -1,9 +1,9 @@
 """Monitors on dense output: extremes, means and events of any method, by the kernels of the compiled loop.
 
-Where peaks and means are looked for differs, and no more. A step of the loop has a motion of its order: a peak is
-looked at once, at the top of the parabola through the last three looks, and an integral has as many parts as there are
-looks. Dense output is as accurate at any time within as at its ends. So peaks are searched by several parabolas, and
-steps whose means leave too much open are halved.
+Only the times of evaluation differ from those of the loop. The loop evaluates a peak once, at the maximum of the
+parabola through the last three values, and an integral has one part for each evaluation. Dense output is as accurate
+within a step as at its ends. Therefore peaks are searched by several parabolas, and steps are halved if the error of a
+mean is too large.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from .monitors import Observed, begin_monitors
 from .rows import write_probes
 
 ROUNDS = 6
-"""Largest number of looks at one peak."""
+"""Largest number of evaluations for one peak."""
 
 
 def top_of(times, heights):
-    """(Time, height) of the top of the parabola through three points, None where it has none.
+    """(Time, height) of the maximum of the parabola through three points, None if it has none.
 
     A step of one rounding has no middle.
     """

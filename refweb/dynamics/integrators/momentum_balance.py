@@ -1,22 +1,22 @@
-"""The book of momentum: what acts from outside has to be there as momentum, or the run is refused.
+"""Momentum balance: impulses of external forces must equal the change of momentum, or the run is refused.
 
-At every history row the momentum of what is free is held against that at the start, the impulse of the supports and
-that of all else that acts from outside. Dead loads and gravity have it in closed form, whatever the steps do: their
-factors are piecewise linear, with an exact antiderivative; damping in proportion to mass gives −rate Σ m Δx. So a load
-that steps have passed over, or given twice, shows. What has no such formula, follower loads and the forces of inertia
-in a frame that turns, is *integrated along the steps* with the weights that these give it, and so is the force of
-supports and of bodies that are fixed: there the book holds the method against its own forces alone.
+At every history row the momentum of free nodes and bodies is compared with that at the start plus the impulses of
+supports and of all other external forces. Dead loads and gravity have impulses in closed form, independent of the
+steps: their factors are piecewise linear, with an exact antiderivative. Damping in proportion to mass has −rate Σ m Δx.
+Therefore the balance finds a load that steps have omitted or applied twice. Follower loads and the inertia forces of a
+rotating frame have no such formula. They are *integrated along the steps* with the weights of the method, as are the
+forces of supports and of fixed bodies: there the balance only checks the method with its forces.
 
-Where nothing is supported and all forces are internal or without a moment about the centre of mass, such as gravity,
-the angular momentum about that is booked as well, with that of bodies which turn. A ring keeps its plane, which takes
-moments: where there are rings it is the part along their normal, and nothing where their normals differ. Friction of
-lines that do not roll leaves moments to their twist: where there is any, angular momentum is not booked.
+The angular momentum about the centre of mass, with that of rotating bodies, has a balance as well, if there is no
+support and all forces are internal or have no moment about it, such as gravity. A ring keeps its plane, which takes
+moments: with rings only the part along their normal counts, and none if their normals differ. Friction of lines that do
+not roll leaves moments to their torsion; with such friction there is no balance of angular momentum.
 
-Central differences and splittings close the book to rounding: each kick gives what the forces are worth, and the
-trapezoidal rule of the kicks is exact for linear factors. Damping sees the mean of the velocities at the ends of steps
-and positions move by those in their middles; with equal steps h the sums differ by ¼ h² (a(end) − a(start)), a being
-accelerations, which is booked. Methods of somebody's own steps keep their equations to their tolerances, and the
-impulse of supports is Simpson's: they close it within `allowed`.
+Central differences and splittings close the balance to rounding: each kick applies exactly its forces, and the
+trapezoidal rule of the kicks is exact for linear factors. Damping uses the mean of the velocities at the ends of steps,
+while positions move by those in their middles. With equal steps h the sums differ by ¼ h² (a(end) − a(start)) with
+accelerations a, which the balance includes. Methods with tolerances satisfy their equations within these, and the
+impulse of supports is that of Simpson's rule: they close the balance within `allowed`.
 
 The book does not see what gives no impulse to all of the web, though it moves parts of it: natural lengths that reels
 and temperature change, pressure inside of a closed line. Nor does it see [[motion]], whose impulse is that of supports.
@@ -72,9 +72,9 @@ class MomentumBalance(Record):
     first : ndarray, shape (2, 3)
         Momentum [N s], and angular momentum along the axes of `Outside.axes` [N m s], at the start.
     given : ndarray, shape (3,)
-        What the formulas of impulses had at the start [N s].
+        Values of the formulas of impulses at the start [N s].
     pushed : ndarray, shape (3,)
-        Impulse of what is integrated along the steps [N s].
+        Impulse of forces that are integrated along the steps [N s].
     left, largest : ndarray, shape (2,)
         Of momentum [N s] and angular momentum [N m s], over all rows: the largest that is left when all is subtracted
         that is known to have come in, and the largest that parts of the system have, whatever their direction.
@@ -231,7 +231,7 @@ def push_on(
 def turning(x: Matrix, p: Matrix, outside: Outside, turned: Vector) -> tuple[float, float]:
     """Write the angular momentum about the centre of mass along the axes; the sum of its parts' sizes [N m s].
 
-    What moves with the centre of mass is left out of momenta ``p``, since it has no part in the sum.
+    The part of momenta ``p`` that moves with the centre of mass is left out, since it adds nothing to the sum.
     """
     places, mass, axes = outside.places, outside.mass, outside.axes
     total, size, far = 0.0, 0.0, 0.0

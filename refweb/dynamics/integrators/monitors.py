@@ -45,9 +45,9 @@ class Observed(Record):
     terms : ndarray of int
         Terms whose values per cell are the data of probes.
     plain : ndarray of int, shape (probes, 4)
-        What the loop looks at itself, see `refweb.results.probes.plain_of`.
+        Quantities that the loop evaluates without a kernel, see `refweb.results.probes.plain_of`.
     scales : ndarray, shape (probes,)
-        Factor on that.
+        Factor on each of these.
     """
 
     probes: ProbeTable

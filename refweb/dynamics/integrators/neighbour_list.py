@@ -1,16 +1,16 @@
-"""Contact of what is near: lines that a body cannot reach yet are not looked at in every step.
+"""Neighbour lists: lines that a body cannot reach yet are not evaluated in every step.
 
-A list of the lines within a skin of a body holds until something may have come as far as the skin is deep: in a step
-nothing moves by more than the fastest row, and a line comes nearer to a body by no more than twice that. So nothing is
-missed, and the numbers are those of all lines to the last bit, since lines that do not touch add nothing to any sum.
+A list of the lines within a skin around a body is valid until the approach may exceed the depth of the skin. In a step
+no row moves by more than the fastest one, and a line approaches a body by at most twice that. Therefore no contact is
+missed. Results are those with all lines to the last bit, since lines without contact add nothing to any sum.
 
-Where cells are pairs of elements that are found, ways of fast rows are those relative to each other, for a net that is
-thrown flies as a whole, and a list that is used up is held against where rows really went before another is made: waves
-come and go. Its skin is not deeper than `WIDEST` of an element, where every element would be near another, and is to
-last for fewer steps, down to `FEWEST`, where to look at its pairs takes longer than to find them.
+Lists of pairs of elements differ in three ways. The approach is that of the relative motion of rows, since a thrown net
+moves as a whole. Before a new list is made, the actual displacements are checked, since waves may move rows back. The
+skin is at most `WIDEST` of the length of elements, since else every element would be near another. It lasts for fewer
+steps, down to `FEWEST`, if the evaluation of its pairs takes longer than the search.
 
-A list is deep enough for the `LASTS` steps ahead, and for the bound on the steps of the next row where that reaches no
-more than `LONGEST` of them. So it is made once in some rows, by a look at all lines.
+A list is deep enough for the next `LASTS` steps, and for the bound on the steps of the next row if that needs at most
+`LONGEST` steps. Thus a list is made once in several rows, by a search over all lines.
 """
 
 from __future__ import annotations
@@ -45,20 +45,20 @@ if TYPE_CHECKING:
     from .records import ForceTerms, Model
 
 LASTS = 64.0
-"""Number of steps that a list is to last at the speed of its first."""
+"""Number of steps that a list should last at the speed of its first step."""
 LONGEST = 256.0
-"""The same where a bound on the next row's steps asks for a deeper skin."""
+"""Largest such number if the bound on the steps of the next row needs a deeper skin."""
 WIDEST, MANY, FEWEST = 0.5, 512.0, 6.0
-"""Depth of a skin around pairs over the mean length of elements, at most; number of steps that it is to last, at most
-and at least."""
+"""Largest depth of a skin around pairs over the mean length of elements; largest and least number of steps that it
+should last."""
 PRICE = 64.0
-"""Time that it takes to find the pairs of an element, over that to look at one."""
+"""Time of the search of the pairs of an element, over that of the evaluation of a pair."""
 KEPT_UP_TO = 0.7
 """Share of a skin around pairs that may be used up where a list is kept."""
 COVERED = 3
-"""Number of steps whose ways are known before a list is made: peaks are looked for in that many."""
+"""Number of steps whose motion must be known before a list is made, since peaks are searched in these."""
 WAY = 2.0 * math.sqrt(3.0)
-"""Way by which two rows come nearer to each other, over that of the largest component, at most."""
+"""Largest approach of two rows, over the largest component of a displacement."""
 SHARE = 0.999
 """Share of a skin that may be used up: the rest is for rounding."""
 SIGN = np.int64(0x7FFFFFFFFFFFFFFF)
@@ -91,7 +91,7 @@ of steps that a list of pairs is to last; the longest of all ways of a step [m];
 and above which a list is made, 0 from the start of a run on; the largest component of a velocity, as a whole number and
 as what it is [m/s]; largest depth around pairs [m], infinite where none are found."""
 NOWHERE = np.zeros((0, 3))
-"""Displacements where none are looked at."""
+"""Displacements without rows."""
 SWAP = types.void(types.int64, types.int64, types.float64, MATRIX, *map(ArraysType, (INDICES, MATRIX, MATRIX, VECTOR)))
 """``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of term i, the m-th that acts nearby, in the
 tables of `refweb.dynamics.integrators.records.ForceTerms`, for those within a skin, or for all where it has no
@@ -101,7 +101,7 @@ SkinArray = Annotated[np.ndarray, types.Array(from_dtype(SKIN), 1, "C")]
 
 
 class NeighbourList(Record):
-    """Terms whose cells act only near something.
+    """Terms whose cells act only on near lines or bodies.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class NeighbourList(Record):
     terms : ndarray of int
         Their numbers.
     skin : ndarray of `SKIN`, shape (1,)
-        How long what is chosen will do.
+        State of the list.
     at : ndarray, shape (rows, 3)
         Displacement at which pairs were found [m]; no rows where none are found.
     cells, data : table
@@ -142,7 +142,7 @@ class NeighbourList(Record):
 
 
 def near_of(system):
-    """Numbers of the terms of a system whose cells act only near something."""
+    """Numbers of the terms of a system whose cells act only on near lines or bodies."""
     return [
         i for i, term in enumerate(system.terms) if term.contact.near is not None or term.contact.finder is not None
     ]
@@ -169,8 +169,7 @@ def rows_of(chosen, cells, data):
 def swap_of(near):
     """The kernel that swaps the cells of a term, found by its kernel ``near``, of signature `SWAP`.
 
-    Loops call it by its address: machine code that is called by name is optimized again in each kernel above, and
-    lists that are written to are long.
+    Loops call it by its address, since machine code that is called by name is optimized again in each calling kernel.
     """
 
     @kernel(SWAP)
@@ -227,9 +226,9 @@ def set_reference(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
 
 @kernel(leaf=True, apart=("near",))
 def show_near(nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Write what the chosen cells show where it is looked for, among that of all cells.
+    """Copy the output of the chosen cells to the output of all cells.
 
-    What an element shows is the largest value of its pairs, or the smallest where these are below 0.
+    The output of an element is the value of largest size among its pairs.
     """
     if not nearby.skin[0].depth < math.inf:
         return
@@ -256,12 +255,12 @@ def show_near(nearby: NeighbourList, terms: ForceTerms) -> None:
 
 
 def forget(model, begun):
-    """Forget how things moved: who comes next has not taken the last steps, or has ``begun`` and taken none."""
+    """Reset the record of motion: the next run has not taken the last steps, or has ``begun`` and taken none."""
     model.nearby.skin["steps"], model.nearby.skin["unknown"] = 0, COVERED if begun else 0
 
 
 def look_at_all(system, model):
-    """Look at all cells, as whoever comes next does."""
+    """Select all cells."""
     skin, terms = model.nearby.skin[0], model.terms
     if skin["depth"] < np.inf:
         for m, i in enumerate(near_of(system)):
@@ -271,7 +270,7 @@ def look_at_all(system, model):
 
 @kernel(apart=("pairs",))
 def take_pairs(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Find the pairs within the skin at displacement x, and say how many steps such a list is to last."""
+    """Find the pairs within the skin at displacement x, and set the number of steps that the list should last."""
     copy_rows(x[: nearby.at.shape[0]], nearby.at)
     set_reference(x, nearby, terms)
     skin, pairs, elements = nearby.skin[0], 0, 0
@@ -286,9 +285,9 @@ def take_pairs(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
 
 @kernel(leaf=True, forceinline=True)
 def reach_all(reach, x, nearby, terms):
-    """Look at all cells, unless those that are chosen are all that can touch by coming nearer by a reach [m].
+    """Select all cells, unless the chosen cells are all that can touch after an approach of ``reach`` [m].
 
-    Pairs that are found stay, see `covered`.
+    Listed pairs stay, see `covered`.
     """
     skin = nearby.skin[0]
     skin.wished = 2.0 * reach
@@ -301,7 +300,7 @@ def reach_all(reach, x, nearby, terms):
 
 @kernel(leaf=True, apart=("pairs",))
 def covered(path: float, x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> bool:
-    """Tell if the listed pairs are all that can touch by coming nearer by a distance [m].
+    """Tell if the listed pairs are all that can touch after an approach of ``path`` [m].
 
     They are found anew at displacement x where a list as deep would then be all: its turn comes soon. Where it is not,
     bounds look at the elements themselves, see
@@ -332,7 +331,7 @@ def goes_freely(model):
 
 @kernel(leaf=True, apart=("near",))
 def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before: Matrix, model: Model) -> None:
-    """Note how far things may have moved in the drift that led to x, and choose anew where the skin is used up.
+    """Record the approach in the drift that led to x, and make a new list if the skin is used up.
 
     ``bits`` are the velocities of all places, in a row, as whole numbers; none where nothing acts nearby. The largest
     is known where a guard has looked for it. Motion that is prescribed is held against the places ``before``; to that

@@ -1,15 +1,15 @@
-"""Check if lines or bodies have come through each other in a step of any method, on its dense output.
+"""Penetration check of lines and bodies in a step of any method, on its dense output.
 
-A piece of a step is known at its start, in its middle and at its end. From each to the next rows are taken to move in
-straight lines, as in the drift of an explicit step, and the same kernels say what may meet there, see
-`refweb.dynamics.integrators.ccd`. A drift is checked before it is taken, and cut: from look to look it uses up what is
-free. A piece is a fact, and halved where rows are not sure not to meet, up to `HALVINGS` times. Two rows may come
-nearer than straight ways by as much as they are off these in the middle; a parabola leaves half of that open.
+A piece of a step is known at its start, in its middle and at its end. Between these, rows are taken to move in straight
+lines, as in the drift of an explicit step, and the same kernels check what may meet, see
+`refweb.dynamics.integrators.ccd`. Unlike a drift, a piece is not rejected: it is halved, up to `HALVINGS` times, while
+it is not certain that nothing meets. Two rows may come nearer than on straight paths by their distance from these paths
+in the middle; a parabola leaves half of that open.
 
-What points of a body move by as it turns is at most twice the difference of its quaternions times their distance from
-its place. Two bodies come nearer by no more than their places do, and what points of either turn by. Where that and
-their depth at the start are less than the least distance from a middle to its surface, or less than what the balls
-around both are apart, neither passes the other.
+By a rotation, points of a body move at most by twice the difference of its quaternions times their distance from its
+position. Two bodies approach at most by the approach of their positions plus the motion of points of each by rotation.
+Neither passes through the other if this approach plus their depth at the start is less than the least distance from a
+middle to its surface, or if the approach is less than the distance of the spheres around both.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Passages:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        The system.
     position : callable
         Displacement of all rows [m], shape (rows, 3), at a time within the last step.
     """

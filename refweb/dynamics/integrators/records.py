@@ -1,8 +1,8 @@
-"""Records of the compiled loop: what acts, what is looked at, and what moves.
+"""Records of the compiled loop: forces, monitors and motion.
 
-Kernels of one signature, and arrays of one type, stand in tables, so that the loop is compiled once for any mixture of
-effects. What a scene does not have is an empty table or array, and the kernels that would be called for it are not
-compiled, see `refweb.dynamics.integrators.features`.
+Kernels of one signature, and arrays of one type, are in tables, so that the loop is compiled once for any mixture of
+effects. Features that a scene does not have are empty tables or arrays, and their kernels are not compiled, see
+`refweb.dynamics.integrators.features`.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ class ForceTerms(Record):
     energies, stored : table
         Kernel of the energy of each term, and what it writes per cell [J].
     working : ndarray of int, shape (terms,)
-        Whether what is booked of a term is work (1), its energy, which is lost (−1), or nothing (0).
+        1 if the power of a term counts as work, −1 if it is energy lost, else 0.
     powers : ndarray of int, shape (powered, 3)
         Terms booked by their power, the column of ``outs`` that has it, and whether they depend on velocity.
     bounds, dampings : table
@@ -291,7 +291,7 @@ class Running(Record):
     extremes : refweb.dynamics.integrators.extremes.Extremes
         Extremes of probes and sums.
     events : ndarray of `refweb.dynamics.integrators.events.EVENT`
-        What each event has come to.
+        State of each event.
     averages : refweb.dynamics.integrators.averages.Averages
         Means over windows.
     power : ndarray, shape (terms,)
@@ -299,7 +299,7 @@ class Running(Record):
     length_force : ndarray, shape (2, changing)
         ∂E/∂L of each length that changes [N], at the last step and at this one.
     crossings : ndarray, shape (3, 5)
-        What has met, see `refweb.dynamics.integrators.integrator.IntegratorState`.
+        Lines and bodies that have met, see `refweb.dynamics.integrators.integrator.IntegratorState`.
     contacts, parts : table
         One array each, space for contacts that are solved for and for their parts.
     """

@@ -34,8 +34,8 @@ class Rupturing:
     system : refweb.system.system.System
         With a `refweb.effects.base.BreakLimits`.
     probes, sums, events : sequence
-        What to look at. The last of the events, where any tension breaks anything and there are any, is that the
-        largest tension over its limit passes 1; it ends the run.
+        Monitors. If elements break by tension, the last event is that the largest tension over its limit passes 1; it
+        ends the run.
 
     Attributes
     ----------

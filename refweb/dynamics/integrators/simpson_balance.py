@@ -31,7 +31,7 @@ class Sample:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        The system.
     time : float
         Time [s].
     x, v : ndarray, shape (rows, 3)
@@ -42,7 +42,7 @@ class Sample:
     force : ndarray, shape (rows, 3)
         Force on each row [N]; what supports give is its negative.
     per_cell : refweb.system.forces.PerCell
-        What terms show of their cells.
+        Output of the terms for their cells.
     """
 
     def __init__(self, system, time, x, v):
@@ -88,7 +88,7 @@ class Piece(NamedTuple):
     step : float
         Size of the step that it is a part of [s].
     jump : ndarray or None
-        What a jump of velocities at its end takes of these, at the corner of a motion.
+        Change of these by a jump of velocities at its end, at the corner of a motion.
     at : callable
         The `Sample` at a time within the step.
     """
@@ -127,7 +127,7 @@ class SimpsonBalance:
     Parameters
     ----------
     system : refweb.system.system.System
-        What acts.
+        The system.
     hold : callable
         ``hold(x, v)`` moves a state to the nearest one that the equations allow.
     fast : float

@@ -1,10 +1,10 @@
 """Explicit dynamics of higher order: symmetric Runge–Kutta–Nyström splittings in the loop of central differences.
 
-A step is a chain of kicks b h f/m and drifts a h v, the same forwards and backwards, of order 4 or 6 where forces
-follow from displacement alone and are smooth. A kink, of a line that goes slack or a body that touches, costs the step
-that it lies in its order. The splittings are symplectic, so that energy does not drift, and keep momenta to rounding.
-Largest values are looked for four times a step, and where parabolas through these turn back, on a polynomial of degree
-5 in between: an oscillator has them to 6e-10 with safety 0.5, and what has a kink to order 2.
+A step is a symmetric sequence of kicks b h f/m and drifts a h v. It is of order 4 or 6 if forces depend on displacement
+alone and are smooth. A kink of the force, at a contact or when a line goes slack, reduces the order of its step. The
+splittings are symplectic, so that energy does not drift, and they conserve momenta to rounding. Extremes are searched
+at four times in a step, and, between these, on a polynomial of degree 5. An oscillator has them to 6e-10 with safety
+0.5; values with a kink have them to order 2.
 
 Dead loads and motion may follow tables of time: steps end at the corners of these, and between them time is a
 coordinate that goes with the drifts, in which a force is taken where its drifts have come to, and what is moved at a
@@ -24,8 +24,8 @@ order 8, 17 stages, Kahan and Li        3.4e-9, 1.2e-10, 4.6e-12 m for 5594, 839
 DOP853, rtol = 1e-4, 1e-6, 1e-8, 1e-10  5.6e-8, 1.7e-9, 1.6e-11, 2.0e-13 m for 1673, 3365, 5657, 9113
 ======================================  =====================================================
 
-There is no order 8 here because of the last rows but one: down to 1e-13 m it needs more evaluations than order 6.
-In CPU time DOP853 with the same forces takes 1.9 to 3 times as long as order 4 or 6 for errors of 1e-7 to 1e-11 m, by
+Order 8 is not included, since it needs more evaluations than order 6 for errors down to 1e-13 m. In CPU time DOP853
+with the same forces takes 1.9 to 3 times as long as order 4 or 6 for errors of 1e-7 to 1e-11 m, by
 ``validation/methods/work_precision.py``.
 
 References

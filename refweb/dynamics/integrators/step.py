@@ -34,10 +34,10 @@ SWEEPS = 8
 """Largest number of sweeps over contacts in a step, which goes on where that before it came to. Where slip is resolved,
 the eighth changes velocities by 1e-10 of the fastest, and by 1e-6 in a first step."""
 STALLED, STILL = 0.5, 0.95
-"""Share of the change of the sweep before at which another is of no use; the same where forces that are iterated with
-them may settle as slowly, behind `SWEEPS` rounds. A line that sticks at its ends and in between has many ways to share
-what it bears, and hundreds of sweeps do not settle which: two in turn differ by a few hundredths. What is left moves
-nothing but its creep below the slip velocity, and the book closes without."""
+"""Change of a sweep, over that of the sweep before, at which sweeps end; the same after `SWEEPS` rounds if other
+forces, which are iterated as well, converge slowly. The friction forces of a line that sticks at several points are not
+unique, and hundreds of sweeps do not determine them: two successive sweeps differ by a few hundredths. The remaining
+changes only move the creep below the slip velocity, and the energy balance closes without further sweeps."""
 SETTLED = 1e-12
 """Change of velocities, over the fastest and over what other forces give, at which sweeps over contacts end."""
 
@@ -247,7 +247,7 @@ def move_supports(
 def turn_supports(t: float, model: Model, running: Running) -> bool:
     """Write prescribed velocities behind a corner at time t, and forces that follow from velocity; whether any jumps.
 
-    What the kinetic energy of the supports gains is work of their motion; the rows of a history show what is behind.
+    The gain of kinetic energy of the supports is work of their motion; history rows show the state after the corner.
     """
     driven, mass, terms, motions = model.inertia.driven, model.inertia.mass, model.terms, model.motions
     x, v, f, forces, cells, data = running.x, running.v, running.f, terms.forces, terms.cells, terms.data

@@ -71,7 +71,7 @@ class StepObserver(Integrator):
     system : refweb.system.system.System
         Of any order, with either mass.
     probes, sums, events : sequence
-        What to look at, see `refweb.dynamics.integrators.integrator`.
+        Monitors, see `refweb.dynamics.integrators.integrator`.
     rtol : float
         Relative tolerance of displacements and velocities.
     atol_position, atol_velocity : float, optional
@@ -84,7 +84,7 @@ class StepObserver(Integrator):
     tolerances : dict of str to float
         Absolute ones by unit: what moves by less is the method's own.
     stats : dict
-        What has been spent: ``nfev``, ``njev`` and ``nlu``.
+        Counts of the work: ``nfev``, ``njev`` and ``nlu``.
 
     Raises
     ------
@@ -99,11 +99,11 @@ class StepObserver(Integrator):
     course_type = ObservedState
     _made_of: tuple
     takes_massless = takes_links = takes_rotations = False
-    """Whether nodes without mass have a place in the method's equations, rigid links, and bodies that turn."""
+    """True if the method's equations can include nodes without mass, rigid links, and rotating bodies."""
     rotations = None  # the `refweb.dynamics.integrators.rotations.Rotations` of such bodies
     restarts = False
-    """Whether it begins anew at corners of tables: IDA's polynomial through the steps before a pulse of 1e-8 s gives
-    3 % too much of its impulse, a new beginning 4e-5."""
+    """True if the method restarts at corners of tables. The polynomial of IDA through the steps before a pulse of 1e-8
+    s gives 3 % too much of its impulse; with a restart the error is 4e-5."""
 
     def __new__(cls, *observed, **keys):
         """Note what it is made of, so that `refined` makes it of the same."""

@@ -44,7 +44,7 @@ class Sundials(StepObserver):
     Attributes
     ----------
     linear_solver, choice : str
-        Which linear solver is used, and why.
+        Linear solver, and the reason for it.
     """
 
     takes_rotations = True

@@ -1,8 +1,8 @@
 """Pairs of bodies that may touch each other, as terms of cells.
 
-A cell is two bodies: the rows of both, and two rows of rotation of each; where a body has fewer, its own row stands in
-their place and is not read. A skeleton that is one point with all of the thickness, a sphere's, says all there is to
-say of its contact with another body, whose own skeleton is then left out.
+A cell is two bodies: the rows of both, and two rows of rotation of each. If a body has fewer rows of rotation, its
+position row fills their columns and is not read. The skeleton of a sphere is one point with the whole thickness. It
+determines the contact with another body, whose skeleton is then left out.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from .body_body_detection import BODIES
 from .pair import lever
 
 PER_PART, MORE = 3, 1024
-"""Contacts that a part of a skeleton has at most on a convex body; room for more where one is not convex."""
+"""Largest number of contacts of a part of a skeleton on a convex body; space for further contacts if a body is not
+convex."""
 FELT_BY_BOTH = 1, 0
 """`ContactForce.felt` of two bodies."""
 
@@ -49,9 +50,9 @@ def force_terms(net, law_of):
     Parameters
     ----------
     net : refweb.net.net.Net
-        With bodies.
+        Net with bodies.
     law_of : callable
-        (stiffness, exponent, damping, friction, slip velocity) of two bodies.
+        Function of two bodies that returns (stiffness, exponent, damping, friction, slip velocity).
     """
     if not (pairs := pairs_of(net)):
         raise InputError(

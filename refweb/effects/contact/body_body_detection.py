@@ -1,11 +1,11 @@
 """Contact points of two bodies: the skeleton of each against the depth in the other.
 
 A part of a skeleton, see `refweb.net.skeleton`, has a thickness τ: it touches a body where it is inside of that body
-grown by τ. A straight line touches as an element of the web does, see `refweb.effects.contact.contact_points`, a point
-once. An arc touches once as well, at the place ξ where W δ^(p + 1) is largest, with the window W = sin²(π ξ). Each
-contact has the energy k/(p + 1) W δ^(p + 1), and since its place is that of an extreme its force is that of a fixed
-place: with G = ∂δ/∂y at its point y, −k W δ^p G on the first body, whose skeleton y is of, and the opposite on the
-other, both at y. So momentum and angular momentum are kept to rounding.
+grown by τ. A straight part has the contacts of an element of the web, see `refweb.effects.contact.contact_points`. A
+point has one contact. An arc has one contact, at the coordinate ξ where W δ^(p + 1) is largest, with the window W =
+sin²(π ξ). Each contact has the energy k/(p + 1) W δ^(p + 1). Since ξ is an extreme, the force is that of a fixed ξ.
+With G = ∂δ/∂y at the contact point y, it is −k W δ^p G on the body with the skeleton, and the opposite on the other
+body, both at y. Therefore momentum and angular momentum are conserved to rounding.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Frame(NamedTuple):
     axes : tuple of 3 tuples of 3 float
         Unit vectors of its axes.
     planar : bool
-        Whether it turns about the third alone.
+        True if the body rotates about the third axis alone.
     mobility : tuple of 6 float
         W of `refweb.net.rotation` along them, 00, 01, 02, 11, 12, 22.
     """

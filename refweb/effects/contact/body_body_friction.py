@@ -1,9 +1,9 @@
 """Damping and friction between two bodies, and how explicit kicks solve for them.
 
 The law is that of `refweb.effects.contact.friction`, with the contacts of `refweb.effects.contact.body_body_detection`.
-u is the velocity of the first body relative to the second where they touch: half the depth below the surface of either,
-so that a ball that rolls has none. F acts there on both, and has the moment a × F about the first body's row, a from
-there. What is solved for in a kick is that of `refweb.effects.contact_solver`; a contact here moves two rotations.
+u is the velocity of the first body relative to the second at the contact point, half the depth below the surface of
+each, so that a rolling sphere has no slip. F acts there on both bodies, with the moment a × F about the first body's
+row at the arm a. `refweb.effects.contact_solver` solves for F in a kick; such a contact moves two rotations.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .friction import facing, friction_force, turned_by
 from .line_body_friction import levers
 
 SLOTS = 3
-"""Number of contacts of a part that are remembered."""
+"""Number of contacts of a part whose forces are kept."""
 
 
 @kernel()

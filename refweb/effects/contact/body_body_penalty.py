@@ -1,9 +1,9 @@
 """Penalty of contact between two bodies, as compiled kernels.
 
 The contacts, their energy and forces are those of `refweb.effects.contact.body_body_detection`. A force F at the point
-y of a body is F on its row and the moment y × F on that of its rotation, y from its row. Tangents of all that acts
-between two bodies are found by differences of its forces, of order 2: they steer the iterations of implicit methods and
-stand in no result. With steps of `STEP` of the size of the bodies they miss by some 1e-9 of the largest entry.
+y of a body is F on its row and the moment y × F on that of its rotation, y from its row. Tangents of all forces between
+two bodies are differences of these forces, of order 2. Only iterations of implicit methods use them; results do not
+depend on them. With steps of `STEP` of the size of the bodies their errors are some 1e-9 of the largest entry.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from .pair import power_of_depth
 from .penalty import SHALLOW, slope_of_power
 
 STEP = 1e-6
-"""Step of differences, over the size of the smaller body, and for quaternions."""
+"""Step of differences, over the size of the smaller body; also the step for quaternions."""
 FARTHEST = 1e6
-"""Largest way that is looked ahead [m]: what is nearer may touch, no deeper than half of a body."""
+"""Largest distance that is checked ahead [m]: nearer bodies may touch, at most to a depth of half a body."""
 INWARD = 1.6
-"""Bound on the largest eigenvalue of the stiffness of a contact whose place moves, over that where it is held."""
+"""Bound on the largest eigenvalue of the stiffness of a contact that moves along a part, over that of a fixed
+contact."""
 CURVED = 1.2
-"""The same for what curvature and pushes on levers add."""
+"""Factor on this bound for curvature and for forces on lever arms."""
 
 
 @kernel()
@@ -74,7 +75,7 @@ def slopes_of(space_of, add_forces):
     Parameters
     ----------
     space_of : kernel
-        Makes what the other one works in.
+        Makes the working space of the other kernel.
     add_forces : kernel
         ``(x, v, f, cells, data, c, space)``: adds the forces of a pair to f.
     """

@@ -1,11 +1,12 @@
 """Contact points of a line on a body of any shape.
 
-A line that lies on a face, or along a ring or a cylinder, has no single nearest point: a force at the deepest one would
-jump from end to end. All shapes but spheres touch each element at both ends and once in between, at the place ξ where
-W(ξ) δ(ξ)^(p + 1) is largest, with the depth δ, the exponent p of the penalty and the window W = 4 ξ (1 − ξ). On a
-straight element that is one place, since the roots of W and δ are concave; it never jumps, and fades out where it nears
-an end, whose own contact takes over. On a curved one that bends away from the body between its ends there may be two,
-of which the deeper counts: the energy has a kink, and the force jumps, where they are equal.
+A line that lies on a face, or along a ring or a cylinder, has no single nearest point: a force at the deepest point
+would jump from end to end. Therefore all shapes but spheres have several contacts with each element: one at each end,
+and one in between. The latter is at the coordinate ξ where W(ξ) δ(ξ)^(p + 1) is largest, with the depth δ, the exponent
+p of the penalty and the window W = 4 ξ (1 − ξ). On a straight element this ξ is unique, since the roots of W and δ are
+concave. It does not jump, and its force vanishes near an end, where the contact of the end takes over. A curved element
+that bends away from the body may have two such ξ; the deeper one counts. Where both are equal, the energy has a kink
+and the force jumps.
 """
 
 from __future__ import annotations
@@ -22,16 +23,16 @@ from .nearest_point import SAMPLES, far, in_box, point, share
 from .pair import Pair, from_shape, pair_of, pairing
 
 NOWHERE = -1.0
-"""Place of the contact of an element that touches nowhere, not at its ends either."""
+"""Coordinate ξ of an element without any contact."""
 
 
 class ContactPoint(NamedTuple):
-    """A place of an element, as a body sees it: vectors are from its row and along its axes.
+    """A point of an element relative to a body: vectors are from the row of the body and along its axes.
 
     Attributes
     ----------
     y, d, e : tuple of 3 float
-        The line's point y there [m], y' = dy/dξ and y''.
+        The point y of the line [m], y' = dy/dξ and y''.
     depth : float
         Depth of that point δ [m].
     gradient, hessian : tuple of 3 and of 6 float
@@ -54,15 +55,15 @@ class PointContact(NamedTuple):
     c : int
         Cell.
     xi : float
-        Its place ξ.
+        Coordinate ξ of the contact.
     inner : bool
-        Whether the place moves as the line does.
+        True if ξ changes as the line moves.
     pair : Pair
         The element and the body.
     spot : ContactPoint
-        What is there.
+        The point of the line at ξ.
     weight, share : float
-        By what its energy counts, and its losses; 1 but on bodies that are not convex.
+        Factors on its energy and on its losses; both are 1 for convex bodies.
     """
 
     c: int
@@ -274,7 +275,7 @@ def places(depth, spins=0):
 def in_reach(depth, spins):
     """The kernel that tells whether an element with two nodes may touch its body within a skin.
 
-    Where a body is convex its depth is concave along the element, and nowhere above its tangent in the middle.
+    The depth in a convex body is concave along the element, and nowhere above its tangent in the middle.
     """
     boxed = in_box(spins)
     if not getattr(depth, "convex", True):

@@ -6,11 +6,11 @@ slip u_t = u − (n·u) n, and q = u_t/√(|u_t|² + v_s²). By Hunt and Crossle
 
     N = N₀ (1 + max(d δ̇, −1)) ≥ 0,        F = N₀ max(d δ̇, −1) n − μ N q,
 
-F being what is added here to the penalty. F acts on the line at the contact and on the body with −F and the moment
-−y × F about its centre, y from the centre to the line's point, so that their momenta and angular momenta are kept; a
-ring turns about its normal only, other bodies as `refweb.net.rotation` says. The power F·u is not positive. With the
-matrices A = ∂F/∂y and B = ∂F/∂u the tangents follow from dF = A dy + B du + F dW/W, where dy, du and dW have a part of
-the contact's place as it moves. How explicit kicks solve for F is in `refweb.effects.contact_solver`.
+where F is added to the force of the penalty. F acts on the line at the contact. On the body act −F and the moment −y ×
+F about its centre, with y from the centre to the line's point. Therefore momentum and angular momentum are conserved. A
+ring rotates about its normal only, other bodies as in `refweb.net.rotation`. The power F·u is not positive. With the
+matrices A = ∂F/∂y and B = ∂F/∂u, tangents follow from dF = A dy + B du + F dW/W, where dy, du and dW include the change
+of ξ. `refweb.effects.contact_solver` solves for F in explicit kicks.
 
 References
 ----------

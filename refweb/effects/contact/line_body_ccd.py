@@ -1,15 +1,15 @@
-"""Check if lines come as deep in a body as its middle while nodes and bodies move in straight lines.
+"""Penetration check of lines with bodies: lines must not reach the middle of a body in a drift.
 
-The push of a body turns over in its middle, where depth is largest: what comes there may leave on the other side. No
-point of a line comes deeper in a drift than it is, and the way of the line towards the body: that of the nodes of its
-element, less that of the body, and what that turns by. Where both together stay below `MIDDLE` of the distance of the
-middle from the surface, nothing passes. Lines that slide around a body at any depth pass nothing.
+The push of a body changes its direction in the middle, where depth is largest: a line that gets there may leave on the
+other side. In a drift the depth of a line grows at most by its relative displacement: that of the nodes of its element
+less that of the body, plus a part by the rotation of the body. If the sum of both stays below `MIDDLE` of the distance
+from the middle to the surface, no line passes. Lines may slide around a body at any depth.
 
-The depth of an element is largest between the places where it touches. On a straight one depth in a convex body is
-concave: from any place it rises by no more than its slope there times the way to the ends, and it is at most `SHOWN`
-times that of the contacts. With ξ that of the largest W δ^(p + 1), W = 4 ξ (1 − ξ), from W'/W ≤ 1/ξ follows
-|δ'| ≤ δ/((p + 1) ξ), and from there to the deepest place it is no further than ξ: (p + 2)/(p + 1) ≤ `SHOWN`. In a
-body that is not convex the largest gradient of depth bounds it.
+The depth of an element may be larger between its contacts. Along a straight element, the depth in a convex body is
+concave. From any point it rises by at most its slope there times the distance to the ends, and it is at most `SHOWN`
+times the depth of the contacts. Let ξ be that of the largest W δ^(p + 1), W = 4 ξ (1 − ξ). From W'/W ≤ 1/ξ follows |δ'|
+≤ δ/((p + 1) ξ), and the deepest point is at most ξ away: (p + 2)/(p + 1) ≤ `SHOWN`. In a body that is not convex, the
+largest gradient of depth gives a bound.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from .overlap import CORE
 from .pair import SPHERE, pair_of
 
 MIDDLE = 0.7
-"""Depth that lines stay below, over the distance from the middle of a body to its surface: depth is 0.737 of that in
-the middle of a cube, 0.757 in that of a square bar, 0.8 in that of a plate, and all of it in a sphere or a capsule."""
+"""Depth that no line may reach, over the distance from the middle of a body to its surface. The depth in the middle is
+0.737 of that distance for a cube, 0.757 for a square bar, 0.8 for a plate, and 1 for a sphere or a capsule."""
 SHOWN = 1.5
-"""Depth of an element in a convex body over that of its deepest contact, at most; of spheres it is that."""
+"""Largest depth of an element in a convex body over that of its deepest contact; for spheres both are equal."""
 PARTS = 256
-"""Largest number of parts of an element whose depth is looked at one by one."""
+"""Largest number of parts of an element whose depth is evaluated one by one."""
 
 
 def limits_of(term, bodies):
-    """(Least depth that nothing is to come to [m], depth of an element over that which is shown of it, at most).
+    """(Depth that no line may reach [m], largest depth of an element over that of its contacts).
 
-    The second is infinite where that is not known. They are those of a term and the bodies that its cells touch.
+    Both are for a term and the bodies that its cells may touch. The second is infinite if it is not known.
     """
     own_bodies = [body for body in bodies if body.row in term.cells[:, 2]]
     observed = [
@@ -47,7 +47,7 @@ def limits_of(term, bodies):
 
 @kernel(forceinline=True)
 def nearing(cells, c, nodes, kick, drift, v, f, inverse):
-    """Largest way of a node of cell c less that of its body in a drift behind a kick [m]."""
+    """Largest displacement of a node of cell c relative to its body in a drift after a kick [m]."""
     fastest, b = 0.0, cells[c, nodes]
     for a in range(nodes):
         i, square = cells[c, a], 0.0
@@ -62,8 +62,8 @@ def nearing(cells, c, nodes, kick, drift, v, f, inverse):
 def passing(depth, nodes, functions, spins=0):
     """The kernel of `refweb.kernels.MEETS` of lines in bodies of one depth, None for spheres alone.
 
-    It writes the nodes of an element, the row of the body, and 1 where that is in the core of the body already, else 0.
-    ``margin`` is what points of bodies come nearer by as they turn. Arguments are those of
+    It writes the nodes of an element, the row of the body, and 1 if the element is in the core already, else 0.
+    ``margin`` is the approach of points of bodies by their rotation. Arguments are those of
     `refweb.effects.contact.penalty.kernels`.
     """
     if depth is None:

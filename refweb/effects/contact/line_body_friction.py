@@ -1,9 +1,9 @@
-"""Losses of contact of lines with bodies, solved for where an explicit method kicks velocities.
+"""Damping and friction of lines on bodies in explicit kicks.
 
-How they are solved for is in `refweb.effects.contact_solver`; here is the detection of contacts.
+`refweb.effects.contact_solver` solves for them; this module detects the contacts.
 
-Lines that end at one node touch a body there at one point, with one normal and one slip. They are one contact of their
-pushes together: its forces are the sum of theirs, and sweeps need not settle which of them bears how much.
+Lines that end at one node touch a body there at one point, with one normal and one slip. They are one contact with the
+sum of their forces, so that sweeps need not distribute the force among them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .pair import LINE_CONTACT
 from .penalty import rubbed_by
 
 SLOTS = 3
-"""Contacts that a cell has at most: one in between, and one at either end."""
+"""Largest number of contacts of a cell: one in between, and one at each end."""
 
 
 @kernel(forceinline=True)

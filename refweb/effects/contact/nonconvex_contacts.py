@@ -1,16 +1,18 @@
 """Contact points of a line on a body that is not convex.
 
 There F = W(ξ) δ(ξ)^(p + 1), see `refweb.effects.contact.contact_points`, may have several maxima along an element, with
-minima in between. Its energy is k/(p + 1) times what F rises by along the element: the sum of its maxima less that of
-its minima where the line is inside. Of a convex body that is the one maximum. A maximum that appears on a slope brings
-a minimum of the same place, and one that appears at the surface has no depth: so the energy has one slope everywhere.
+minima in between. The energy is k/(p + 1) times the total rise of F along the element: the sum of its maxima less that
+of its minima where the line is inside. For a convex body this is the single maximum. A maximum and a minimum that
+appear on a slope have the same position, and a maximum that appears at the surface has no depth. Therefore the energy
+has a continuous slope.
 
-Maxima and minima are the places where the slope of F changes its sign, from one sample to the next; samples are at most
-half as far apart as the length on which the surface may turn. Where a sample is outside, the line is outside as far as
-its distance from the surface; those samples are left out.
+Maxima and minima are found where the slope of F changes its sign between two samples. The distance of samples is at
+most half the length on which the surface may turn. If a sample is outside of the body, the line is outside over its
+distance from the surface, and samples there are left out.
 
-Losses have no energy: each maximum has the share of its push that F falls by on both sides on average, and minima have
-none. These shares are those of the rise, none is negative, and friction takes energy wherever it acts.
+Friction and damping have no energy. Each maximum counts with a share of its push: the fall of F to both sides, on
+average, over F. Minima do not count. The sum of these shares equals the total rise, no share is negative, and friction
+always dissipates.
 """
 
 from __future__ import annotations
@@ -26,15 +28,15 @@ from .nearest_point import far, point
 from .pair import LINE_CONTACT, pair_of, power_of_depth
 
 SAMPLES = 256
-"""Largest number of parts of an element between whose ends slopes are looked at."""
+"""Largest number of parts of an element for samples of the slope."""
 LEAST = 4
-"""Least number of them."""
+"""Least number of such parts."""
 PLACES = 2 * SAMPLES + 2
 """Largest number of contacts of an element."""
 LOOKS = 4
-"""Number of looks for a slope of F that changes its sign twice between two samples."""
+"""Number of further samples for a slope of F that changes its sign twice between two samples."""
 FURTHER = 1.8
-"""How far the next sample is from one outside, over its distance from the surface: at 2 both see all between."""
+"""Distance of the next sample from one outside, over its distance from the surface; 2 would just leave no gap."""
 STEEPEST = 1.25
 """Largest gradient of a depth."""
 

@@ -1,20 +1,20 @@
 """Allowed penetration of lines into bodies, and the stiffness of contact that keeps it.
 
-A penalty lets lines in, and a weak one lets them through. An overlap is held against the size of the body: the radius
-of a sphere, of a ring in its plane, or the smallest edge or diameter of another shape. Above `SHARE` of it contact is
-not that with a rigid body; a line that is deeper than `CORE` of the way to the middle passes through, for its push may
-turn to the other side at any moment.
+A penalty lets lines in, and a weak one lets them through. The overlap is compared with the size of the body: the radius
+of a sphere, of a ring in its plane, or the smallest edge or diameter of another shape. If it is above `SHARE` of this
+size, the contact is not that with a rigid body. A line deeper than `CORE` of the distance to the middle counts as
+passed through, since its push may change to the other side.
 
-The push k δ^p stores k δ^(p + 1)/(p + 1). A body that brings the energy E is stopped at δ by k = (p + 1) E/δ^(p + 1), a
-push F is held there by k = F/δ^p, whatever else gives way. So the stiffness that would do follows from an overlap that
-was found: it falls with k^(−1/(p + 1)) where a body comes with its energy, with k^(−1/p) where it is pushed.
+The push k δ^p stores k δ^(p + 1)/(p + 1). A body with the energy E stops at δ if k = (p + 1) E/δ^(p + 1); a force F is
+in balance at δ if k = F/δ^p, if nothing else yields. Hence a sufficient stiffness follows from a computed overlap,
+which is proportional to k^(−1/(p + 1)) for a given energy, and to k^(−1/p) for a given force.
 
 The window W of a contact between the ends of an element, see `refweb.effects.contact.contact_points`, makes it softer
-near these, and lets a body in deeper there: it rolls into the ends as into hollows. Of a body that a force N presses by
-δ into the middle of a straight chain of elements of length L, with the radius r of its surface along the chain,
-energies along the way differ by 0.145 N (δ² L²/r)^⅓, for all δ/L from 5e-4 to 0.05 and r/L from 0.05 to 5 within a
-quarter. So contact pushes along a line, forth and back, by `ALONG` (δ²/(L r))^⅓ of each push on average. Other laws,
-over this:
+near the ends. A body penetrates deeper there, so that it is pushed along the line towards the ends. Let a force N press
+a body by δ into the middle of a straight chain of elements of length L, with the radius r of the surface of the body
+along the chain. Energies along the chain differ by 0.145 N (δ² L²/r)^⅓, within a quarter for all δ/L from 5e-4 to 0.05
+and r/L from 0.05 to 5. Therefore contact pushes along a line, in alternating directions, by `ALONG` (δ²/(L r))^⅓ of
+each push on average. Other laws have these factors on it:
 
 =====================================================================  ==================================
 laws, at r = L/4                                                       δ/L = 5e-4, 5e-3, 5e-2
@@ -41,30 +41,30 @@ from ...net.rigid_body import RigidBody
 from ..base import pairs_of
 
 SHARE = 0.1
-"""Overlap that is allowed, over the size of the body."""
+"""Allowed overlap, over the size of the body."""
 CORE = 0.5
 """Overlap at which a line is in the core, over the distance from the middle of the body to its surface."""
 AIM = 0.2
-"""Overlap that a stiffness is chosen for, over what is allowed: 2 % of the size of the body.
+"""Overlap for which a stiffness is chosen, over the allowed overlap: this is 2 % of the size of the body.
 
-Of a net of 16 × 16 cells that is thrown at a box of 500 kg this costs as many steps as 0.8 does, whose contact is 16
-times softer; 0.1 costs 2.4 times as many."""
+For a net of 16 × 16 cells that is thrown at a box of 500 kg, this takes as many steps as 0.8, whose contact is 16 times
+softer; 0.1 takes 2.4 times as many."""
 NOTED = 1.0 / 30.0
-"""Overlap over the size of the body above which it is told: results may move with it."""
+"""Overlap over the size of the body above which a finding reports it, since results may depend on it."""
 STIFFER = 25.0
-"""Factor of a stiffness that is chosen anew in dynamics: energy that reaches the overlap that is allowed comes to `AIM`
-of it then. How deep the overlap is says less, for it may still be growing when it is looked at."""
+"""Factor on a stiffness that is chosen again in dynamics: the energy of the allowed overlap then leads to `AIM` of it.
+The present overlap tells less, since it may still be growing."""
 DEEPER = 1.1
-"""Factor on the overlap at the start up to which a deeper one is no matter of stiffness."""
+"""Factor on the overlap at the start up to which the stiffness is not the cause of a deeper overlap."""
 ALONG, TOLD = 0.29, 0.05
-"""Push along a line over that of its contact and (δ²/(L r))^⅓, and its share above which it is told, where there is
-less friction."""
+"""Push along a line over that of its contact and (δ²/(L r))^⅓; share of the push above which a finding reports it, if
+friction is smaller."""
 MOST_TIMES = 200
-"""Largest number of times at which loads and motions are looked at."""
+"""Largest number of times at which loads and motions are evaluated."""
 
 
 def size_of(body):
-    """Length that an overlap is held against [m]; infinite for a body without end."""
+    """Size of a body for the comparison with an overlap [m]; infinite for ground."""
     return body.thickness * (1.0 if body.shape.once or body.shape.planar else 2.0)
 
 
@@ -74,12 +74,12 @@ def allowed(body):
 
 
 def allowed_in(net, body):
-    """Overlap that is allowed of a body of a net [m]: of ground as of a body as small as the shortest line."""
+    """Allowed overlap of a body of a net [m]; ground counts as a body of the size of the shortest line."""
     return min(allowed(body), SHARE * float(net.natural_length.min())) if body.shape.ground else allowed(body)
 
 
 def aim(net, body):
-    """Overlap that a stiffness is chosen for [m]."""
+    """Overlap for which a stiffness is chosen [m]."""
     return AIM * allowed_in(net, body)
 
 
@@ -90,7 +90,7 @@ def rounded_up(value):
 
 
 def too_soft(deepest, where, limit, names):
-    """The `PenetrationError` of a contact deeper than ``limit`` [m], whose stiffness was chosen for some bodies."""
+    """The `PenetrationError` for a contact deeper than ``limit`` [m], whose stiffness refweb chose for some bodies."""
     factor = STIFFER * deepest.stiffness
     stiffer = rounded_up(factor if deepest.moving else max(deepest.enough, factor))
     return PenetrationError(
@@ -101,9 +101,9 @@ def too_soft(deepest, where, limit, names):
 
 
 def push_along(body, overlap, length):
-    """Share of the push of a contact by which it pushes along elements of a length [m], on average, at most.
+    """Largest average push along elements of a length [m], over the push of the contact.
 
-    It is that of the sharpest of what is round of a body; 0 of one that touches a line once, wherever it does.
+    It is that of the smallest radius of curvature of the body; 0 for a sphere, which touches a line once.
     """
     if body.shape.once or not overlap > 0.0:
         return 0.0
@@ -157,12 +157,12 @@ class Deepest:
 
     @property
     def too_deep(self):
-        """True if it is deeper than allowed."""
+        """True if the overlap is not allowed."""
         return self.overlap > self.allowed
 
     @property
     def at_start(self):
-        """True if it is deepest where it starts."""
+        """True if the overlap is deepest at the start."""
         return self.moving and self.overlap <= self.initial
 
     @property
@@ -172,9 +172,9 @@ class Deepest:
 
     @property
     def enough(self):
-        """Stiffness that would do [N/m^p]: of an overlap that is `AIM` of what is allowed.
+        """Sufficient stiffness [N/m^p]: it leads to `AIM` of the allowed overlap.
 
-        In the core the depth says little: it is no less than what the energy at the start asks for.
+        In the core the depth tells little: there it is at least the stiffness for the energy at the start.
         """
         share = self.overlap / (AIM * self.allowed)
         factor = self.stiffness * share ** (self.exponent + self.moving)
@@ -226,7 +226,7 @@ class DeepestLine(Deepest):
 
     @property
     def _percent(self):
-        """Overlap in per cent of the size that it is held against."""
+        """Overlap in per cent of the size of the body."""
         return 100.0 * self.overlap * SHARE / self.allowed
 
     @property
@@ -254,7 +254,7 @@ class DeepestLine(Deepest):
         )
 
     def remarks(self, what="the web"):
-        """Remarks for a reader of the results; ``what`` is all that it might have touched."""
+        """Findings on the contact; ``what`` is the text for all objects that it might have touched."""
         if self.overlap <= 0.0:
             yield Finding(
                 "never-touched", f'body "{self.body.name}" never touches {what}, though there is a [contact]', "contact"
@@ -283,13 +283,13 @@ class Overlaps:
     Parameters
     ----------
     scene : refweb.Scene
-        With a stiffness for each body; those of ``scene.chosen`` are refweb's choice.
+        Scene with a stiffness for each body; refweb chose those of ``scene.chosen``.
     system : refweb.system.system.System
         That of the scene.
     moving : bool
-        Whether bodies come with energy, in dynamics, or are pushed.
+        True in dynamics, where bodies have energy; False in statics, where they are pushed.
     pairs : refweb.effects.contact.pair_overlap.PairOverlaps, optional
-        Those of bodies in each other, where they touch.
+        Contacts of bodies with bodies, if there are any.
     """
 
     def __init__(self, scene, system, moving, pairs=None):

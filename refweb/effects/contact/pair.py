@@ -1,4 +1,4 @@
-"""Numbers of a pair, one element and one body, as the kernels of contact read them.
+"""Data of a pair, one element and one body, for the kernels of contact.
 
 Data of a cell begin with a `SPHERE` and the vectors from the centre to the cell's nodes in the web's position; behind
 these stands a `SURFACE`, which spheres alone do not need, and at the end a `TURNING` of a body that turns in space.
@@ -84,7 +84,7 @@ def pair_data(body, cells, points, law, tumbles=False):
     law : tuple of 5 float
         Stiffness, exponent, damping, friction and slip velocity, as in `Pair`.
     tumbles : bool
-        Whether its axes are those of its rows of rotation.
+        True if the axes of the body follow from its rows of rotation.
     """
     away = (points[cells] - points[body.row]).reshape(len(cells), -1)
     shape, (stiffness, *law) = body.shape, law

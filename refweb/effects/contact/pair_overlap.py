@@ -1,12 +1,12 @@
 """Allowed penetration of bodies into each other, the stiffness that keeps it, and the proof that none passes.
 
-An overlap is held against the smaller of two bodies, as that of a line is against one, see
-`refweb.effects.contact.overlap`. Nothing has passed through a body unless its middle was passed, between two steps or
-at one. In a step two bodies come nearer by at most its length times the speeds of their fastest points. So where the
-deepest overlap of all steps and that way together are less than the least distance from a middle to its surface, it is
-certain that nothing has passed. Explicit steps by the bound are so short that this way is 0.2 of that distance times
-``safety``; for explicit steps of a given size that and the largest speed of the run tell. Steps of CVODE and IDA are
-followed one by one, see `refweb.dynamics.integrators.body_body_ccd`.
+The overlap is compared with the size of the smaller of both bodies, as for a line, see
+`refweb.effects.contact.overlap`. A body can only pass through another by its middle, at a step or between two. In a
+step two bodies approach by at most the step times the speeds of their fastest points. If this approach plus the deepest
+overlap of all steps is less than the least distance from a middle to its surface, it is proven that nothing has passed.
+The bound of explicit steps limits the approach to 0.2 times that distance times ``safety``. For explicit steps of a
+given size, it follows from the step and the largest speed of the run. Steps of CVODE and IDA are checked one by one,
+see `refweb.dynamics.integrators.body_body_ccd`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from ..base import pairs_of
 from .overlap import AIM, CORE, Deepest, allowed, first_between, size_of
 
 WAY = 0.2
-"""Way of two bodies in an explicit step, over the thickness of the smaller and ``safety``: what the bound allows."""
+"""Largest approach of two bodies in an explicit step by the bound, over the thickness of the smaller body and
+``safety``."""
 
 
 @dataclass(frozen=True)

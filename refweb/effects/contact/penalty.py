@@ -1,14 +1,14 @@
 """Penalty of contact with a body of any shape, as compiled kernels.
 
-Each contact, see `refweb.effects.contact.contact_points`, has the energy k/(p + 1) W δ^(p + 1). Its place ξ is where
-that is largest or an end of its element, so that the force is that of a fixed place. With the shares N of nodes, −1 of
-the body, g = ∂δ/∂x and the matrix H = ∂²δ/∂x² at the place, and y' = dy/dξ of the line,
+Each contact, see `refweb.effects.contact.contact_points`, has the energy k/(p + 1) W δ^(p + 1). Its ξ is a maximum of
+this energy or an end of its element, so that the force is that of a fixed ξ. With the shape functions N of nodes, −1
+for the body, g = ∂δ/∂x and the matrix H = ∂²δ/∂x² at the contact point, and y' = dy/dξ of the line,
 
     stiffness of (a, b)    k W N_a N_b (p δ^(p−1) g⊗g + δ^p H) + c_a⊗∂ξ/∂x_b,
     c_a                    k δ^(p−1) [(W' δ + p W δ') N_a g + W δ (N_a H y' + N_a' g)].
 
-A body that turns feels the moment y × F of its push F about its centre, y from there to the line's point; what that
-adds to the stiffness is in `refweb.effects.contact.rotational_stiffness`.
+A rotating body has the moment y × F of its push F about its centre, with y from the centre to the line's point.
+`refweb.effects.contact.rotational_stiffness` has the stiffness of this moment.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from .pair import LINE_CONTACT, lever_of, pair_of, pairing, power_of_depth
 from .rotational_stiffness import add_moments, add_push, add_rotation, set_arms
 
 SHALLOW = 0.05
-"""Share of the depth and of the rate of depth that a contact may come to which losses reckon with before it is there: a
-step that has to do with more is iterated for longer, and the next bound knows the depth."""
+"""Share of the possible depth and rate of depth of a contact that the bound of losses includes in advance. If a step
+has more, it takes more iterations, and the next bound knows the depth."""
 SPREAD = 2.5
 """Bound on the row sums of the stiffness of an element's contacts, both ends and one between, over k p δ^(p − 1)."""
 HOLLOW = 2.0
-"""The same of a body that is not convex, over this: where it is hollow curvature adds δ ∂²δ/∂x² ≤ 1."""
+"""Factor on this bound for a body that is not convex: curvature of hollow parts adds δ ∂²δ/∂x² ≤ 1."""
 
 
 @kernel()

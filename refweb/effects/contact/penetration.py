@@ -1,12 +1,12 @@
-"""Check if lines can have passed through bodies.
+"""Penetration check of lines with bodies.
 
-A line passes a body through its middle, where the push turns over. Methods follow how deep every line comes, see
-`refweb.effects.contact.line_body_ccd`: explicit ones before each drift, in which nodes and bodies move in straight
-lines, and those of steps of their own on their interpolants. So it is certain that nothing has passed where no line has
-come to the middle of a body from the start of a run on; that a line is in the core at the start is refused.
+A line can only pass through a body by its middle, where the push changes its direction. All methods check the depth of
+every line, see `refweb.effects.contact.line_body_ccd`. Explicit methods do so before each drift, in which nodes and
+bodies move in straight lines; CVODE and IDA use their interpolants. If no line has reached the middle of a body since
+the start of a run, it is proven that nothing has passed. A line in the core at the start is refused.
 
-The middle of a mesh is that of its field, see `refweb.net.boundary.field`: where a wall is thinner than nearly all of
-its surface, it is not seen.
+The middle of a mesh is that of its field, see `refweb.net.boundary.field`. Walls that are thinner than nearly all of
+the surface are not checked.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ class BodyPassage:
         self._followed = any(term.contact.passing is not None for term in system.terms)
 
     def record(self, met):
-        """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.IntegratorState.crossings`."""
+        """Record the first crossing, a row of `refweb.dynamics.integrators.integrator.IntegratorState.crossings`."""
         self._met = met
 
     def status(self):
-        """True if nothing can have passed, as ``run.json`` has it."""
+        """Status as in ``run.json``: "certified", or the reason for doubt."""
         if not self._followed:
             return "not certified: curved elements are not followed"
         time, *met = self._met

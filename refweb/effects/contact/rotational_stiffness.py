@@ -1,13 +1,13 @@
 """Tangents of contact by rotation, as compiled kernels.
 
-Forces at a contact depend on how the body stands to the line alone: to turn the body by δθ, and the line and all
-velocities with it, turns the forces. With the blocks K_b = −∂f/∂x_b and C_b = −∂f/∂v_b of the nodes b, whose arms from
-the centre are p_b, and the velocities v_b of all rows, the stiffness against a rotation of the body alone is therefore
+Forces at a contact depend on the relative position of body and line. If the body, the line and all velocities rotate by
+δθ, the forces rotate as well. Let K_b = −∂f/∂x_b and C_b = −∂f/∂v_b be the blocks of the nodes b, with arms p_b from
+the centre and velocities v_b of all rows. Then the stiffness against a rotation of the body alone is
 
     K_θ δθ = −Σ K_b (δθ × p_b) − Σ C_b (δθ × v_b) − δθ × f.
 
-The moment on the body is −Σ p_a × f_a of the forces f_a on nodes, whence its rows. A rotation by a quaternion changes
-with that by δθ = 2 (q₀ δq − δq₀ q + q × δq)/|q|². All but the last is along the axes of the body.
+The rows of the moment on the body follow from −Σ p_a × f_a with the forces f_a on nodes. A change of the quaternion
+rotates the body by δθ = 2 (q₀ δq − δq₀ q + q × δq)/|q|². All but the last is along the axes of the body.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Penalty of contact with spheres, as compiled kernels.
 
-The penalty acts once per line of the web, at the line's point nearest the centre of a sphere: with its distance d and
-the radius R the energy is ½ k (R − d)₊², shared by the nodes as the functions N of the element have it at that point.
-Contact is thus the same however finely a line is divided. With p the vector from the centre to that point, ξ its place
-on the element and m = ∂(p·p')/∂q, p' = ∂p/∂ξ, the Hessian of ½ d² is BᵀB − m mᵀ/(|p'|² + p·p'') while 0 < ξ < 1.
+The penalty acts once per line of the web, at the line's point nearest the centre of a sphere. With its distance d and
+the radius R the energy is ½ k (R − d)₊². The shape functions N of the element distribute the force to the nodes.
+Contact is thus the same for any number of elements. Let p be the vector from the centre to that point, ξ its coordinate
+on the element, p' = ∂p/∂ξ, and m = ∂(p·p')/∂q. Then the Hessian of ½ d² is BᵀB − m mᵀ/(|p'|² + p·p'') while 0 < ξ < 1.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""Penalty contact of lines with rigid bodies, with damping and friction where asked for.
+"""Penalty contact of lines with rigid bodies, with optional damping and friction.
 
-The kernels of spheres alone are in `refweb.effects.contact.sphere`; other shapes, which touch a line wherever it lies
-on them, and other exponents are in `refweb.effects.contact.penalty`, damping and friction in
-`refweb.effects.contact.friction`, and how explicit steps solve for them in `refweb.effects.contact_solver`. Bodies
-whose kernels are the same make one term.
+The kernels for spheres are in `refweb.effects.contact.sphere`, those for other shapes and exponents in
+`refweb.effects.contact.penalty`, and those of damping and friction in `refweb.effects.contact.friction`. Explicit steps
+use the solver in `refweb.effects.contact_solver`. Bodies with the same kernels make one term.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from .pair import AWAY, pair_data
 KEYS = "stiffness", "exponent", "damping", "friction", "slip_velocity"
 """Keys of the law of a contact."""
 OUT_OF_REACH = 1e6, 7e5, 4e5
-"""How far from every body broken elements are taken to be [m]."""
+"""Offset of broken elements from every body [m], so that they touch nothing."""
 
 
 @accepts({"enum": [1, 1.5]})
@@ -36,7 +35,7 @@ def _exponent(name, value):
 
 @table
 class BodyContact(Table):
-    """Keys of one body that differ; they are those of `Contact`.
+    """Keys of `Contact` with other values for one body.
 
     Examples
     --------
@@ -60,56 +59,57 @@ def _bodies(name, value):
 
 
 def rotations(body):
-    """Number of its rows of rotation."""
+    """Number of rows of rotation of a body."""
     return (body.spin is not None) + (body.turn is not None)
 
 
 @table
 class Contact(Table):
-    """Contact of the web with all bodies, and where asked for of bodies with each other.
+    """Contact of the web with all bodies, and optionally of bodies with each other.
 
-    A sphere touches a line once. Other shapes touch each of its elements at both ends, and once in between, at ξ of its
-    length with the energy W k δ^(p + 1)/(p + 1), W = 4 ξ (1 − ξ), so that nothing jumps as a line slides on. What fades
-    pushes along the line as well, forth and back, by some 0.3 (δ²/(L r))^⅓ of the push on average, of an element of
-    length L and a surface of radius r along it, to which ± is blind: where that is above 5 % and friction, a run says
-    so. Lines in pieces, ``subdivide``, and a larger stiffness make it less.
+    A sphere has one contact with a line. Other shapes have a contact with each element at both ends, and one in
+    between. The latter, at ξ of the length, has the energy W k δ^(p + 1)/(p + 1) with W = 4 ξ (1 − ξ), so that no force
+    jumps as a line slides. The window W also causes a push along the line, in alternating directions. On average it is
+    some 0.3 (δ²/(L r))^⅓ of the push, for an element of length L and a surface of radius r along it. ± does not contain
+    this error: a finding reports it if it is above 5 % and above friction. More elements, ``subdivide``, and a larger
+    stiffness reduce it.
 
-    A line passes a body through its middle, where the push turns over. How deep every line comes is followed from the
-    start of a run on, and ``passage`` of ``run.json`` says "certified" of ``bodies`` where none has come there: before
-    each drift of an explicit step, which is cut where one would, and in steps of cvode and ida on their interpolants.
-    Steps of order 4 and 6 are cut where one of order 2 would be, and what comes through nevertheless is told of; load
-    steps of statics and curved elements are not followed. What is not certified is a warning as well. ``pairs`` are
-    bodies that touch each other.
+    A line can only pass through a body by its middle, where the push changes its direction. The penetration check
+    follows the depth of every line from the start of a run: before each drift of an explicit step, and on the
+    interpolants of cvode and ida. ``passage`` of ``run.json`` is "certified" for ``bodies`` if no line has reached the
+    middle of a body. An explicit step is cut if a line would reach it. A step of order 4 or 6 is cut if a step of order
+    2 would be; a line that passes nevertheless is reported. Load steps of statics and curved elements are not checked.
+    A warning reports bodies that are not certified. ``pairs`` is for bodies that touch each other.
 
     Parameters
     ----------
     stiffness : float, optional
-        Penalty k of each contact [N/m], or [N/m^1.5] with that exponent. Where it is left out, here and for a body,
-        refweb chooses it from what moves and pushes, and chooses it anew where lines get deeper into the body than a
+        Penalty k of each contact [N/m], or [N/m^1.5] with that exponent. If it is left out, here and for a body, refweb
+        chooses it from velocities, masses and forces. It chooses a larger one if lines penetrate the body deeper than a
         tenth of its size, see `refweb.effects.contact.overlap`.
     exponent : {1, 1.5}
         p of the push k δ^p at the depth δ.
     damping : float
-        d of Hunt and Crossley [s/m]: a push of k δ^p (1 + d δ̇), never a pull. A body that comes with a small velocity
-        v is thrown back with 1 − 2/3 d v of it.
+        d of Hunt and Crossley [s/m]: a push of k δ^p (1 + d δ̇), never a pull. A body with a small velocity v rebounds
+        with 1 − 2/3 d v of it.
     friction : float
-        Coefficient of friction μ. It turns free bodies; a push turns those alone that are no spheres or rings.
+        Coefficient of friction μ. Friction rotates free bodies; a push rotates all free bodies but spheres and rings.
     slip_velocity : float
-        Velocity of slip v_s [m/s] at which friction is 1/√2 of what it comes to; below, it is viscous. Explicit steps
-        do not depend on it.
+        Slip velocity v_s [m/s] at which friction is 1/√2 of its limit; below it, friction is viscous. Explicit steps do
+        not depend on it.
     between_bodies : bool
-        Whether bodies touch each other as well, edges on edges too: all but pairs that are both fixed. They do so with
-        each corner once, with each edge, as with the axis of a capsule, once between its ends, and with rims; a sphere
-        touches once. Each contact has the push k δ^p, one of an edge that of a line, k W δ^p: it fades towards the
-        ends, and edges that cross have one each. Stiffness, damping, friction and slip velocity of a pair are the
-        larger of both bodies'.
+        True for contact of bodies with each other as well, for all pairs but two fixed bodies. Contacts are at each
+        corner, between the ends of each edge and of the axis of a capsule, and on rims; a sphere has one contact. Each
+        contact has the push k δ^p. The contact of an edge has that of a line, k W δ^p, which vanishes towards the ends;
+        edges that cross have one each. Stiffness, damping, friction and slip velocity of a pair are the larger ones of
+        both bodies.
     bodies : dict of str to BodyContact
-        What differs for a body.
+        Keys with other values for a body.
 
     Raises
     ------
     InputError
-        For a stiffness or a slip velocity that is not > 0, damping or friction < 0, and another exponent; from ``on``,
+        For a stiffness or a slip velocity that is not > 0, damping or friction < 0, and another exponent. From ``on``,
         without a body, and for a name in ``bodies`` that no body has.
 
     Examples
@@ -133,7 +133,7 @@ class Contact(Table):
         return getattr(self, key) if given is None else given
 
     def law_of(self, body):
-        """(stiffness, exponent) of a body; the stiffness is None where it is left out."""
+        """(Stiffness, exponent) of a body; the stiffness is None if it is left out."""
         return self._of(body, "stiffness"), self._of(body, "exponent")
 
     def friction_of(self, body):
@@ -141,7 +141,7 @@ class Contact(Table):
         return self._of(body, "friction")
 
     def left_out(self, bodies):
-        """Names of those of some bodies whose stiffness is left out."""
+        """Names of bodies whose stiffness is left out."""
         return tuple(body.name for body in bodies if self._of(body, "stiffness") is None)
 
     def with_stiffness(self, stiffness):
@@ -150,7 +150,7 @@ class Contact(Table):
         return replace(self, bodies={**self.bodies, **by_body})
 
     def extend(self, net):
-        """The net whose free bodies turn where friction turns them."""
+        """The net with rows of rotation for free bodies that friction rotates."""
 
         def turns(body):
             return body.turns or not body.prescribed and self._of(body, "friction") > 0.0
@@ -158,8 +158,7 @@ class Contact(Table):
         return replace(net, bodies=tuple(replace(body, turns=turns(body)) for body in net.bodies))
 
     def on(self, net):
-        """The terms of all pairs of a line and a body, of one kind each; ``out`` has the depth of the deepest
-        contact [m], or the power of what is lost [W], and the force on the body [N]."""
+        """The terms of lines on bodies; ``out`` has depth [m] or lost power [W], and the force on the body [N]."""
         names = [body.name for body in net.bodies]
         if not names:
             raise InputError("there is no [[body]] that the web could touch: add one")
@@ -196,9 +195,7 @@ class Contact(Table):
         return tuple(map(max, *laws))
 
     def _pairs(self, net, bodies, spins=0) -> dict:
-        """Common arguments of a `ForceTerm` of every element with each of some bodies, with ``spins`` rows of their
-        rotations.
-        """
+        """Common arguments of a `ForceTerm` of elements and some bodies, with ``spins`` rows of rotation."""
         along = net.cells[:, net.along]
         rows = [[body.row, body.spin, body.turn][: 1 + spins] for body in bodies]
         cells = [np.hstack([along, np.tile(row, (len(along), 1))]) for row in rows]

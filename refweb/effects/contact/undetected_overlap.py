@@ -1,8 +1,8 @@
-"""Bodies that lie in each other where they do not touch: a reader of the results is told.
+"""Undetected overlap: findings on bodies in each other without contact between them.
 
-It is looked at with every block of rows, for all shapes but rings, which have no ends along their normal. Where the
-spheres around two bodies meet, places on the skeleton of each are held against the depth in the other: so it costs next
-to nothing, and a short overlap may be missed.
+The overlap is checked once for every block of rows, for all shapes but rings, which have no ends along their normal. If
+the spheres around two bodies meet, points of the skeleton of each are compared with the depth in the other. This costs
+very little, and it may miss a short overlap.
 """
 
 from __future__ import annotations

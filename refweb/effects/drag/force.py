@@ -1,12 +1,12 @@
 """The force of drag at a node, quadratic in its velocity relative to the fluid, as compiled kernels.
 
-Each end of an element, and each inner node, bears the drag of its share of the natural length: with the unit tangent t
-of the element there, u = v − w the velocity of the node less that of the wind, u_t = (t·u) t and u_n = u − u_t,
+Each node of an element has the drag of its share of the natural length. With the unit tangent t of the element there,
+the velocity u = v − w of the node relative to the wind, u_t = (t·u) t and u_n = u − u_t,
 
     F = −c_n |u_n| u_n − c_t |u_t| u_t.
 
-−∂F/∂u = c_n (|u_n| (I − t⊗t) + u_n⊗u_n/|u_n|) + 2 c_t |u_t| t⊗t is positive semidefinite, and F·u ≤ 0. What has no
-direction, such as a body or an element whose ends are at one place, has t = 0, and all of u counts as u_n.
+−∂F/∂u = c_n (|u_n| (I − t⊗t) + u_n⊗u_n/|u_n|) + 2 c_t |u_t| t⊗t is positive semidefinite, and F·u ≤ 0. A cell without
+direction, such as a body or an element without length, has t = 0, and all of u counts as u_n.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
-"""Drag solved for, node by node, where an explicit method kicks velocities.
+"""Drag in explicit kicks: an implicit equation for each node.
 
-A kick of size h takes the velocity of a node from v⁻ to v⁺ = v⁻ + h M⁻¹(f + F(u)), f being all other forces and u the
-mean of both less the wind: the rule of the midpoint, which loses h F·v, whatever h is. For a node that is
+A kick of size h changes the velocity of a node from v⁻ to v⁺ = v⁻ + h M⁻¹(f + F(u)), with all other forces f and the
+mean u of both velocities relative to the wind. This is the midpoint rule, which dissipates h F·v for any h. For a node
+the equation is
 
     u = u⁻ + ½h M⁻¹(f + F(u)),
 
-whose solution is unique, since −F is the gradient of a convex function of u. Newton's method finds it from
-velocities without drag, or with that of the sweep before. No node feels another's drag, so that one sweep solves all of
-them, but for nodes that one body carries: M⁻¹ is then the block J M⁻¹ Jᵀ of `refweb.effects.contact_solver`, and nodes
-of one body feel each other's drag, which takes a few sweeps.
+Its solution is unique, since −F is the gradient of a convex function of u. Newton's method starts from velocities
+without drag, or with the drag of the sweep before. Equations of different nodes are independent, so that one sweep
+solves all of them. Nodes that are attached to one body are an exception: M⁻¹ is then the block J M⁻¹ Jᵀ of
+`refweb.effects.contact_solver`, and their equations are coupled, which takes a few sweeps.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ..vectors import add, solve
 from .force import drag_on, end_of, slope_of
 
 MOST_STEPS, CLOSE = 60, 4e-16
-"""Steps of Newton's method, and what they leave of the equations, over velocities, at which they end."""
+"""Largest number of steps of Newton's method, and its tolerance relative to velocities."""
 
 
 @kernel(forceinline=True)
@@ -46,7 +47,7 @@ def numbers_of(contact):
 
 @kernel(forceinline=True)
 def newton_step(h, n, count, u, rest, contacts):
-    """Step of Newton's method where ``rest`` of the equation is left at the velocity u."""
+    """Step of Newton's method with the residual ``rest`` of the equation at the velocity u."""
     node, a, b, c = contacts[n], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for m in range(n, n + count):
         t, normal, tangential = numbers_of(contacts[m])

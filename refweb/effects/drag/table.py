@@ -1,6 +1,6 @@
-"""Drag of a fluid that is at rest or blows steadily, on lines and on free bodies.
+"""Drag of a fluid, at rest or in steady wind, on lines and on free bodies.
 
-The force is in `refweb.effects.drag.force`, and how explicit steps solve for it in `refweb.effects.drag.implicit_drag`.
+The force is in `refweb.effects.drag.force`, and its solver for explicit steps in `refweb.effects.drag.implicit_drag`.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ SPHERE = 0.47
 
 @table
 class BodyDrag(Table):
-    """Drag of one body, ½ ρ C A |u|², whichever way it moves.
+    """Drag of one body, ½ ρ C A |u|², for all directions of motion.
 
     Parameters
     ----------
     coefficient : float, optional
-        C; of a sphere 0.47 by default.
+        C; for a sphere 0.47 by default.
     area : float, optional
-        A [m²]; of a sphere that of its circle by default.
+        A [m²]; for a sphere that of its circle by default.
 
     Examples
     --------
@@ -53,39 +53,39 @@ def _bodies(name, value):
 
 @table
 class Drag(Table):
-    """Drag of a fluid, quadratic in the velocity relative to it; explicit steps are not made shorter by it.
+    """Drag of a fluid, quadratic in the velocity relative to it; it does not shorten explicit steps.
 
-    A line of diameter D that moves across itself with u_n and along itself with u_t is held back by ½ ρ C_n D |u_n| u_n
-    + ½ ρ π C_t D |u_t| u_t per natural length, half of an element's by the node at either end. Reels change natural
-    lengths, and not the drag. A free body is held back by ½ ρ C A |u| u and not turned; what of the wind a body or a
-    line keeps from others is not known.
+    Let a line of diameter D have the relative velocity u_n across its axis and u_t along it. Its drag per natural
+    length is ½ ρ C_n D |u_n| u_n + ½ ρ π C_t D |u_t| u_t; half of that of an element acts on the node at each end.
+    Reels change natural lengths, but not the drag. The drag of a free body is ½ ρ C A |u| u, without a moment. Bodies
+    and lines do not shelter each other from wind.
 
-    Where a start is so fast that drag takes much of it in one step, the run is repeated with shorter steps, until
-    the book of energy closes.
+    If the start is so fast that drag takes much of the energy in one step, the run is repeated with shorter steps,
+    until the energy balance closes.
 
-    In a fluid at rest all that drag takes is ``dissipated_energy``; where wind blows, its power on what moves is
-    ``work``, and may have either sign.
+    In a fluid at rest the losses by drag are ``dissipated_energy``. In wind the power of drag counts as ``work``, which
+    may have either sign.
 
     Parameters
     ----------
     density : float
         ρ of the fluid [kg/m³].
     normal : float
-        C_n of a line across its own direction.
+        C_n of a line across its axis.
     tangential : float
-        C_t along it, of the whole surface.
+        C_t of a line along its axis, for the whole surface.
     diameter : float, optional
         D [m]; by default that of a round line of its area.
     wind : sequence of 3 float
         Velocity of the fluid [m/s].
     bodies : dict of str to BodyDrag
-        Coefficient and area of bodies, which free ones other than spheres need.
+        Coefficient and area of bodies; free bodies that are no spheres need them.
 
     Raises
     ------
     InputError
-        For numbers out of bounds; from ``on``, for a name in ``bodies`` that no free body has, and a free body that is
-        no sphere whose coefficient or area is missing.
+        For numbers out of bounds. From ``on``, for a name in ``bodies`` that no free body has, and for a free body that
+        is no sphere without coefficient or area.
 
     References
     ----------

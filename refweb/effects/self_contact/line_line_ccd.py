@@ -1,14 +1,14 @@
-"""Check if centre lines meet while nodes move in straight lines, and find the time in which none can pass.
+"""Penetration check of lines with lines in a drift, and the time in which no lines can meet.
 
-Points of two elements come nearer to each other by no more than the largest of the four differences of the ways of
-their nodes, for such a difference is linear along either element. A pair whose distance is above that does not meet. Of
-the others the motion is followed: from a distance d it may go on by d over that difference, and so on until its end, or
-until centre lines are nearer than `MEETING` of the distance at which lines touch.
+In a drift nodes move in straight lines. Points of two elements approach by at most the largest of the four differences
+of the displacements of their nodes, since such a difference is linear along each element. A pair with a larger distance
+does not meet. For all other pairs the motion is followed: at a distance d, the share d over that difference is safe.
+This is repeated until the end of the drift, or until centre lines are nearer than `MEETING` times the distance of
+contact.
 
-Two elements that share a node meet where one folds flat onto the other: their distance is that of the far node of
-either from the other. They do not push each other, nor do those that are near along the net, so that these are told of
-and not kept apart. A pair with a distance d need not be looked at again before rows have moved by d relative to each
-other.
+Two elements that share a node meet if one folds flat onto the other: their distance is that of the far node of each
+from the other element. They do not push each other, nor do elements that are near along the net. Such meetings are
+reported, not prevented. A pair with a distance d needs no new check before rows have moved by d relative to each other.
 """
 
 from __future__ import annotations
@@ -24,14 +24,13 @@ from .pair import PAIR, nearest, numbers_of, place_of
 from .search import near_pairs
 
 MEETING = 1e-9
-"""Distance at which centre lines meet, over that at which lines touch."""
+"""Distance at which centre lines count as meeting, over the distance of contact."""
 LOOKS = 200
-"""Largest number of looks at the motion of a pair; one that is not decided by then counts as meeting."""
+"""Largest number of positions of a pair that are checked; an undecided pair then counts as meeting."""
 AHEAD = 64.0
-"""Number of ways that what is looked at in turn is chosen for."""
+"""Number of drifts for which pairs to check in turn are chosen."""
 TRAVEL = 0.2
-"""Largest share of the distance of touch that lines may come nearer by in an implicit step, or half of what they are
-apart."""
+"""Largest approach of lines in an implicit step, over the distance of contact; or half of their distance."""
 
 
 @kernel(forceinline=True)
@@ -45,13 +44,13 @@ def from_line(u, w):
 
 @kernel(forceinline=True)
 def distance(p, u, w, joined):
-    """Distance of two elements; of those that are ``joined`` at their beginnings, of their ends from each other."""
+    """Distance of two elements; for elements that are ``joined`` at their first nodes, that of their ends."""
     return min(from_line(u, w), from_line(w, u)) if joined else math.sqrt(max(nearest(p, u, w)[2], 0.0))
 
 
 @kernel(forceinline=True)
 def longest_of(p, u, w):
-    """Largest difference of what is p − … of the first and of the other element: at one of their ends."""
+    """Largest size of p + s u − t w over both elements, which is at their ends."""
     longest = 0.0
     for i in range(2):
         for j in range(2):
@@ -63,7 +62,7 @@ def longest_of(p, u, w):
 
 @kernel(forceinline=True)
 def ways_of(cells, c, kick, drift, v, f, inverse):
-    """Change of the vectors (p, u, w) of pair c in a drift, behind a kick."""
+    """Change of the vectors (p, u, w) of pair c in a drift after a kick."""
     i, j, k, m = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3]
     a0, a1 = drift * (v[i, 0] + kick * inverse[i, 0] * f[i, 0]), drift * (v[i, 1] + kick * inverse[i, 1] * f[i, 1])
     b0, b1 = drift * (v[j, 0] + kick * inverse[j, 0] * f[j, 0]), drift * (v[j, 1] + kick * inverse[j, 1] * f[j, 1])
@@ -76,13 +75,13 @@ def ways_of(cells, c, kick, drift, v, f, inverse):
 
 @kernel(forceinline=True)
 def gone(vector, share, path):
-    """A vector after a share of its way."""
+    """A vector after a share of its change."""
     return vector[0] + share * path[0], vector[1] + share * path[1], vector[2] + share * path[2]
 
 
 @kernel()
 def would_meet(margin, geometry, ways, joined):
-    """(True if a pair comes nearer than ``margin`` on its way, distance at the start, largest change of it)."""
+    """(True if a pair comes nearer than ``margin`` in a drift, distance at its start, largest change of that)."""
     (p, u, w), (dp, du, dw) = geometry, ways
     longest, share, start = longest_of(dp, du, dw), 0.0, distance(p, u, w, joined)
     left = start
@@ -168,8 +167,7 @@ def soon(x, v, cells, data):
 def neighbours(net, beside, touch):
     """(Nodes, numbers, elements) of the pairs of elements that do not push: joined at a node, or near along the net.
 
-    Joined ones begin at what they share. Two lines between the same nodes are one on the other at any time, and no
-    pair.
+    Joined elements begin at their common node. Two lines between the same nodes coincide at any time, and are no pair.
 
     Parameters
     ----------

@@ -5,9 +5,9 @@ and |f| the root of the sum of the squares of all components, damping adds
 
     F = m f,        m = max(d δ̇, −1),        δ̇ = −f·v/|f|,
 
-the push of Hunt and Crossley, which never turns into a pull. δ̇ is the rate of the overlap: where middles of elements
-cross, |f| is the push, and up to √2 of it towards their ends. F has no resultant and no moment, as f has none, and does
-not feel a rigid motion. Its power m f·v is not positive. With K = −∂f/∂x,
+the law of Hunt and Crossley, which never becomes a pull. δ̇ is the rate of the overlap. |f| is the push where middles
+of elements cross, and up to √2 of it towards their ends. F has no resultant and no moment, as f has none; a rigid
+motion does not change it. Its power m f·v is not positive. With K = −∂f/∂x,
 
     −∂F/∂v = d f f/|f| where m > −1,        −∂F/∂x = m K − f ∂m/∂x,        ∂δ̇/∂x = K v/|f| − (f·v) K f/|f|³.
 """
@@ -25,8 +25,8 @@ from .pair import ELEMENT, PAIR, numbers_of
 from .search import near_pairs
 
 SHALLOW = 0.05
-"""Share of the overlap that a pair may come to that is reckoned with before it is there: a step that has to do with
-more is iterated for longer, and the next bound knows the overlap."""
+"""Share of the possible overlap of a pair that the bound includes in advance. If a step has more, it takes more
+iterations, and the next bound knows the overlap."""
 
 
 @kernel(forceinline=True)

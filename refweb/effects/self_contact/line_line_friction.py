@@ -1,35 +1,34 @@
 """Friction where lines touch, as compiled kernels, and how explicit kicks solve for it.
 
-The push of a pair, see `refweb.effects.self_contact.line_line_penalty`, has the resultant N n on its first element, but
-for what is along either line, as at joints, and its shares on the four nodes say where it acts: at a of the first
-element and at b of the other, d = a − b. With the directions û and ŵ of the elements, the rates at which they slide
-along themselves,
+The push of a pair, see `refweb.effects.self_contact.line_line_penalty`, has the resultant N n on its first element,
+without parts along the lines, which occur at joints. Its distribution to the four nodes determines the contact points a
+of the first and b of the other element, d = a − b. With the directions û and ŵ of the elements, the rates at which they
+slide along themselves,
 
     s₁ = d/dt (û·d),        s₂ = d/dt (ŵ·d),
 
-for these shares, do not feel a motion of the pair as a whole. The slip that has them as components along û and ŵ has
-the square |u|² = sᵀ G⁻¹ s, G = [[1, c], [c, 1]], c = û·ŵ. Friction is Coulomb's, regularised with the slip velocity
+for this distribution, do not change with a rigid motion of the pair. The slip that has them as components along û and ŵ
+has the square |u|² = sᵀ G⁻¹ s, G = [[1, c], [c, 1]], c = û·ŵ. Friction is Coulomb's, regularised with the slip velocity
 v_s,
 
     F = −μ N ∂|u|²/∂s / (2 √(|u|² + v_s²)),        its power  F·s = −μ N |u|²/√(|u|² + v_s²) ≤ 0,
 
-spread to the nodes as s takes their velocities, so that it keeps momentum and angular momentum. Nodes of a straight
-line take no moment about it, so friction has none either: lines turn freely about themselves, and one that is wound
-around a straight line is held no more than over a pulley that turns, whatever μ is.
+It is distributed to the nodes by the derivatives of s, so that momentum and angular momentum are conserved. Nodes of a
+straight line take no moment about it, so that friction has none either: lines rotate freely about their axes. For any
+μ, a line that is wound around a straight line slides as over a rotating pulley.
 
-Where lines do not roll, s are the two components across n of the velocity of one centre line relative to the other, and
-G is the identity: the friction of threads, by which a line that is wound n turns holds T₂/T₁ ≤ e^(2π n μ). It keeps
-momentum. Of angular momentum 2 r F is left in each contact to a twist that elements without thickness do not have, and
-nets that turn as a whole are braked, as their lines would have to turn along. To keep it and to hold exclude each
-other.
+If lines do not roll, s has the two components across n of the relative velocity of both centre lines, and G is the
+identity. This is the friction of threads: a line that is wound n turns holds T₂/T₁ ≤ e^(2π n μ). It conserves momentum.
+It does not conserve angular momentum: each contact leaves a moment 2 r F, which real lines would carry by torsion. It
+also brakes nets that rotate as a whole. No friction can hold a wound line and conserve the angular momentum of such
+elements.
 
-N is the push of the overlap, whatever damping adds to it. Lines that lie along each other slide along themselves alone:
-across, such lines roll, as nothing resists their turning about themselves. 1 + `ALIKE` c²/(L L'), of the distance of
-touch c, stands for the ones of G, so that this is the limit.
+N is the push of the overlap, without damping. Lines that lie along each other have friction only along their axes:
+across them they roll. To get this limit, the ones in G are replaced by 1 + `ALIKE` c²/(L L'), with the distance of
+contact c.
 
-In explicit kicks friction is solved for contact by contact, see `refweb.effects.contact_solver`, along the two
-directions between which J M⁻¹ Jᵀ has no mixed term. Tangents of N by differences steer iterations of implicit methods
-alone.
+In explicit kicks `refweb.effects.contact_solver` solves for friction contact by contact, along the two directions for
+which J M⁻¹ Jᵀ has no mixed term. Only iterations of implicit methods use tangents of N, by differences.
 """
 
 from __future__ import annotations
@@ -49,11 +48,11 @@ from .pair import ELEMENT, PAIR, place_of
 from .search import near_pairs
 
 ALIKE = 0.01
-"""Share of (2r)²/(L L') that keeps the slip of lines along each other finite: it takes half of it from friction."""
+"""Factor of (2r)²/(L L') that keeps the slip of lines along each other finite."""
 STEP = 1e-6
-"""Step of differences, over the distance of touch."""
+"""Step of differences, over the distance of contact."""
 SLOTS = 8
-"""Pairs of an element that are remembered."""
+"""Number of pairs of an element whose forces are kept."""
 
 
 @kernel(forceinline=True)
@@ -73,9 +72,9 @@ def set_rows_of_threads(along, n, a, b, rows, shares):
 
 @kernel()
 def slip_rows(x, cells, data, c, rows, shares):
-    """N of pair c [N], 0 where it does not touch; what nodes add to both components of u to ``rows (2, 4, 3)``.
+    """N of pair c [N], 0 without contact; writes the entries of nodes in both components of u to ``rows (2, 4, 3)``.
 
-    ``shares (2, 2)`` is what forces along both are along û and ŵ, or along the components of threads.
+    ``shares (2, 2)`` are the parts along û and ŵ, or along the components of threads, of forces along both.
     """
     (_, push), pair = pushed(x, cells, data, c), record_at(PAIR, data, c, 0)
     total = push[0][0] + push[1][0], push[0][1] + push[1][1], push[0][2] + push[1][2]
@@ -222,7 +221,7 @@ def bound(reach, speed, x, mass, rates, cells, data):
 
 @kernel()
 def set_contact(contact, parts, cell, c, normal, cells, data, rows, shares):
-    """Write the contact of pair c, which shows its power at a ``cell``, by what `slip_rows` writes.
+    """Write the contact of pair c, whose power belongs to a ``cell``, from the output of `slip_rows`.
 
     Its basis has the directions along û and ŵ, or along the components of threads, and a normal without force.
     """
@@ -260,4 +259,4 @@ def detect(x, cells, data, contacts, parts, begin):
 
 
 KICKS = ImplicitContactKernels(detect, friction_law, SLOTS)
-"""How explicit kicks solve for it."""
+"""Kernels that solve explicit kicks."""

@@ -4,21 +4,21 @@ Two elements with natural lengths L and L', whose vectors are u and w, have the 
 
     E = ½ κ f (L I + L' I'),        f² = |u × w|²/(L L')² + c²/(L L'),        κ = k/(√12 c³),
 
-I and I' being the overlaps of each with the line of the other, see `refweb.effects.self_contact.overlap_integrals`, c =
-2r the distance at which lines touch, and k the stiffness. All of it follows from the four nodes smoothly and does not
-change as the pair is carried and turned: its forces are the gradient, their resultant and their moment are zero.
+with the overlaps I and I' of each element with the line of the other, see
+`refweb.effects.self_contact.overlap_integrals`, the distance of contact c = 2r, and the stiffness k. E is a smooth
+function of the four nodes, and a rigid motion does not change it. The forces are its gradient, so that their resultant
+and their moment are zero.
 
-Lines that cross with their centre lines h apart overlap over a length that goes with one over the sine of their angle.
-f takes that away: whatever the angle, at any place that is not at a free end,
+Lines that cross at a distance h of their centre lines overlap over a length proportional to 1/sin of their angle. The
+factor f compensates this. For any angle, and at any point that is not near a free end,
 
     E = (16/15) κ (c² − h²)^(5/2) f/sin,        push = k h (c² − h²)^(3/2)/(√27 r³) · f/sin,
 
-where f/sin is 1 but for (c/L)², and both are times the mean of the stretches |u|/L and |w|/L'. For a small overlap δ
-that is 3.08 k δ^(3/2)/√r, as crossed cylinders push by Hertz; at h = r it is k r and largest. Where what overlaps is
-further than c from all ends, both integrals are these roots and powers to rounding, and no sum is taken. Lines that lie
-along each other push with 2 κ f h (c² − h²)·2 on their length: elements of a pair together by up to k r again, over the
-length that they share. So the stiffness of a pair is of the order of k at any angle, and steps need not be shorter for
-lines that are parallel.
+where f/sin is 1 up to (c/L)², and both are multiplied by the mean of the stretches |u|/L and |w|/L'. For a small
+overlap δ the push is 3.08 k δ^(3/2)/√r, as for crossed cylinders by Hertz. Its largest value is k r, at h = r. If the
+overlap is further than c from all ends, these closed forms are exact to rounding, and no sums are needed. Lines that
+lie along each other push with 2 κ f h (c² − h²)·2 along their common length, so that the push of a pair is at most k r
+again. Therefore the stiffness of a pair is of the order of k at any angle, and parallel lines need no shorter steps.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ from .pair import ELEMENT, Numbers, angle_factor, apart, nearest, numbers_of, pl
 from .search import REACH, near_pairs
 
 MARGIN = 0.75
-"""Factor on that of a rigid body: of 4000 pairs at random no row sum is above 0.7 of what it leaves."""
+"""Factor on the bound for a rigid body: no row sum of 4000 random pairs is above 0.7 of the bound."""
 MOST = 6.0
-"""Number of others that lie against an element at one time in bounds, at most: so many equal lines fit around one."""
+"""Largest number of elements that touch an element at one time, for bounds: so many equal lines fit around one."""
 FAR = 4.0
-"""Reach over the longest element above which a bound does not look which elements are near each other."""
+"""Reach over the longest element above which a bound does not search near elements."""
 OF_REACH = 0.5
-"""Share of the reach of a bound that pairs come nearer by: that is twice what two rows may at its speed."""
+"""Largest approach of pairs, over the reach of a bound: it is twice the approach of two rows at its speed."""
 NOT_SEEN = -1.0
-"""What a pair shows that does not overlap."""
+"""Overlap of a pair without contact, as a mark."""
 NO_PUSH = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-"""Forces of such a pair."""
+"""Forces of a pair without contact."""
 
 
 @kernel(forceinline=True)
@@ -67,7 +67,7 @@ def overlap(p, u, w, n, s, t, of):
 
 @kernel(forceinline=True)
 def to_nodes(p, u, w, s, t, slopes):
-    """Gradients by the four nodes of what has such slopes."""
+    """Gradients by the four nodes of a quantity with such slopes."""
     a, b, c, d, e, g = slopes
     by_p = a * p[0] + b * u[0] + c * w[0], a * p[1] + b * u[1] + c * w[1], a * p[2] + b * u[2] + c * w[2]
     by_u = (
@@ -107,10 +107,10 @@ def slopes_of_factor(u, w, n, f, area):
 
 @kernel(forceinline=True)
 def crossed(geometry, n, of):
-    """(J, its slopes, squared distance) of a pair that overlaps far from its ends; J is 0 of all others.
+    """(J, its slopes, squared distance) of a pair that overlaps far from its ends; J is 0 for all others.
 
-    Of a crossing at the places s and t of both infinite lines, a distance h apart, R = c² − h² and N = |u × w|, the
-    overlap is (R/N²)^½ |w| long to either side along the first element, and the same of the other:
+    Let both infinite lines cross at s and t with a distance h, R = c² − h² and N = |u × w|. The overlap extends by
+    (R/N²)^½ |w| to each side along the first element, and correspondingly along the other:
 
         J = (8/15) κ R^(5/2) (L |w| + L' |u|)/N.
 
@@ -141,7 +141,7 @@ def crossed(geometry, n, of):
 
 @kernel()
 def forces_of(geometry, of):
-    """(How deep a pair that may touch overlaps [m], `NOT_SEEN` where it does not, the forces on its four nodes)."""
+    """(Overlap of a pair that may touch [m], or `NOT_SEEN`, and the forces on its four nodes)."""
     p, u, w = geometry
     n = cross(u, w)
     f, area = angle_factor(n, of.length, of.second, of.touch)
@@ -163,7 +163,7 @@ def forces_of(geometry, of):
 
 @kernel(forceinline=True)
 def forces_near_ends(geometry, n, f, area, of):
-    """The same of a pair that overlaps near an end, or does not: lines may meet far from both segments."""
+    """Overlap and forces of a pair that overlaps near an end, or not at all."""
     s, t, square = nearest(geometry.p, geometry.u, geometry.w)
     if square > (REACH * of.touch) ** 2:
         return NOT_SEEN, NO_PUSH
@@ -178,10 +178,10 @@ def forces_near_ends(geometry, n, f, area, of):
 
 @kernel(forceinline=True)
 def pushed(x, cells, data, c):
-    """(How deep pair c overlaps [m], `NOT_SEEN` where it does not, the forces on its four nodes [N]).
+    """(Overlap of pair c [m], or `NOT_SEEN`, and the forces on its four nodes [N]).
 
-    What is apart costs no call, and a call takes no array, nor does what is written here: to count the references to
-    the arrays of a pair takes as long as its push.
+    Pairs without contact cost no call, and no call takes an array: counting the references to the arrays of a pair
+    would take as long as its push.
     """
     geometry, of = place_of(x, cells, data, c), numbers_of(data, c)
     if apart(geometry, of.touch):

@@ -1,29 +1,27 @@
 """The overlap of one straight element with the line of another, as an integral in closed form.
 
-Of a point at a of the first element let p = a − b₀ be its place from the first end of the other, w = b₁ − b₀ that
-element, M = |w|, ŵ = w/M, y = p·ŵ how far along it the point is, and D = |p − y ŵ|² its squared distance from the
-straight line. With the distance c at which lines touch,
+For a point a of the first element, let p = a − b₀ be its vector from the first end of the other element w = b₁ − b₀.
+With M = |w| and ŵ = w/M, y = p·ŵ is its coordinate along that element, and D = |p − y ŵ|² its squared distance from the
+straight line. With the distance of contact c,
 
     I = ∫₀¹ W(y, M) e(D) ds,      e = (c² − D)² where D < c², else 0,      W = S(y/c) − S((y − M)/c),
 
-S(x) = ½ + ¾ x − ¼ x³ from 0 at x = −1 to 1 at x = 1. W is the element smeared along itself: where elements continue
-each other in a straight line their W add up to 1, whatever their lengths, and I does not know where one of them ends.
-What slides along a line feels no joint. Beyond a free end, or a corner, an element fades over the distance c; no corner
-is without W, for within c of it that of either side is above 0.
+S(x) = ½ + ¾ x − ¼ x³ from 0 at x = −1 to 1 at x = 1. W is a smooth window along the element. If elements continue each
+other in a straight line, their W add up to 1 for any lengths. Then I does not depend on the position of their joint,
+and an object that slides along a line has no force from joints. Beyond a free end, or a corner, W decreases to 0 over
+the distance c. Every corner has contact, since within c of it W of each side is above 0.
 
-Along the first element p and y are linear in s and D is quadratic, so the integrand is piecewise a polynomial, of
-degree 7, as are those of its first and second derivatives. Four Gauss points on each piece integrate all of them to
-rounding. At the ends of the pieces integrand and gradient are continuous. So I is a smooth function of the four nodes,
-with Lipschitz continuous first derivatives, also where lines are parallel, and its derivatives are the integrals of
-those of the integrand.
+Along the first element p and y are linear in s, and D is quadratic. Therefore the integrand and its first and second
+derivatives are piecewise polynomials of degree 7, which four Gauss points on each piece integrate to rounding.
+Integrand and gradient are continuous between pieces. Hence I is a smooth function of the four nodes, with Lipschitz
+continuous first derivatives, also for parallel lines. Its derivatives are the integrals of those of the integrand.
 
-Three other ways were weighed. The distance of the nearest points of two segments jumps to other points where lines are
-parallel. The least value of ½ |d(s, t)|² + ½ ε ((s − ½)² + (t − ½)²) over both segments is smooth, but near a joint the
-elements on either side of it both push: within √(4 r δ) of it the energy of an overlap δ doubles, and what slides over
-it is held back by ¼ √(δ/r) of the push. A sum over Gauss points on both lines needs many where r is much smaller than
-an element.
+Three alternatives have drawbacks. The nearest points of two segments jump where lines are parallel. The least value of
+½ |d(s, t)|² + ½ ε ((s − ½)² + (t − ½)²) over both segments is smooth, but the elements on both sides of a joint push:
+within √(4 r δ) of it the energy of an overlap δ doubles, which resists sliding by ¼ √(δ/r) of the push. A sum over
+Gauss points on both lines needs many points if r is much smaller than an element.
 
-An element of no length has no direction; then I is 0, as it is in the limit.
+An element without length has no direction; then I is 0, which is its limit.
 """
 
 from __future__ import annotations
@@ -41,7 +39,7 @@ PLACES, WEIGHTS = tuple((0.5 * (1.0 + _POINTS)).tolist()), tuple((0.5 * _WEIGHTS
 NOWHERE = 0.0, 0.0, 0.0, 0.0
 """Ends of no pieces."""
 SHORT = 1e-9
-"""Length of an element over the distance of touch below which it has no direction."""
+"""Length of an element over the distance of contact below which it has no direction."""
 
 
 @kernel(forceinline=True)
@@ -80,9 +78,9 @@ def comes_near(quadratic):
 def pieces(low, high, length, y, rate, quadratic, touch):
     """(Number of the pieces of low to high on which the integrand is a polynomial, their ends).
 
-    There y + s rate is how far along the other element a point is, and the three numbers of ``quadratic`` are a, b and
-    c of c² − D = a − 2 b s − c s². Ends are handed over as numbers: a call that takes an array counts references to
-    it, as long as a piece takes.
+    y + s rate is the coordinate of a point along the other element. The three numbers of ``quadratic`` are a, b and c
+    of c² − D = a − 2 b s − c s². Ends are passed as numbers, since counting references to an array takes as long as a
+    piece.
     """
     deep, half, square = quadratic
     root = half * half + square * deep

@@ -1,4 +1,4 @@
-"""Numbers of elements, and of pairs of elements, as the kernels of lines against lines read them.
+"""Data of elements, and of pairs of elements, for the kernels of lines against lines.
 
 Cells of a term are pairs, of the nodes of one element and of another, or elements of which any two may touch: then
 `refweb.effects.self_contact.search` makes pairs of them.

@@ -1,13 +1,13 @@
-"""Check if lines can have passed through lines, and find a stiffness that would hold them.
+"""Penetration check of lines with lines, and a stiffness that is sufficient.
 
-Lines pass where their centre lines meet. Methods follow the motion of every pair, see
-`refweb.effects.self_contact.line_line_ccd`: explicit ones before each drift, in which nodes move in straight lines, and
-those of steps of their own on their interpolants. So it is certain that nothing has passed where no two have met from
-the start of a run on. How the web came from its own position to that start is no part of it.
+Lines pass if their centre lines meet. All methods check the motion of every pair, see
+`refweb.effects.self_contact.line_line_ccd`. Explicit methods do so before each drift, in which nodes move in straight
+lines; CVODE and IDA use their interpolants. If no two centre lines have met since the start of a run, it is proven that
+no line has passed. The change from the initial web to a folded start is not checked.
 
 Two elements that share a node do not push each other, nor do those within two radii of each other along the net. They
-are followed as well: the first two that fold flat onto each other, or meet, are told. What hangs on them cannot have
-passed unseen, for that is met itself.
+are checked as well: the first two that fold flat onto each other, or meet, are reported. Other elements that pass
+because of them are found by their own pairs.
 
 An overlap above r is refused: from there on the push falls.
 """
@@ -22,19 +22,19 @@ from ...errors import PenetrationError, SolverError
 from ...findings import Finding
 
 AIM = 0.8
-"""Overlap that a stiffness is named for, over the radius."""
+"""Overlap for which a stiffness is proposed, over the radius."""
 STIFFER = 4.0
-"""Factor of a stiffness that is chosen anew: how deep an overlap is says little while it may still be growing."""
+"""Factor on a stiffness that is chosen again: the present overlap tells little, since it may still be growing."""
 POWER = 2.5
-"""Power of an overlap that the energy of lines that cross goes with."""
+"""Power of the overlap to which the energy of crossing lines is proportional."""
 PRESCRIBED = "the motion of both is prescribed, and no stiffness of [self_contact] holds them"
-"""What is said of lines that are moved through each other."""
+"""Text for lines that prescribed motions move through each other."""
 HELD = 16.0 / 15.0 * (4.0 - (2.0 - AIM) ** 2) ** POWER / (8.0 * math.sqrt(12.0))
-"""Energy of lines that cross and overlap by `AIM` of the radius, over k r²."""
+"""Energy of crossing lines that overlap by `AIM` of the radius, over k r²."""
 
 
 def pressed(system):
-    """Number of the term of lines against lines of a system, None where there is none."""
+    """Number of the term of lines against lines of a system; None if there is none."""
     numbers = (i for i, term in enumerate(system.terms) if term.contact.crossing is not None)
     return next(numbers, None)
 
@@ -51,10 +51,10 @@ def holding(energy, radius):
 
 
 def would_pass(system, v, nodes):
-    """Message that two lines would pass, with the stiffness that would hold them; ``nodes (4,)`` are those of both.
+    """Message that two lines would pass, with a sufficient stiffness; ``nodes (4,)`` are those of both.
 
-    It is that which stores, at `AIM` of the radius, the energy with which they come at velocities v. A node that a body
-    carries comes with the mass of the body.
+    At `AIM` of the radius, this stiffness stores the energy of both at velocities v. An attached node counts with the
+    mass of its body.
     """
     fixed, pairs = system.fixed.all(axis=1), np.reshape(nodes, (2, 2))
     crossing = system.terms[pressed(system)].contact.crossing
@@ -76,16 +76,16 @@ def would_pass(system, v, nodes):
 
 
 def first_stiffness(system):
-    """Stiffness of lines that a scene asks for before it is solved [N/m].
+    """Stiffness of lines that refweb chooses before a scene is solved [N/m].
 
-    It is EA/L of the stiffest element, or what stores at `AIM` of the radius the energy with which two of the heaviest
-    elements come together at the largest velocity that any two nodes or bodies have towards each other: a net that is
-    thrown at a body folds on it as fast.
+    It is EA/L of the stiffest element, or, if larger, the stiffness that stores an impact energy at `AIM` of the
+    radius. This is the energy of two of the heaviest elements at the largest relative velocity of any two nodes or
+    bodies, since a net that is thrown at a body folds with that velocity.
 
     Parameters
     ----------
     system : refweb.system.system.System
-        With any stiffness of lines.
+        System with any stiffness of lines.
     """
     net, touch = system.net, system.terms[pressed(system)].contact.crossing.touch
     lines = float((net.axial / net.line_data.natural_length).max())
@@ -103,11 +103,11 @@ class Passage:
     Parameters
     ----------
     system : refweb.system.system.System
-        With a term of lines against lines.
+        System with a force term of lines against lines.
     unfollowed : str, optional
-        What does not follow them, and why; None where they are followed.
+        Method that does not check the lines, with the reason; None if they are checked.
     chosen : bool
-        Whether the stiffness is refweb's choice.
+        True if refweb chose the stiffness.
     """
 
     def __init__(self, system, unfollowed=None, chosen=False):
@@ -118,11 +118,11 @@ class Passage:
         self._deepest, self._crossings = 0.0, np.full((2, 5), np.inf)
 
     def record(self, overlap, crossings):
-        """Note the deepest overlap [m], and what has met so far, see `IntegratorState.crossings`."""
+        """Record the deepest overlap [m], and crossings so far, see `IntegratorState.crossings`."""
         self._deepest, self._crossings = max(self._deepest, overlap), crossings
 
     def plain(self):
-        """Overlap, radius and stiffness as ``run.json`` has them."""
+        """Overlap, radius and stiffness, as in ``run.json``."""
         values = {"overlap": self._deepest, "radius": 0.5 * self.touch, "stiffness": self._stiffness}
         return {**values, "chosen": self._chosen}
 
@@ -146,11 +146,11 @@ class Passage:
             yield Finding("lines-in-doubt", f"lines may have passed through lines, {status}", "self_contact")
 
     def _enough(self, overlap, elements, v):
-        """Stiffness that may hold what overlaps so far [N/m].
+        """Stiffness that may be sufficient for the overlap so far [N/m].
 
-        Above the top of the push what comes is hardly braked, and the overlap tells nothing of its energy: it is at
-        least that which stores, at `AIM` of the radius, what is stored so far and what two elements bring that come
-        together as fast as any two of their nodes.
+        Above the largest push lines are hardly braked, and the overlap tells nothing about their energy. Therefore this
+        stiffness stores at least, at `AIM` of the radius, the energy that is stored so far plus the kinetic energy of
+        two elements at the largest relative velocity of their nodes.
         """
         radius = 0.5 * self.touch
         enough = self._stiffness * (overlap / (AIM * radius)) ** POWER
@@ -164,14 +164,14 @@ class Passage:
         return max(enough, stored + holding(moving, radius))
 
     def refuse(self, overlap, when, cell, v=None):
-        """Refuse an overlap above the radius [m] of a cell, at a time or load step in words; v are velocities then.
+        """Refuse an overlap [m] of a cell above the radius, at a time or load step as text; v are the velocities.
 
         Raises
         ------
         TooSoft
             Where refweb chose the stiffness.
         SolverError
-            Where it was given.
+            Where the scene gives the stiffness.
         """
         radius = 0.5 * self.touch
         if not overlap > radius:

@@ -1,8 +1,8 @@
 """Search for elements that are near each other: pairs of a list, or of all elements by a grid of cells.
 
-The grid is as wide as the longest element and the distance looked for together. So what is near an element has its
-middle in the same cell or in one beside it, and the time goes with the number of elements. Elements that share a node
-make no pair, nor do those that are listed as near along the net.
+A cell of the grid is as wide as the longest element plus the distance of the search. Therefore all elements near an
+element have their middles in the same cell or in a neighbouring cell, and the time is proportional to the number of
+elements. Elements that share a node make no pair, nor do those that are listed as near along the net.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ WIDTH = width_of(PAIR)
 """Number of columns of the data of pairs."""
 
 REACH = math.sqrt(2.0)
-"""Distance of two segments up to which they may push each other, over that at which lines touch: an element ends
-smeared, by as much along itself as its line is thick."""
+"""Distance of two segments up to which they may push each other, over the distance of contact: the window of an element
+extends beyond its ends."""
 BOXES = 4
 """Largest number of cells of the grid over that of elements."""
 

@@ -1,4 +1,4 @@
-"""Contact of lines with lines: what a scene says of it, and its terms."""
+"""Contact of lines with lines: its table and its terms."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ LISTED = 20_000
 BROKEN = column_of(ELEMENT, "scale")
 """Column of pairs and of elements that is 0 where one is broken."""
 ROUNDING = 1e-9
-"""Share of the radius by which a distance may be wrong."""
+"""Error of a distance, over the radius."""
 FAR, SOME = 4.0, 8
-"""Distance of touch, over the longest line, above which some elements are looked at first, and how many: what all of
-them have beside them along the net takes long to find and fills the memory."""
+"""Distance of contact, over the longest line, above which some elements are tested first, and their number: the search
+of all neighbours along the net would take long and fill the memory."""
 
 
 @table
@@ -42,29 +42,30 @@ class SelfContact(Table):
     """Contact of lines with lines, of the same web.
 
     Lines are round, and touch where their centre lines are less than two radii apart. Two elements push each other over
-    the length on which they do, as a smooth function of their four nodes whatever their angle, see
-    `refweb.effects.self_contact.line_line_penalty`. Lines that cross h apart push with k h (4 r² − h²)^(3/2)/(√27 r³)
-    times the mean of their stretches, length over natural length. That is k r at half the distance of touch, where it
-    is largest: what is pushed harder would pass, and is refused. Elements that share a node do not push each other, nor
-    do those that are within two radii of each other along the net at any time of the run, as reels and heat change
-    natural lengths.
+    the length of their overlap; for any angle this is a smooth function of their four nodes, see
+    `refweb.effects.self_contact.line_line_penalty`. Lines that cross at the distance h push with k h (4 r² −
+    h²)^(3/2)/(√27 r³) times the mean of their stretches, length over natural length. The largest push is k r, at half
+    the distance of contact; a larger load would push lines through each other, and is refused. Elements that share a
+    node do not push each other, nor do those within two radii of each other along the net at any time of the run, as
+    reels and heat change natural lengths.
 
-    Every pair of lines is followed from the start of a run on, and ``passage`` of ``run.json`` says "certified" where
-    no two centre lines have met: before each drift of an explicit step, which is cut where two would meet, and in steps
-    of cvode and ida on their interpolants. Neighbours that come to lie on each other are named there with the time, for
-    nothing keeps them apart. Load steps of statics are not followed, but lines that meet on their straight ways from
-    one to the next are named. What is not certified is a warning as well.
+    The penetration check follows every pair of lines from the start of a run: before each drift of an explicit step,
+    which is cut if two lines would meet, and on the interpolants of cvode and ida. ``passage`` of ``run.json`` is
+    "certified" for ``lines`` if no two centre lines have met. It names neighbours that come to lie on each other, with
+    the time, since no force keeps them apart. Load steps of statics are not certified, but lines are named that meet on
+    straight paths from one load step to the next. A warning reports lines that are not certified.
 
-    Explicit methods find pairs as they come near. Statics, cvode and ida take all pairs of a small web as one list.
+    Explicit methods search near pairs during the run. Statics, cvode and ida use one list of all pairs of a small web.
 
     Parameters
     ----------
     radius : float
         Radius of all lines [m].
     stiffness : float, optional
-        k [N/m], the push of lines that cross at half the distance of touch, over the radius. Where it is left out it is
-        chosen: EA/L of the stiffest element, or what stops two of the heaviest at the largest velocity between nodes or
-        bodies at the start; a run whose lines overlap by more than their radius is repeated with a larger one.
+        k [N/m], the push of lines that cross at half the distance of contact, over the radius. If it is left out refweb
+        chooses it: EA/L of the stiffest element, or, if larger, the stiffness that stops two of the heaviest elements
+        at the largest relative velocity of nodes or bodies at the start. If lines then overlap by more than their
+        radius, the run is repeated with a larger stiffness.
     damping : float
         d of Hunt and Crossley [s/m]: a push of 1 + d δ̇ times that of the overlap, never a pull; δ̇ is the rate of the
         overlap.
@@ -73,17 +74,17 @@ class SelfContact(Table):
     slip_velocity : float
         v_s [m/s], of μ N |u|/√(|u|² + v_s²): what sticks creeps below it.
     rolling : bool
-        Whether lines turn freely about themselves, so that friction keeps angular momentum: one that is wound around
-        a straight one then slides as over a pulley that turns. Where they do not, friction acts on centre lines, as on
-        threads that do not twist, and one that is wound n turns holds a ratio of tensions up to e^(2π n μ); moments of
-        2r times the friction are left to the twist of lines, so that angular momentum is not kept, and a web that turns
-        as a whole is braked where its lines press on each other.
+        True if lines rotate freely about their axes, so that friction conserves angular momentum. A line that is wound
+        around a straight line then slides as over a rotating pulley. With false, friction acts on centre lines, as on
+        threads that do not twist: a line that is wound n turns holds a ratio of tensions up to e^(2π n μ). Moments of
+        2r times the friction are then left to the torsion of lines. Therefore angular momentum is not conserved, and a
+        rotating web is braked where its lines press on each other.
 
     Raises
     ------
     InputError
-        For a radius, a stiffness or a slip velocity that is not > 0, damping or friction < 0; from ``on``, for curved
-        elements, lines that overlap in the web's position, and in statics a web of too many pairs.
+        For a radius, a stiffness or a slip velocity that is not > 0, and damping or friction < 0. From ``on``, for
+        curved elements, lines that overlap in the initial web, and in statics a web with too many pairs.
 
     Examples
     --------
@@ -103,7 +104,7 @@ class SelfContact(Table):
     def on(self, net):
         """The term of the push, and those of damping and friction.
 
-        ``out`` is how deep a pair or an element overlaps [m], or the power of what is lost [W].
+        ``out`` is the overlap of a pair or an element [m], or the lost power [W].
         """
         if net.order > 1:
             raise InputError(
@@ -154,7 +155,7 @@ class SelfContact(Table):
         return terms if len(terms) > 1 else push
 
     def stiffness_on(self, net):
-        """Its stiffness [N/m], chosen where it is left out."""
+        """Its stiffness [N/m], chosen if it is left out."""
         if self.stiffness is not None:
             return self.stiffness
         return float((net.axial / net.line_data.natural_length).max())
@@ -257,7 +258,7 @@ def _reached(graph, nodes, distance):
 def near_along(net, distance):
     """Elements that share no node and are within a distance of each other along the net, shape (elements, most).
 
-    Rows are filled with −1. Lengths are natural ones at their shortest in the run.
+    Rows are filled with −1. Distances are sums of the least natural lengths in the run.
     """
     cells, count, natural = net.cells, net.nodes, shortest_of(net)
     if distance < natural.min():

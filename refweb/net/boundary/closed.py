@@ -202,7 +202,7 @@ def oriented(size, pairs, along):
     pairs : ndarray of int, shape (e, 2)
         Triangles on both sides of edges.
     along : ndarray of bool, shape (e,)
-        Whether both run along the edge in one direction.
+        True if both triangles run along the edge in the same direction.
     """
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(size, size)).tocsr()
     graph = graph + graph.T

@@ -1,10 +1,10 @@
 """Distance from a closed surface of triangles at the points of a grid, as a compiled kernel.
 
 Near the surface each triangle is held against the points around it; further away a point takes the nearest triangle
-of a neighbour, in sweeps along all eight diagonals of the grid, as in fast sweeping [1]_. What is inside is told by how
-often a straight line along the third axis meets the surface ahead: that needs no normals, so that triangles without
-area do no harm. Which of two triangles with a common edge a line meets is decided by signs of products that are exact
-negatives of each other, so that no line slips through between them.
+of a neighbour, in sweeps along all eight diagonals of the grid, as in fast sweeping [1]_. A point is inside or outside
+by the number of times that a straight line from it, along the third axis, meets the surface. This needs no normals, so
+that triangles without area do no harm. Signs of products decide which of two triangles with a common edge a line meets.
+These products are exact negatives of each other, so that no line slips through between the triangles.
 
 References
 ----------

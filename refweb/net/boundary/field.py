@@ -133,7 +133,7 @@ class Field:
     Attributes
     ----------
     numbers : ndarray
-        What kernels read, see `ORIGIN`.
+        Numbers for kernels, see `ORIGIN`.
     spacing : float
         Distance of the points of its grid h [m].
     counts : tuple of 3 int

@@ -162,15 +162,15 @@ class _Pieces(NamedTuple):
     piece, area : ndarray, shape (t,)
         Piece of each triangle, and its area [m²].
     as_given : ndarray of bool, shape (pieces,)
-        Whether most of a piece is as the file has it.
+        True if most triangles of a piece have the orientation of the file.
     volume : ndarray, shape (pieces,)
         Volume between a piece and the middle of its rim [m³].
     flat : ndarray of bool, shape (pieces,)
-        Whether that is none.
+        True if this volume is zero.
     ends : ndarray of int, shape (k, 2)
         Corners of the edges of one triangle.
     open : ndarray of bool, shape (pieces,)
-        Whether a piece has such an edge.
+        True if a piece has such an edge.
     crowded : int
         Number of edges of more than two triangles.
     """

@@ -87,4 +87,4 @@ def _triangles(points, cells):
 
 
 READERS = {".stl": _of_stl, ".obj": _of_obj, ".vtp": _of_vtk}
-"""What reads surfaces, by the end of their name."""
+"""Functions that read surfaces, by the end of the name of the file."""

@@ -38,7 +38,7 @@ class Solid(NamedTuple):
     field : refweb.net.boundary.field.Field
         Depth in it.
     convex : bool
-        Whether it is convex.
+        True if the body is convex.
     remarks : tuple of str
         Faults of the surface.
     felt : tuple of ndarray, optional

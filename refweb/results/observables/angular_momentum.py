@@ -1,4 +1,4 @@
-"""Angular momentum of all that moves about its centre of mass, or the part of it that nodes or a body have."""
+"""Angular momentum of web and free bodies about their centre of mass, or the part of nodes or of a body."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from .observable import Value
 
 
 class TotalAngularMomentum(Nodal):
-    """Σ m (r − r_c) × (v − v_c), and what bodies turn with, r_c and v_c being those of the centre of mass of all.
+    """Σ m (r − r_c) × (v − v_c) plus the spin of bodies; r_c and v_c are those of the centre of mass of all.
 
-    That is of web and free bodies together, with ``node`` or ``body`` the part of these: ``node = "all"`` that of the
-    web. Supported nodes count with their masses, at rest or as they are moved, while fixed bodies do not. What nothing
-    acts on from outside, no support among it, keeps the whole; in ``[frame]`` and ``[orbit]`` velocities are those
-    against the turning axes, and it does not stay.
+    By default it is that of web and free bodies together. With ``node`` or ``body`` it is the part of these; ``node =
+    "all"`` is the part of the web. Supported nodes count with their masses, at rest or moving, while fixed bodies do
+    not count. The total is constant if no force acts from outside and there is no support. In ``[frame]`` and
+    ``[orbit]`` velocities are relative to the rotating axes, and the total is not constant.
     """
 
     unit, keys = "N m s", ("node", "body", "component")
     dynamic = True
 
     def _parts(self, system):
-        """Masses and reference positions of all (rows, 4), rows that count, and rows of spin with their moments."""
+        """Masses and reference positions of rows (rows, 4), rows that count, and rows of rotation with moments."""
         net, observe = system.net, self.observe
         linear = system.rows - net.spins
         masses = net.mass[:linear].copy()
@@ -38,7 +38,7 @@ class TotalAngularMomentum(Nodal):
         return np.column_stack([masses, net.points[:linear]]), counted, moments
 
     def of(self, state):
-        """Compute it by sums over rows."""
+        """Value by sums over rows."""
         numbers, counted, spins = self._parts(state.system)
         mass, linear = numbers[:, :1], len(numbers)
         position, speed = (all_of[:linear] - (mass * all_of[:linear]).sum(axis=0) / mass.sum() for all_of in (
@@ -48,7 +48,7 @@ class TotalAngularMomentum(Nodal):
         return Value(float(self.sizes(total[None])[0]), None)
 
     def position(self, system, at):
-        """Nowhere."""
+        """None: the value has no position."""
         return None
 
     def probe(self, system):

@@ -9,7 +9,7 @@ from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
 
 def weights(system, column):
-    """Weights of (energy of each term, kinetic energy, work, step size) that make a column of the whole net."""
+    """Weights of (energy of each term, kinetic energy, work, step size) in a column."""
     total, books = column == "total_energy", [f.balance.column for f in system.terms]
     stored = [book not in ("work", "dissipated_energy") for book in books]
     weights_found = [
@@ -21,14 +21,14 @@ def weights(system, column):
 
 
 class Booked(Observable):
-    """A column of the book, named as the quantity is.
+    """A column of the energy balance, with the name of the quantity.
 
     Attributes
     ----------
     needs : str
-        Table without which no effect writes to the column, empty where there always is one.
+        Table of the effect that writes to the column; empty if there is always one.
     signed : bool
-        Whether it may be negative.
+        True if the value may be negative.
     """
 
     unit = "J"
@@ -37,7 +37,7 @@ class Booked(Observable):
     signed = True
 
     def bounds(self, system):
-        """Energy of what is stretched, pressed, bent or moved, or lost, is not negative."""
+        """Bounds of the value: strain, contact, bending, kinetic and lost energies are not negative."""
         return ANY if self.signed else NOT_NEGATIVE
 
     def on(self, system):
@@ -46,7 +46,7 @@ class Booked(Observable):
             raise InputError(f'quantity = "{self.observe.quantity}" needs {self.needs} in the scene')
 
     def of(self, state):
-        """From the energies of the state, which know nothing of motion."""
+        """Value from the energies of the state, without kinetic energy."""
         return Value(state.energies[self.observe.quantity], None)
 
     def weights(self, system):
@@ -67,7 +67,7 @@ class StrainEnergy(Booked):
     signed = False
 
     def error(self, state, equilibrium):
-        """The proven bound of duality, where there is one."""
+        """The proven bound of duality, if there is one."""
         if equilibrium.duality_bound is None:
             return super().error(state, equilibrium)
         return equilibrium.duality_bound.strain_energy
@@ -108,7 +108,7 @@ class BendingEnergy(Booked):
 
 
 class FrameEnergy(Booked):
-    """Potential energy in a frame that turns."""
+    """Potential energy in a rotating frame."""
 
     needs = "[frame]"
 
@@ -120,7 +120,7 @@ class OrbitEnergy(Booked):
 
 
 class RuptureEnergy(Booked):
-    """Energy that lines held when they broke."""
+    """Energy that was stored in lines when they broke."""
 
     signed = False
     dynamic = True
@@ -136,11 +136,11 @@ class DissipatedEnergy(Booked):
 
 
 class TotalEnergy(Booked):
-    """All that is stored, in dynamics with that of motion."""
+    """Sum of stored energies, in dynamics with the kinetic energy."""
 
 
 class Work(Booked):
-    """Work of loads, and of devices that move nodes or change lengths."""
+    """Work of loads, motions, reels and other devices."""
 
     needs = "[[load]], [[motion]] or another effect that does work"
 
@@ -156,7 +156,7 @@ class Work(Booked):
 
 
 class StepSize(Booked):
-    """Length of the step that led to an instant."""
+    """Size of the last step before an instant."""
 
     signed = False
     unit = "s"

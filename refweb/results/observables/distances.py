@@ -1,4 +1,4 @@
-"""Observables between nodes: their distance, and the mouth of a net that some of them surround."""
+"""Observables between nodes: their distance, and perimeter and area of the mouth of a net."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
 
 class Between(Observable):
-    """A length or an area that places of some rows make."""
+    """A length or an area that follows from the positions of some rows."""
 
     unit = "m"
 
@@ -23,7 +23,7 @@ class Between(Observable):
         raise NotImplementedError
 
     def on(self, system):
-        """Refuse what the system does not have."""
+        """Refuse nodes and bodies that the system does not have."""
         self.rows(system)
 
     def _number_of(self, system, name):
@@ -37,11 +37,11 @@ class Between(Observable):
         return system.net.bodies[names.index(name)].row
 
     def bounds(self, system):
-        """A length or an area is not negative, its component may be."""
+        """Bounds of the value: a length or an area is not negative, but its component may be."""
         return NOT_NEGATIVE if self.observe.component is None else ANY
 
     def of(self, state):
-        """Compute it by the kernel of its probe."""
+        """Value by the kernel of its probe."""
         value = self.probe(state.system)
         rows, data = np.array(value.rows, dtype=np.int64), np.ascontiguousarray(value.data, dtype=float)
         none = np.zeros((0, 0))
@@ -54,7 +54,7 @@ class Distance(Between):
     keys = ("node", "body", "to")
 
     def rows(self, system):
-        """The two."""
+        """Rows of both ends."""
         observe, numbers = self.observe, []
         if observe.node is not None:
             numbers += system.net.find(observe.node).tolist()
@@ -78,7 +78,7 @@ class Mouth(Between):
     keys = ("node",)
 
     def rows(self, system):
-        """The nodes."""
+        """Rows of the nodes around the mouth."""
         numbers = np.zeros(0) if self.observe.node is None else system.net.web.find_around(self.observe.node)
         if len(numbers) < 3:
             raise InputError(
@@ -89,7 +89,7 @@ class Mouth(Between):
 
 
 class MouthPerimeter(Mouth):
-    """Sum of the distances from node to node, the last to the first."""
+    """Sum of the distances from node to node, and from the last to the first."""
 
     def probe(self, system):
         """Make the probe of x and the reference position."""
@@ -100,9 +100,9 @@ class MouthPerimeter(Mouth):
 class MouthArea(Mouth):
     """Size of the area vector ½ Σ pᵢ × pᵢ₊₁ of the closed polygon, or a component of it.
 
-    Nodes are listed in their order around; those of one name are taken as they lie around their middle in the web.
-    Of a mouth in a plane it is the area; of another one the largest that it has as seen from any side. A component is
-    that as seen along an axis, positive where the nodes go round counterclockwise.
+    Listed nodes are taken in their order. Nodes of one name are sorted by angle around their middle in the web. The
+    size is the area of a mouth in a plane, else its largest projected area. A component is the projected area along an
+    axis, positive if the nodes run counterclockwise.
     """
 
     unit, keys = "m²", ("node", "component")

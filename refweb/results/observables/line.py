@@ -13,13 +13,13 @@ from .observable import ANY, NOT_NEGATIVE, SELECTIONS, Observable, Value
 class Line(Observable):
     """A number of each element.
 
-    Subclasses have `values`, `bound` and `scale`, by which ``column`` of tension and strain of each element is
-    multiplied.
+    Subclasses have `values`, `bound` and `scale`. The latter is a factor on the ``column`` of tension or strain of each
+    element.
 
     Attributes
     ----------
     pull : bool
-        Whether it has the sign of the tension.
+        True if the value has the sign of the tension.
     """
 
     keys, at = ("line", "part", "select"), "line"
@@ -30,7 +30,7 @@ class Line(Observable):
         raise NotImplementedError
 
     def bound(self, tension, net):
-        """Error of each element that a proven one of tensions [N] makes, shape (cells,)."""
+        """Error of each element by a proven error of its tension [N], shape (cells,)."""
         raise NotImplementedError
 
     def on(self, system):
@@ -43,7 +43,7 @@ class Line(Observable):
             )
 
     def lines(self, net):
-        """Numbers of the lines that are looked at, increasing; None for all."""
+        """Numbers of the observed lines, increasing; None for all."""
         line = self.observe.line
         return None if line is None else net.web.find_lines(line, "line")
 
@@ -102,7 +102,7 @@ class Line(Observable):
         return NOT_NEGATIVE if self.pull and laws == {"tension-only"} and not damped else ANY
 
     def column(self, system):
-        """Column of tension of what the lines observe."""
+        """Column of tension in the output of lines."""
         return system.tension_column
 
     def scale(self, net):
@@ -110,7 +110,7 @@ class Line(Observable):
         return np.ones(len(net.cells))
 
     def error(self, state, equilibrium):
-        """The proven bound of duality, where there is one, and the rounding of lines that both ends hold."""
+        """The proven bound of duality, if there is one, plus the rounding of lines whose ends are both fixed."""
         if equilibrium.duality_bound is None:
             return super().error(state, equilibrium)
         net = state.system.net
@@ -118,7 +118,7 @@ class Line(Observable):
         return float(bound.max()) + self.of_held_lines(state)
 
     def proven(self, equilibrium):
-        """True where there is a bound from duality."""
+        """True if there is a bound from duality."""
         return equilibrium.duality_bound is not None
 
 
@@ -132,7 +132,7 @@ class Tension(Line):
         return state.element_tension
 
     def bound(self, tension, net):
-        """Its own [N], shape (cells,)."""
+        """The error bound of tension itself [N], shape (cells,)."""
         return tension
 
 
@@ -155,7 +155,7 @@ class Stress(Line):
 
 
 class StressShare(Line):
-    """Stress over a limit of it, largest of all lines: what the margin of safety and the utilisation are made of.
+    """Stress over its limit, the largest of all lines, for the margin of safety and the utilisation.
 
     Parameters
     ----------
@@ -174,11 +174,11 @@ class StressShare(Line):
         return state.element_tension * self.scale(state.system.net)
 
     def scale(self, net):
-        """Inverse of the tension at the limit [1/N], 0 where there is no limit, shape (cells,)."""
+        """Inverse of the tension at the limit [1/N], 0 without a limit, shape (cells,)."""
         return 1.0 / (net.area * getattr(net, self._over))
 
     def bound(self, tension, net):
-        """Error bound of tension over that at the limit [1], shape (cells,)."""
+        """Error bound of tension over the tension at the limit [1], shape (cells,)."""
         return tension * self.scale(net)
 
 
@@ -200,7 +200,7 @@ class Strain(Line):
         return tension / net.line_data.ea
 
     def error(self, state, equilibrium):
-        """None where duality leaves it open whether the line is slack: then its strain is not unique."""
+        """± of the value; None if the line may be slack within its bound, since its strain is then not unique."""
         error = super().error(state, equilibrium)
         if error is None or equilibrium.duality_bound is None:
             return error

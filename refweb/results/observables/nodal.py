@@ -35,7 +35,7 @@ class Nodal(Observable):
         return np.arange(net.nodes) if self.observe.node is None else net.find(self.observe.node)
 
     def sizes(self, vectors):
-        """The component of vectors that is asked for, or their magnitude, shape (k,)."""
+        """The requested component of vectors, or their magnitude, shape (k,)."""
         component = self.observe.component
         return np.linalg.norm(vectors, axis=1) if component is None else vectors[:, component]
 
@@ -62,7 +62,7 @@ class Nodal(Observable):
         return Probe(selected_row, [source, SELECTIONS[self.observe.select], component, *rows], data)
 
     def numbers(self, rows):
-        """Component and rows, as `refweb.results.probes.largest_of` takes them."""
+        """Component and rows in the form of `refweb.results.probes.largest_of`."""
         from ..probes import MAGNITUDE
 
         component = MAGNITUDE if self.observe.component is None else self.observe.component
@@ -71,7 +71,7 @@ class Nodal(Observable):
 
 
 class Place(Nodal):
-    """A vector of each row that its position makes: open where the row floats."""
+    """A vector of each row that follows from its position; it is open if the row floats."""
 
     def floats(self, state, equilibrium):
         """Tell if the row whose value counts may move at no cost, or another one pass it."""
@@ -128,7 +128,7 @@ class Displacement(Place):
 
 
 class Position(Place):
-    """Place in space."""
+    """Position in space."""
 
     unit = "m"
 

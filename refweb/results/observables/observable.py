@@ -14,23 +14,24 @@ ANY, NOT_NEGATIVE = (-np.inf, np.inf), (0.0, np.inf)
 SELECTIONS = {"max": 0, "min": 1, "abs": 2}
 """Numbers of choices among several values in compiled probes, by ``select``."""
 ROUNDING, SHARE = 4.0 * np.finfo(float).eps, 1e-7
-"""Rounding of a strain by that of positions and lengths, and the change of a length by which its effect is found."""
+"""Rounding of a strain by rounding of positions and lengths; relative change of lengths by which its effect is
+found."""
 
 
 class Value(NamedTuple):
-    """Value of an observable at one instant; ``where`` is the node or line it stands at."""
+    """Value of an observable at one instant; ``where`` is the number of its node or line."""
 
     value: float
     where: int | None
 
 
 class Observable:
-    """A quantity, as one ``[[observe]]`` asks for it.
+    """A quantity with the keys of one ``[[observe]]``.
 
     Parameters
     ----------
     observe : refweb.Observe
-        The table: where the quantity is looked at.
+        The table, which selects nodes, lines or bodies.
 
     Attributes
     ----------
@@ -40,12 +41,12 @@ class Observable:
         Which of ``node``, ``body``, ``to``, ``component``, ``line``, ``part`` and ``select`` have a meaning; one of the
         whole net has none.
     dynamic : bool
-        Whether it has no meaning in statics.
+        True if the quantity has no meaning in statics.
     at : str
-        What ``where`` of its value is the number of.
+        Kind of the number ``where`` of its value, "node" or "line".
     booked : bool
-        Whether dynamics finds it in the energy book, as `refweb.results.observables.balances.Booked`, and not by a
-        probe.
+        True if the value comes from the energy balance, see `refweb.results.observables.balances.Booked`, and not from
+        a probe.
     """
 
     unit = "1"
@@ -58,14 +59,14 @@ class Observable:
         self.observe = observe
 
     def on(self, system):
-        """Refuse what a `refweb.system.system.System` does not have, with an `InputError`."""
+        """Raise an `InputError` for keys that do not fit a `refweb.system.system.System`."""
 
     def of(self, state):
         """Its `Value` in a `refweb.results.state.State`."""
         raise NotImplementedError
 
     def probe(self, system):
-        """The `refweb.results.probes.Probe` that finds the same value in every step of a run."""
+        """The `refweb.results.probes.Probe` of the same value for every step of a run."""
         raise NotImplementedError
 
     def body(self, net):
@@ -111,19 +112,19 @@ class Observable:
         return NOT_NEGATIVE if magnitude or self.observe.select == "abs" else ANY
 
     def bounds_by_tables(self, tables):
-        """Least and largest value that the tables of a scene file leave, a dict; where they say less, any value."""
+        """Least and largest possible value by the tables of a scene file, a dict; any value if they do not tell."""
         return self.bounds(None)
 
     def position(self, system, at):
-        """Node or line of the scene, where the probe says it stands at row or element ``at``; None for the whole."""
+        """Node or line of the row or element ``at`` of the probe; None for quantities of the whole net."""
         return None
 
     def error(self, state, equilibrium):
-        """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None where none is known.
+        """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None if it is not known.
 
-        An estimate from the equilibrium's deviations: what the residual makes of the value, three times what rounding
-        makes of it, and the rounding of the value itself. None is known of a value that changes where parts of the net
-        float.
+        This is an estimate from the deviations of the equilibrium: the change by the residual, three times the change
+        by rounding of forces, and the rounding of the value itself. It is None for a value that changes as parts of the
+        net float.
         """
         if equilibrium.deviations is None or self.floats(state, equilibrium):
             return None
@@ -145,9 +146,9 @@ class Observable:
         return abs(self.of(moved).value - self.of(state).value) / share
 
     def of_held_lines(self, state):
-        """Effect on the value of rounding the strains, by `ROUNDING`, of lines that both ends hold.
+        """Effect on the value of a rounding, by `ROUNDING`, of the strains of lines whose ends are both fixed.
 
-        No move of a node balances these.
+        No displacement of a node balances these strains.
         """
         system = state.system.at(state.time)
         net = system.net
@@ -163,12 +164,12 @@ class Observable:
         return max(changes) / SHARE * ROUNDING
 
     def floats(self, state, equilibrium):
-        """Tell if moves at no cost change the value, beside the changes by other moves of their size."""
+        """Tell if moves without stiffness change the value, compared with other moves of their size."""
         if equilibrium.floating is None:
             return False
         some = np.random.default_rng(0).uniform(-1.0, 1.0, state.x.shape) * ~state.system.supported
         return max(self._change(state, move) for move in equilibrium.floating.moves) > 1e-4 * self._change(state, some)
 
     def interval(self, state, equilibrium):
-        """Least and largest value in all equilibria, where parts of the net float; None where that is not known."""
+        """Least and largest value in all equilibria if parts of the net float; None if that is not known."""
         return None

@@ -1,4 +1,4 @@
-"""``[[observe]]``: a number that a run is asked for, with a name, and what is kept of it over time."""
+"""``[[observe]]``: a quantity with a name, and its reduction over time."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class Observe(Table):
     Parameters
     ----------
     name : str
-        Its name in results and history.
+        Name in results and history.
     quantity : str
-        What is followed, one of `refweb.registry.OBSERVABLES`.
+        Quantity, one of `refweb.registry.OBSERVABLES`.
     node : int, str or list, optional
         Node of a nodal quantity, or several, see ``select``; without ``node`` all.
     body : str or list of str, optional
@@ -49,7 +49,7 @@ class Observe(Table):
         together: 0 where nothing touches it, whatever drag, gravity, a frame or the lines that it holds by
         ``[[attach]]`` do to it. The force with which it holds these is the reaction of their nodes.
     to : str, optional
-        Body that a distance ends at, of one node or another body; without it that of two nodes.
+        Body at the end of a distance from one node or another body. Without it, the distance is that of two nodes.
     line : int, str or list, optional
         Lines of a line quantity, by number or group, see `refweb.net.groups`; without ``line`` all.
     part : {"start", "middle", "end"}, optional
@@ -62,11 +62,11 @@ class Observe(Table):
         largest absolute value, without its sign. The reaction of several is their sum, and with ``select`` that of the
         one that counts.
     component : {0, 1, 2, "x", "y", "z", "w"}, optional
-        Axis of a nodal quantity, or of one of a body that turns; without it the magnitude. Of an orientation it is the
-        component of the quaternion that takes the axes x, y and z to those of the body, "w" or 3 being its scalar part;
-        without it the angle from the start.
+        Axis of a nodal quantity, or of a quantity of rotation; without it the magnitude. For an orientation it is the
+        component of the quaternion that rotates the axes x, y and z to those of the body; "w" or 3 is the scalar part.
+        Without a component an orientation is the angle from the start.
     reduce : {"max", "min", "final"}
-        Reduction over time; in statics none, where each load step has results of its own.
+        Reduction over time. In statics it is not used, since each load step has its results.
     average : float, optional
         Length of a window [s], in dynamics: its mean is taken in place of the value. In a web of many waves the mean
         has digits where an instant has none. The window slides along the run and ends at the instant: each row of the
@@ -128,7 +128,7 @@ class Observe(Table):
 
     @property
     def observable(self):
-        """The quantity as it is asked for, a `refweb.results.observables.observable.Observable`."""
+        """The `refweb.results.observables.observable.Observable` of the quantity."""
         return load(OBSERVABLES[self.quantity])(self)
 
     @property
@@ -137,7 +137,7 @@ class Observe(Table):
         return self.observable.unit
 
     def on(self, system):
-        """Refuse what the system does not have."""
+        """Refuse nodes, lines, bodies and effects that the system does not have."""
         if system.net.quasi_static and self.observable.dynamic:
             raise InputError(f'quantity = "{self.quantity}" has no meaning in statics')
         if system.net.quasi_static and self.average is not None:
@@ -149,23 +149,23 @@ class Observe(Table):
         return self.observable.of(state)
 
     def error(self, state, equilibrium):
-        """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None where none is known.
+        """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None if it is not known.
 
-        A proven bound from duality where there is one that speaks of the quantity, else an estimate from the
-        equilibrium's deviations.
+        It is a proven bound from duality if there is one for the quantity, else an estimate from the deviations of the
+        equilibrium.
         """
         return self.observable.error(state, equilibrium)
 
     def interval(self, state, equilibrium):
-        """Least and largest value in all equilibria, where the value is open and these are known."""
+        """Least and largest value in all equilibria, if the value is open and they are known."""
         return self.observable.interval(state, equilibrium)
 
     def bounded(self, result, system):
-        """A `refweb.results.solution.Result` whose ± says nothing beyond what is possible."""
+        """A `refweb.results.solution.Result` whose ± is cut to possible values."""
         return result.bounded(*self.observable.bounds(system))
 
     def probe(self, system):
-        """The `refweb.results.probes.Probe` that follows it, with the sign of its peaks and its window."""
+        """The `refweb.results.probes.Probe` of the observable, with the sign of its peaks and its window."""
         return self.observable.probe(system)._replace(sign=SIGN[self.reduce], average=self.average or 0.0)
 
 
@@ -184,7 +184,7 @@ def observes_of(tables):
 
 
 def bounds_by_name(tables):
-    """Least and largest possible value of each result of a scene by name, and of all that is called as a quantity is.
+    """Least and largest possible value of each result of a scene by name, and of each name that is a quantity.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def bounds_by_name(tables):
     Raises
     ------
     InputError
-        For an observable that is none.
+        For an invalid observable.
     """
     observes = {quantity: Observe(name=quantity, quantity=quantity) for quantity in OBSERVABLES}
     observes |= {observe.name: observe for observe in observes_of(tables)}

@@ -12,15 +12,15 @@ from .observable import NOT_NEGATIVE, Observable, Value
 class Overlap(Observable):
     """Depth of the deepest contact of a body, or of several, with lines, 0 where none touches; it stands at the line.
 
-    How deep two bodies overlap stands in ``pairs`` of ``run.json``.
+    The overlap of two bodies is in ``pairs`` of ``run.json``.
 
-    With ``reduce = "max"`` it is the deepest of all steps and between them.
+    With ``reduce = "max"`` it is the deepest overlap at and between all steps.
     """
 
     unit, keys, at = "m", ("body",), "line"
 
     def on(self, system):
-        """Refuse a scene without contact, a body that is none, and none where there are several."""
+        """Refuse a scene without contact, an unknown body, and a missing name if there are several bodies."""
         if not system.contact:
             raise InputError('quantity = "overlap" needs [contact] in the scene')
         self._touched(system.net)
@@ -36,7 +36,7 @@ class Overlap(Observable):
         return Value(float(deep[at]), self.position(state.system, at if deep[at] > 0.0 else -1))
 
     def bounds(self, system):
-        """A depth."""
+        """Bounds of the value: a depth is not negative."""
         return NOT_NEGATIVE
 
     def probe(self, system):
@@ -44,7 +44,7 @@ class Overlap(Observable):
         return _deepest_of([system.contact_forces.row(body) for body in self._touched(system.net)])
 
     def position(self, system, at):
-        """The line of an element, None where nothing is touched."""
+        """The line of an element, None without contact."""
         return int(system.net.line[at]) if at >= 0 else None
 
 
@@ -66,7 +66,7 @@ def probes_between(system):
 
 
 def probe_of_touch(system, body, body_b):
-    """The probe of the deepest contact of a body, None for any, with the web, or with another body."""
+    """The probe of the deepest contact of a body (None for any body) with the web, or with another body."""
     bodies, forces = system.net.bodies if body is None else [body], system.contact_forces
     return _deepest_of(
         [forces.row(body_a) for body_a in bodies] if body_b is None else forces.pair_rows(body_b, bodies)

@@ -1,7 +1,7 @@
 """Reactions: the force of supports on nodes and of contact on bodies, of several their sum or that of one.
 
-A kernel has the whole force f on each row, and what supports add to it is −f. What contact adds to a body is the
-sum over its contacts, see `refweb.system.contact_forces`: where nothing touches it that is zero, whatever else acts.
+A kernel gets the total force f on each row; the force of a support is −f. The contact force on a body is the sum over
+its contacts, see `refweb.system.contact_forces`: it is zero without contact, whatever else acts.
 """
 
 from __future__ import annotations

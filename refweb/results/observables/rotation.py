@@ -1,6 +1,6 @@
 """Rotation of a body: its orientation, its angular velocity and its angular momentum about its centre.
 
-All are along the axes x, y and z of the scene.
+All components are along the axes x, y and z of the scene.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ class Turning(Observable):
     dynamic = True
 
     def on(self, system):
-        """Refuse a body that is none, and none where there are several or no body."""
+        """Refuse an unknown body, and a missing name if there is no body or there are several."""
         if not system.net.bodies:
             raise InputError(f'quantity = "{self.observe.quantity}" needs a [[body]] in the scene')
         self.body(system.net)
 
     def rows(self, system):
-        """Component and rows of rotation of the body, −1 where there is none."""
+        """Component and rows of rotation of the body, −1 for rows that do not exist."""
         component, body = self.observe.component, self.body(system.net)
         rows = (MAGNITUDE if component is None else component, body.spin, body.turn)
         return [-1 if row is None else row for row in rows]
@@ -43,10 +43,10 @@ class Turning(Observable):
 
 
 class Orientation(Turning):
-    """Components of the quaternion that takes x, y and z to the axes of the body; without one the angle from the start.
+    """Component of the quaternion from x, y, z to the axes of the body; without it the angle from the start.
 
-    It is that of the scene's ``orientation`` at the start, or of its axes with w ≥ 0, and does not jump. The angle is 0
-    to π.
+    At the start it is the ``orientation`` of the scene, or that of the axes with w ≥ 0. It does not jump. The angle is
+    0 to π.
     """
 
     dynamic = False
@@ -56,11 +56,11 @@ class Orientation(Turning):
         self.unit = "rad" if observe.component is None else "1"
 
     def bounds(self, system):
-        """An angle, or a component of a unit quaternion."""
+        """Bounds of the value: those of an angle, or of a component of a unit quaternion."""
         return (0.0, math.pi) if self.observe.component is None else (-1.0, 1.0)
 
     def on(self, system):
-        """Refuse a ball, which looks the same however it turns."""
+        """Refuse a sphere, which has no orientation."""
         super().on(system)
         body = self.body(system.net)
         if body.spin is not None and body.turn is None and not body.shape.planar:
@@ -70,7 +70,7 @@ class Orientation(Turning):
             )
 
     def of(self, state):
-        """Compute it by the rotation of the body."""
+        """Value by the rotation of the body."""
         value = self.probe(state.system)
         rows = np.array(value.rows, dtype=np.int64)
         return Value(float(orientation_of(state.x, rows, np.ascontiguousarray(value.data, dtype=float))), None)
@@ -87,12 +87,12 @@ class Orientation(Turning):
 
 
 class AngularVelocity(Turning):
-    """Angular velocity; in a frame that turns, against it."""
+    """Angular velocity; in a rotating frame, relative to the frame."""
 
     unit = "rad/s"
 
     def of(self, state):
-        """Compute it by momentum and inertia."""
+        """Value by momentum and inertia."""
         return self._sized(self.body(state.system.net).turning(state.x, state.v))
 
     def probe(self, system):
@@ -103,12 +103,12 @@ class AngularVelocity(Turning):
 
 
 class AngularMomentum(Turning):
-    """Angular momentum about the centre of the body; in a frame that turns, by the rotation against it."""
+    """Angular momentum about the centre of the body; in a rotating frame, by the rotation relative to the frame."""
 
     unit = "N m s"
 
     def of(self, state):
-        """Compute it by the velocity of its row of rotation."""
+        """Value by the velocity of its row of rotation."""
         body = self.body(state.system.net)
         return self._sized(np.zeros(3) if body.spin is None else body.moment * state.v[body.spin])
 
