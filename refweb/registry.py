@@ -1,8 +1,7 @@
 """Tables of names: what a scene or the command line may call for, and where it lives.
 
 A line is a name and the ``"module:name"`` that brings it, or the ``"module"`` that it is; it is imported when it is
-called for and not before. What is in a table is known to scene files, checks, messages and help; nothing else has to be
-told.
+called for and not before. Scene files, checks, messages and help know all that is in a table.
 
 Other packages, scripts and notebooks add to the tables of `KINDS` by `register`. An installed package does so by an
 entry point of the groups ``refweb.effects``, ``refweb.shapes``, ``refweb.observables``, ``refweb.integrators`` and
@@ -270,7 +269,7 @@ KINDS = {
     "integrator": Kind(INTEGRATORS, "refweb.dynamics.integrators.integrator:Integrator", _WORDS),
     "verb": Kind(COMMANDS, "", _WORDS),
 }
-"""What `register` and entry points, of the group ``refweb.`` + kind + ``s``, may add."""
+"""Kinds that `register` and entry points, of the group ``refweb.`` + kind + ``s``, may add."""
 SHIPPED = {kind: frozenset(entry.table) for kind, entry in KINDS.items()}
 """Names of what refweb ships, by kind."""
 RESERVED = {"effect": {"schema", "title", "seed", "web", "solve", *PARTS, *LISTS}, "integrator": {"auto"}}
@@ -285,10 +284,10 @@ def register(kind: str, name: str, value: Any = None) -> Any:
     Parameters
     ----------
     kind : {"effect", "shape", "observable", "integrator", "verb"}
-        What it is.
+        Kind of the addition.
     name : str
         Its name in scenes: of the table of an effect, and of a value of ``shape``, ``quantity`` or ``method``; or on
-        the command line. What had the name by `register` before is replaced.
+        the command line. A class that had the name by `register` is replaced.
     value : class or module, optional
         The class; of a verb a module, or what else has ``add_arguments`` and ``run``. Without it, `register` is a
         decorator.

@@ -20,7 +20,7 @@ from .integrators.integrator import IntegratorState
 from .schedule import blocks, time_of
 
 THREADS = True
-"""Whether twins may have a thread of their own: not in processes that share a machine as it is."""
+"""True if twins may have a thread of their own: not in processes that share a machine as it is."""
 PAUSE = 0.2
 """Time between two looks at a twin that is waited for [s]."""
 

@@ -27,15 +27,15 @@ from ..compiled.rows import column_of, width_of
 from ..errors import InputError
 
 LINE_OUT = np.dtype([(name, float) for name in ("tension", "strain", "damped_tension", "power")])
-"""What terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law the tension with
-it [N] and its power [W]."""
+"""Numbers that terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law the
+tension with it [N] and its power [W]."""
 TENSION, STRAIN, DAMPED_TENSION, POWER = range(4)
 """Columns of these."""
 
 
 TOUCH = np.dtype([("value", float), ("force", float, (3,))])
-"""What terms of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of a loss; and
-the force on the body that `ContactForce.felt` names [N]."""
+"""Numbers that terms of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of a
+loss; and the force on the body that `ContactForce.felt` names [N]."""
 OWN, CONTACT_COLUMNS = column_of(TOUCH, "value"), width_of(TOUCH)
 """Column of that value, and number of columns."""
 CONTACT = -2
@@ -183,7 +183,7 @@ class Balance(NamedTuple):
     moment_free : bool
         True if forces that are not internal have no moment about the centre of mass of web and bodies.
     twists : bool
-        Whether forces that are internal have moments that the twist of lines or a clamp bears: they do not keep angular
+        True if forces that are internal have moments that the twist of lines or a clamp bears: they do not keep angular
         momentum, and feel a rotation as a whole.
     """
 

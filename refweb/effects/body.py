@@ -107,7 +107,8 @@ class Body(Table):
 
     In statics a free body rests where forces and moments on it balance, if it touches the web, or carries nodes by
     ``[[attach]]``. Newton's method goes downhill from where its table has it, so that a ball begins in the net, or next
-    to it. What turns it at no cost, as a beam on two ropes about its own line, is told. Balls and rings do not turn.
+    to it. A rotation at no cost, as of a beam on two ropes about its own line, is a remark. Balls and rings do not
+    turn.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ class Body(Table):
         Moments of inertia about its centre [kg m²]: one number, three about its axes, or the symmetric 3 × 3 tensor
         along them; for a ring that about its normal. By default those of a uniform solid, and m r² for a ring.
     fixed : bool
-        Whether it does not move.
+        True if it does not move.
     axle : BodyAxle, optional
         Axle that it turns about, ``{ point = ..., direction = ..., torque = ... }``, freely or by ``[[motion]]``. Its
         place and its rotation follow from the angle alone.

@@ -179,9 +179,9 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
     quasi_static : bool
         True if time is the load step of statics.
     consistent : bool
-        Whether mass is consistent, ∫ρA N_a N_b ds, and not lumped to ∫ρA N_a ds.
+        True if mass is consistent, ∫ρA N_a N_b ds, and not lumped to ∫ρA N_a ds.
     explicit : bool
-        Whether no matrix is assembled, so that straight elements do without scikit-fem.
+        True if no matrix is assembled, so that straight elements do without scikit-fem.
     """
     given, pieces, element = cable.properties(web), cable.subdivide, line_element(cable.order)
     laws = np.unique(given["law"])

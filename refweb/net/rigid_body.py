@@ -220,9 +220,9 @@ class RigidBody:
     velocity : tuple of 3 float
         Initial velocity [m/s].
     fixed : bool
-        Whether it does not move.
+        True if it does not move.
     moved : bool
-        Whether it moves as tables say.
+        True if it moves as tables say.
     axle : Axle, optional
         The axle that it turns about.
     axes : ndarray, shape (3, 3)

@@ -126,7 +126,7 @@ class RigidRotations(Record):
     ahead : ndarray, shape (carried, 3)
         Their displacements at the start [m], 0 where the body takes them where the web has them.
     scales : ndarray, shape (carried, 3)
-        What makes rates of the nodes those of the body, see `carry_rates`.
+        Factors that make rates of the nodes those of the body, see `carry_rates`.
     axles : ndarray, shape (bodies, 3)
         Unit vectors along axles, 0 of bodies that have none.
     doubled : ndarray, shape (bodies,)
@@ -384,7 +384,7 @@ def turns_within(
 def turn_by(x, y, v, turns):
     """Turn bodies from where x has them by the rotation vectors y − x of their rows of rotation [rad], written to y.
 
-    What they carry goes with them: its places are written to y, its velocities by ``v`` of the bodies.
+    Carried nodes go with them: their places are written to y, their velocities by ``v`` of the bodies.
     """
     for n in range(turns.moment.size):
         s, t = turns.rows[n, 1], turns.rows[n, 2]

@@ -93,11 +93,11 @@ class Newton:
     Attributes
     ----------
     follows : bool
-        Whether there are forces without a potential, or struts of form finding, whose potential has no minimum.
+        True if there are forces without a potential, or struts of form finding, whose potential has no minimum.
     turns : bool
-        Whether centrifugal forces act; ``drifting`` is the number of negative pivots that they bring to an equilibrium.
+        True if centrifugal forces act; ``drifting`` is the number of negative pivots that they bring to an equilibrium.
     grows : bool
-        Whether τ grows until the tangent is definite: where centrifugal forces act, and where bodies are free.
+        True if τ grows until the tangent is definite: where centrifugal forces act, and where bodies are free.
     anchors : ndarray of int
         Indices of diagonal entries that anchor parts without support, on which the loads balance.
     scale : float

@@ -66,7 +66,7 @@ class System:
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     angles : bool
-        Whether unknowns of bodies that turn are rotation vectors, see `refweb.system.resting_bodies`, and not
+        True if unknowns of bodies that turn are rotation vectors, see `refweb.system.resting_bodies`, and not
         quaternions: so it is in statics.
     """
 

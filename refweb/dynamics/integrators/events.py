@@ -1,7 +1,7 @@
 """Events: moments at which the value of a probe, or of a sum, passes a level.
 
-A compiled step is looked at once, at its end: a moment is known to its size. What is known anywhere within a step is
-searched by bisection, to rounding. An event of rest is that a value has stayed below a share of its largest for a time.
+A compiled step is looked at once, at its end: a moment is known to its size. Bisection finds a moment to rounding where
+values are known anywhere within a step. An event of rest: a value has stayed below a share of its largest for a time.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Event(NamedTuple):
     stop : bool
         True if the event ends the run.
     at_once : bool
-        Whether being above at t = 0 counts, as a contact does.
+        True if being above at t = 0 counts, as a contact does.
     during : float
         0, or for how long the value is to stay at or below ``level`` times its largest so far [s]: it happens then.
     """

@@ -133,9 +133,9 @@ class Deepest:
     allowed : float
         Overlap that is allowed [m].
     moving : bool
-        Whether they come with energy, in dynamics, or are pushed.
+        True if they come with energy, in dynamics, and are not pushed.
     fixed : bool
-        Whether it is deeper than allowed, and neither the line nor the body is free to give way.
+        True if it is deeper than allowed, and neither the line nor the body is free to give way.
     """
 
     bodies: tuple[RigidBody, ...]

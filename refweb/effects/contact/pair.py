@@ -28,7 +28,7 @@ SURFACE = np.dtype(
         *((name, float) for name in ("fine", "thick", "field")),
     ]
 )
-"""What a `Pair` has besides."""
+"""Further fields of a `Pair`."""
 TURNING = np.dtype([("mobility", float, (6,)), ("lever", float), ("offset", float, (3,))])
 """Mobility of a `Pair`, what `lever` says, and the centre of the shape from the body's row [m]."""
 LINE_CONTACT = np.dtype([("cell", np.int64), *((name, float) for name in ("xi", "inner", "weight", "share", "rise"))])

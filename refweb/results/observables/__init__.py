@@ -50,10 +50,10 @@ A scene asks for it in ``[[observe]]``, with the keys it takes::
 
 `refweb.results.observables.observable` says what it may have besides, `refweb.results.probes` what a kernel sees, and
 `refweb.net.net.Net` what there is: element c joins the rows ``net.cells[c, :2]``, ends first, and belongs to the line
-``net.line[c]``. What stands at a node or a line gives its ``Value`` that place, as those in ``nodal.py`` and
+``net.line[c]``. A quantity at a node or a line gives its ``Value`` that position, as those in ``nodal.py`` and
 ``line.py`` do; in dynamics its probe writes a row or an element to ``where[0]`` where ``where[1]`` is ``PLACE``, and
-``place(system, at)`` makes a node or a line of it. ``on(system)`` refuses a node or a line that the net does not have.
-A sum of energies has weights in place of a probe, as in ``balances.py``. One that refweb ships is a line in
+``position(system, at)`` makes a node or a line of it. ``on(system)`` refuses a node or a line that the net does not
+have. A sum of energies has weights in place of a probe, as in ``balances.py``. One that refweb ships is a line in
 `refweb.registry.OBSERVABLES`; ``tests/results/test_observable_contract.py`` holds the two faces of each against each
 other.
 """

@@ -55,8 +55,8 @@ class Observe(Table):
     part : {"start", "middle", "end"}, optional
         Element of each line that a line quantity is looked at in: that at its first node, that at its middle or behind
         it, or that at its last node; without it all elements. A value of an element of order 1 is that of its middle;
-        of a higher order it is the largest of its quadrature points. What a support bears, with the mass that is lumped
-        there, is its reaction.
+        of a higher order it is the largest of its quadrature points. The load of a support, with the mass that is
+        lumped there, is its reaction.
     select : {"max", "min", "abs"}, optional
         Value that counts of several nodes, bodies or lines: the largest, which is the default, the smallest, or the
         largest absolute value, without its sign. The reaction of several is their sum, and with ``select`` that of the
