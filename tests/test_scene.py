@@ -514,7 +514,7 @@ WRONG = [
     ("web.groups", ["a"], "[web] groups has 1 entries for 3 lines"),
     ("web.natural_length", [1, 1], "[web] natural_length has 2 entries for 3 lines"),
     ("web.supports", [0, 9], "[web] supports[1] = 9 must be 0 … 3"),
-    ("motion", [STILL, {**STILL, "node": "rim"}], "[[motion]] node = 0 is moved by two tables"),
+    ("motion", [STILL, {**STILL, "node": "rim"}], "[[motion]] node 0 is moved by two tables"),
     ("motion", [{"node": 0, "displacement": [[0, 1.0, 0]]}], "[[motion]] 1 displacement[0] = [0, 1.0, 0]", "row of 4"),
 ]
 OBSERVE = [

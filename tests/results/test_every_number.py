@@ -39,7 +39,21 @@ SPIN = (1.0, 2.0, 3.0)
 MORE = {
     "gravity": {"gravity": {"acceleration": [0.5, -1.0, -9.81]}},
     "load": {"load": [{"node": 5, "force": [0.0, 0.0, 3.0]}]},
-    "motion": {"motion": [{"node": 1, "displacement": [[0.0, 0.0, 0.0, 0.0], [DURATION, 0.0, 0.0, 0.02]]}]},
+    "motion": {
+        "motion": [
+            {"node": 1, "displacement": [[0.0, 0.0, 0.0, 0.0], [DURATION, 0.0, 0.0, 0.02]]},
+            {"body": "door", "rotation": [[0.0, 0.0, 0.0, 0.0], [DURATION, 0.0, 0.0, 0.3]]},
+        ],
+        "body": [
+            {
+                "name": "door",
+                "shape": "box",
+                "size": SIDES,
+                "position": [2.0, 2.0, 0.0],
+                "axle": {"direction": [0.0, 0.0, 1.0]},
+            }
+        ],
+    },
     "point_mass": {"point_mass": [{"node": 6, "mass": 0.05}]},
     "velocity": {"velocity": [{"node": 10, "value": [0.0, 0.0, 1.0]}]},
     "body": {"body": [{"name": "third", "radius": 0.1, "fixed": True, "position": [2.0, 2.0, 0.0]}]},
@@ -87,6 +101,7 @@ LOOKED_AT = {
         {"node": 0},
         {"select": "max"},
     ],
+    **{quantity: [{"body": "door"}] for quantity in ("support_force", "support_moment", "axle_angle")},
     "orientation": [{"body": "box"}],
     "angular_velocity": [*({"body": "ball", "component": k} for k in range(3)), {"body": "box"}],
     "angular_momentum": [{"body": "box"}],
@@ -292,6 +307,8 @@ def numbers(frame, spin, effect, static):
         if not static:
             moved = moved + BALL_MASS * (frame.places[0] - BALL) + BOX_MASS * (frame.places[1] - BOX)
         found["potential_energy 0"] = -acceleration @ moved
+    if effect == "motion":  # nothing touches the door
+        found |= {"support_force 0": 0.0, "support_moment 0": 0.0, "axle_angle 0": 0.3}
     if effect == "fold":
         held = np.zeros(3)
     bent = effect == "bending"  # its springs push on supports as well
