@@ -29,6 +29,9 @@ LONG = (
     "tethered_web",
     "coverage",
     "trust",
+    "rupture",
+    "frequencies",
+    "cable_law",
 )
 """Cases that take more than two seconds with ``--quick``; what they show has tests of its own beside them."""
 

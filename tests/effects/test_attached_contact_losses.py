@@ -393,6 +393,7 @@ def crossed(**solve):
     return refweb.Scene.from_dict(tables)
 
 
+@pytest.mark.slow
 def test_lines_that_rub_on_each_other_between_bodies_are_those_of_cvode():
     """Of order 2, with energy by that order and momenta to rounding; central differences are chosen for it."""
     exact = refweb.run(crossed(method="cvode", rtol=1e-10))

@@ -45,6 +45,7 @@ def angle_of_pendulum(t, omega):
     return 2.0 * np.arcsin(k * ellipj(rate * t, k * k)[0])
 
 
+@pytest.mark.ordinary("ida", "adams", "order *", "central-difference")
 @pytest.mark.parametrize("method", nets.METHODS)
 def test_body_on_an_axle_is_a_physical_pendulum(method):
     """Its angle, and the pull m g + m ω² l at the lowest place, within ±; the balance of energy closes."""
@@ -135,6 +136,7 @@ def gate_by_itself():
     return result.y[0, -1], pull(result.y[0, -1])[0]
 
 
+@pytest.mark.ordinary("bdf", "adams", "order *", "central-difference")
 @pytest.mark.parametrize("method", nets.METHODS)
 def test_attached_node_turns_a_gate(method):
     angle, tension = gate_by_itself()

@@ -68,6 +68,7 @@ def test_press_in_statics_is_the_rim_that_comes_to_it(d):
         assert moved["reaction"].value == pytest.approx(63967.23152, abs=1e-5)
 
 
+@pytest.mark.ordinary("shape0")
 @pytest.mark.parametrize("shape", [{"radius": RADIUS}, {"shape": "plane", "normal": [0.0, 0.0, 1.0]}])
 def test_a_body_that_comes_is_the_web_that_comes_to_it(shape):
     """Galilei: contact of a body at a constant velocity, and of the web with its rim at the negative one."""
@@ -126,6 +127,7 @@ def turned(t, table=TURNS):
     return Rotation.from_rotvec(rate * (t - table[n, 0])) * first, rate
 
 
+@pytest.mark.ordinary("central-difference", "order 4")
 @pytest.mark.parametrize("method", ["central-difference", "order 4", "bdf"])
 def test_a_body_turns_as_its_table_says(method):
     """Orientation, angular velocity and a node on it, between rows whose axes differ; a corner's rate is the next's."""
@@ -185,6 +187,7 @@ def winding(method, **solve):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_methods_wind_alike_and_book_the_work():
     """Five methods within their ± beside order 6; the work of the motion is what the web has of energy."""
     reference = winding("order 6", safety=0.1)

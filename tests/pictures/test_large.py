@@ -9,6 +9,7 @@ from refweb.pictures.model import FINE, Tubes
 from refweb.pictures.opengl import MOST_CORNERS
 
 
+@pytest.mark.slow
 def test_wires_are_as_wide_as_tubes():
     """A line that is there often enough to be drawn as a wire, and the same as one tube: the same but at rims."""
     line = np.array([[[-0.6, 0.0, 0.0], [0.6, 0.2, 0.1]]])

@@ -548,6 +548,7 @@ def test_an_interruption_leaves_nothing(film, no_opengl, monkeypatch, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_an_mp4(film, no_opengl, tmp_path):
     """All frames, and the last for a second."""
     out = films.animate(film, tmp_path / "web.mp4")

@@ -58,7 +58,7 @@ FLYING = [(effect, method) for effect in ALONE for method in METHODS if method !
 """Steps of high order take nothing that depends on velocity."""
 
 
-@pytest.mark.ordinary("gravity-central-difference", "gravity-ida", "frame-*", "orbit-*", "drag-*")
+@pytest.mark.ordinary("gravity-central-difference", "frame-*", "orbit-*", "drag-*")
 @pytest.mark.parametrize("effect, method", FLYING)
 def test_a_body_that_touches_nothing_feels_no_contact(effect, method):
     """A ball flies above a web; forces on it are 9.4 mN of drag, newtons of weight, and change their sign."""
