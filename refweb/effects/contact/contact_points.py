@@ -290,3 +290,32 @@ def in_reach(depth, spins):
         return not spot.depth + 0.5 * abs(dot(spot.gradient, spot.d)) + skin <= 0.0
 
     return in_reach
+
+
+@functools.cache
+def reaching(depth, spins):
+    """The kernel that tells whether an element with two nodes touches its body after an approach of ``reach``.
+
+    It looks at the depth itself, which changes by no more than line and body move. So an element that `in_reach` has
+    left out of a list stays out of reach until the skin of that list is used up, and bounds of steps do not depend on
+    where the list was made. The depth in bodies that are not convex is not followed along the element.
+    """
+    if not getattr(depth, "convex", True):
+        return in_reach(depth, spins)
+    within = places(depth, spins).within
+
+    @kernel()
+    def reaches(reach, x, cells, data, c, nodes, functions):
+        low, high, moved, xi = 0.0, 1.0, math.inf, 0.5
+        while moved > 1e-15:
+            spot = within(x, cells, data, c, nodes, functions, xi)
+            deep, slope = spot.depth + reach, dot(spot.gradient, spot.d)
+            if deep + max(slope * (high - xi), slope * (low - xi)) <= 0.0:
+                return False  # concave: nowhere deep enough
+            if deep > 0.0:
+                break
+            curve = dot(spot.d, hessian_times(spot.hessian, spot.d))
+            low, high, moved, xi = climb(slope, curve, low, high, moved, xi)
+        return True
+
+    return reaches

@@ -24,7 +24,7 @@ from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ...net.rotation import times_transposed, to_quaternion
 from ..base import TOUCH
 from ..vectors import cross, dot
-from .contact_points import hessian_times, place_moves, places, window
+from .contact_points import hessian_times, place_moves, places, reaching, window
 from .nearest_point import lightness, point, share
 from .pair import LINE_CONTACT, lever_of, pair_of, pairing, power_of_depth
 from .rotational_stiffness import add_moments, add_push, add_rotation, set_arms
@@ -102,7 +102,7 @@ def foresight(depth, spins=0):
     `SHALLOW` of that, and not beyond twice the depth that it already has. ``depth`` is the kernel of the bodies,
     ``spins`` as in `refweb.effects.contact.pair.pairing`.
     """
-    within, deepest, *_ = places(depth, spins)
+    (within, deepest, *_), reaches = places(depth, spins), reaching(depth, spins)
 
     @kernel()
     def depth_ahead(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
@@ -114,7 +114,7 @@ def foresight(depth, spins=0):
         length = math.sqrt(dot(d, d))
         deep = max(deep, first, last)
         nearest = 0.5 * (first + last + length) if nodes == 2 else max(first, last) + float(nodes) * length
-        if max(deep, nearest) + reach <= 0.0:
+        if max(deep, nearest) + reach <= 0.0 or nodes == 2 and not reaches(reach, x, cells, data, c, nodes, functions):
             return Foreseen(0.0, length)
         for a in range(nodes):
             reduced_mass += mass[cells[c, a]]

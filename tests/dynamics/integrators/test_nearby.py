@@ -15,6 +15,11 @@ SPUN = refweb.Body(
     name="rod", shape="cylinder", radius=0.05, length=0.5, axis=(1.0, 0.3, 0.1), mass=0.3, position=(0.0, 0.0, 0.1),
     velocity=(0.3, 0.0, -1.0), angular_velocity=(3.0, -20.0, 10.0),
 )  # fmt: skip
+GROUND = refweb.Body(name="ground", shape="plane", normal=(0.0, 0.0, 1.0), position=(0.0, 0.0, -0.05), fixed=True)
+FALLEN = refweb.Body(
+    name="crate", shape="box", size=(0.3, 0.2, 0.2), mass=0.5, position=(0.03, 0.02, 0.12), velocity=(0.4, 0.1, -2.0),
+    angular_velocity=(1.0, 2.0, 3.0),
+)  # fmt: skip
 AT_REST = refweb.Body(name="post", radius=0.05, fixed=True, position=(0.2, 0.2, 0.051))
 SHAKEN = refweb.Motion(node="rim", displacement=[(0.0, 0.0, 0.0, 0.0), (0.01, 0.02, 0.0, 0.1), (0.03, 0.0, 0.0, -0.1)])
 
@@ -53,22 +58,27 @@ def solver_of(scene, everything):
         case(AT_REST, SHAKEN),
         case(BALL, BOX, AT_REST, friction=0.4),
         case(SPUN, friction=0.4, damping=0.3),
+        case(GROUND, FALLEN, between_bodies=True),
     ],
-    ids=["ball", "bodies", "exponent", "shaken", "rubbing", "tumbling"],
+    ids=["ball", "bodies", "exponent", "shaken", "rubbing", "tumbling", "ground"],
 )
 def test_lists_change_no_bit(scene):
-    """Of the last state, the history and all peaks: the same run with every line looked at in every step."""
-    times, courses, rows = np.linspace(2e-3, 0.03, 15), [], []
-    for everything in (False, True):
+    """Of the last state, the history and all peaks: the same run with every line looked at in every step.
+
+    So is one that is taken row by row, where a list is made anew: a run is, for as many rows as the machine is slow.
+    """
+    times, courses, rows = np.linspace(1e-3, 0.03, 30), [], []
+    for everything, count in ((False, 30), (False, 1), (True, 30)):
         solver = solver_of(scene, everything)
         courses.append(solver.start())
-        rows.append(solver.advance(courses[-1], times).values)
-    np.testing.assert_array_equal(*rows)
+        rows.append(np.vstack([solver.advance(courses[-1], some).values for some in times.reshape(-1, count)]))
     assert rows[0][:, 1:].any() and courses[0].extremes.values.min() > 0.0  # something has touched
-    for name, array in courses[0].arrays().items():
-        if name == "longest":  # is noted with the lists alone
-            continue
-        np.testing.assert_array_equal(array, courses[1].arrays()[name], err_msg=name)
+    for course, values in zip(courses[1:], rows[1:], strict=True):
+        np.testing.assert_array_equal(values, rows[0])
+        for name, array in courses[0].arrays().items():
+            if name == "longest":  # is noted with the lists alone
+                continue
+            np.testing.assert_array_equal(array, course.arrays()[name], err_msg=name)
 
 
 def distances(net, body, x):
@@ -106,6 +116,36 @@ def test_what_is_near_is_what_is_near():
             assert may[chosen[:count]].all() and np.isin(np.flatnonzero(must), chosen[:count]).all()
             counts.append(count)
     assert 0 < sorted(counts)[1] and max(counts) < len(net.cells)
+
+
+def test_bounds_of_steps_do_not_depend_on_lists():
+    """A list has all lines that a bound counts, also where lines have moved since, by the rest of the skin.
+
+    The bound counts the lines that come as far as its reach, by the depth of the deepest of many points, and no others.
+    """
+    scene, rng, shares = case(BOX, GROUND, AT_REST, SPUN, exponent=1.5), np.random.default_rng(5), []
+    system, moved = scene.build(), 0.01
+    net, nodes = system.net, system.net.bodies[0].row
+    for term in (one for one in system.terms if one.contact.near is not None):
+        for reach in (0.0, 0.01, 0.03, 0.1):
+            x, way = np.zeros((2, system.rows, 3))
+            x[:nodes], way[:nodes] = rng.normal(0.0, 0.02, (nodes, 3)), rng.normal(size=(nodes, 3))
+            listed = np.empty(len(term.cells), dtype=np.int64)
+            listed = listed[: term.contact.near(reach + moved, x, term.cells, term.data, listed)]
+            x[:nodes] += moved * way[:nodes] / np.linalg.norm(way[:nodes], axis=1, keepdims=True)
+            counted, gaps = np.zeros(len(term.cells), dtype=bool), np.zeros(len(term.cells))
+            for c in range(len(term.cells)):
+                rates, one = np.zeros(system.rows), slice(c, c + 1)
+                term.tangent.bound(reach, 0.0, x, net.mass, rates, term.cells[one], term.data[one])
+                counted[c] = rates.any()
+            for body in net.bodies:
+                its = term.cells[:, 2] == body.row
+                gaps[its] = -depths(net, body, x)[term.elements.numbers[its]]
+            assert np.isin(np.flatnonzero(counted), listed).all()
+            # points are some 0.1 m/32 apart, so that the deepest place of a line is less than 2 mm from one
+            assert counted[gaps < reach].all() and not counted[gaps > reach + 2e-3].any()
+            shares.append(counted.mean())
+    assert min(shares) < 0.1 and max(shares) > 0.3
 
 
 def test_far_from_a_body_few_lines_are_looked_at():
