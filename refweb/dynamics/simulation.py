@@ -184,7 +184,12 @@ class Simulation:
             self.solution.findings.append(finding._replace(text=text))
         self.solution.findings += on_stability(state, equilibrium_, "the equilibrium it starts from")
         self.solution.findings += remarks_on(self.begin, self.system)
-        if self.overlaps is not None and len(waiting(self.system)) < len(self.system.net.bodies):
+        absent = waiting(self.system)
+        if names := [body.name for body in absent if body.carried]:
+            which = "bodies that move at the start or turn about an axle are held while the web finds its equilibrium"
+            text = f"{which}, and so are the nodes that they carry: {', '.join(names)}"
+            self.solution.findings.append(Finding("left-out", text, "body"))
+        if self.overlaps is not None and len(absent) < len(self.system.net.bodies):
             from ..statics.body_penetration import Passage
 
             passage = Passage(self.scene, self.system)

@@ -212,7 +212,7 @@ def _scales(body, net):
     across = [np.cross(np.eye(3), point) @ root for point in points]
     pulls = [[root @ (p[k] * np.eye(3) - np.outer(p, np.eye(3)[k])) @ root for k in range(3)] for p in points]
     lever = np.linalg.norm(across, 2, axis=(1, 2))
-    light, own_mass = net.mass[net.heavy].min(), net.mass[body.row]
+    light, own_mass = net.mass[net.heavy].min(initial=math.inf), net.mass[body.row]
     angle = min(0.5 / max(float(lever.max()), 1e-300), math.sqrt(light / body.moment))
     factor = min(0.5, math.sqrt(light / own_mass)) if own_mass > 0.0 else 0.5
     pull = np.linalg.norm(np.linalg.norm(pulls, 2, axis=(2, 3)), axis=1)

@@ -19,6 +19,8 @@ MOST = 400
 """Largest number of factorizations from the last state, where the interior-point method cannot be used."""
 PATIENCE = 3000
 """Largest number of factorizations of the smooth law after the interior-point method has failed."""
+FAR = 1e4
+"""Way of a node over the size of the web from which on lines of form finding do not hold it."""
 SOFTEST = 1e-2
 """Load over EA of the first net in a series of nets of growing stiffness."""
 
@@ -51,6 +53,8 @@ def solve(system, load_steps, progress=None):
             state = _equilibrium(newton, t, _start(system, t, states), warm=bool(states))
         except NotFound as error:
             raise where_nothing_touches(system, t, error) from None
+        if system.net.forming.any():
+            _refuse_far(system, t, state)
         if system.convex:
             from .duality_bound import duality_bound
             from .floating import between_slack_lines
@@ -68,6 +72,20 @@ def solve(system, load_steps, progress=None):
         state.deviations = newton.deviations(state)
         states = [*states[-1:], state]
         yield state
+
+
+def _refuse_far(system, t, state):
+    """Refuse a state that has run away, since forces that do not grow with length balance no load, however far."""
+    net = system.net
+    size = float(np.ptp(net.points, axis=0).max() + net.natural_length.max())
+    distance = np.linalg.norm(state.x[: net.nodes], axis=1)
+    if distance.max() > FAR * size:
+        raise NotFound(
+            f"no equilibrium at load step {t:g}: node {distance.argmax()} goes further than {FAR:g} times the size of "
+            "the web, as forces that do not grow with the length of lines cannot carry the loads: lower these, or "
+            "raise pretension",
+            state.stats,
+        )
 
 
 def _start(system, t, states):

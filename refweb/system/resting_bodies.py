@@ -112,7 +112,8 @@ class RestingBodies(Carried):
         for n, (row, column, at) in enumerate(self._spun):
             R, block, tensor = np.array(self.matrix(n, x)), np.zeros((6, 6)), np.eye(6)
             block[row, column] = values[at]
-            tensor[:3, :3] = R @ np.linalg.inv(self.turns.mobility[n]) @ R.T
+            inverse = np.linalg.pinv(self.turns.mobility[n])  # nothing turns across an axle
+            tensor[:3, :3] = R @ inverse @ R.T
             values[at] = (block @ tensor)[row, column]
         return values
 

@@ -268,3 +268,23 @@ def test_statics_takes_no_axle():
     body = NO | {"axle": {"direction": [0, 0, 1]}}
     with pytest.raises(refweb.InputError, match=r"turns freely cannot be used in statics: leave out its mass and give"):
         refweb.Scene.from_dict(dict(web=WEB, cable=SOFT, body=[body], solve={"kind": "static"})).build()
+
+
+def test_modes_hold_a_body_on_an_axle_and_say_so():
+    """A heavy rope beside it vibrates as it does alone."""
+
+    def scene(body):
+        return refweb.Scene(
+            web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1]),
+            cable=refweb.Cable(law="linear", modulus=1e7, area=1e-5, density=1000.0, prestrain=1e-2, subdivide=4),
+            effects=body,
+            solve=refweb.Static(),
+        )
+
+    axle = {"point": [0.0, 5.0, 0.0], "direction": [1.0, 0.0, 0.0]}
+    flap = refweb.Body(name="flap", shape="box", size=(0.2, 0.2, 0.2), mass=1.0, position=(0.0, 5.0, 0.3), axle=axle)
+    alone, beside = (
+        refweb.modes(scene(body).replace(solve=refweb.Dynamic(duration=1.0)), number=2) for body in ([], [flap])
+    )
+    np.testing.assert_allclose(beside.frequency, alone.frequency, rtol=1e-9)
+    assert any("turn about an axle" in text and "flap" in text for text in beside.warnings)

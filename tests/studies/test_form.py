@@ -438,3 +438,22 @@ def test_what_form_finding_refuses():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert refweb.form(plain, elastic).title == "scene, formed"
+
+
+@pytest.mark.parametrize("load", [-5.0, -2.0, -2.001])
+def test_what_constant_forces_cannot_carry_is_refused(load):
+    """Two lines of 1 N carry less than 2 N, 1.9 N by an angle with the vertical of acos(0.95)."""
+
+    def scene(force):
+        return refweb.Scene(
+            web=refweb.Inline(points=[[-1, 0, 0], [1, 0, 0], [0, 0, 0.1]], lines=[[0, 2], [1, 2]], supports=[0, 1]),
+            cable=refweb.Cable(law="constant-force", pretension=1.0, modulus=1e9, area=1e-6, density=0.0),
+            effects=[refweb.Load(node=2, force=(0.0, 0.0, force))],
+            observe=[refweb.Observe(name="z", quantity="position", node=2, component="z")],
+            solve=refweb.Static(),
+        )
+
+    exact = -0.95 / np.sqrt(1.0 - 0.95**2)
+    assert refweb.run(scene(-1.9)).results["z"].value == pytest.approx(exact, rel=1e-9)
+    with pytest.raises(refweb.SolverError, match="cannot carry the loads: lower these, or raise pretension"):
+        refweb.run(scene(load))
