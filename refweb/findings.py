@@ -21,7 +21,7 @@ CODES = {
     "kink": "Elements between slack and taut, of which no vibration is linear.",
     "large-strain": "A strain beyond what the law describes.",
     "law-floor": "The smooth law lets slack lines push.",
-    "left-out": "Effects that natural frequencies leave out.",
+    "left-out": "Effects and bodies that a solution leaves out, such as friction in statics.",
     "lines-in-doubt": "Lines may have passed through lines.",
     "loose-bodies": "Bodies that the equilibrium leaves free to move or turn.",
     "loose-nodes": "Positions that the equilibrium leaves open.",

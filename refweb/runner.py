@@ -13,7 +13,7 @@ from . import memory
 from .errors import InputError, PenetrationError, in_file
 from .findings import NOTE, REFUSAL, Finding, read_findings
 from .messages import short
-from .results.error_budget import judge
+from .results.error_budget import judge, rubs
 from .results.folder import Folder, check_folder, fingerprint, is_alive
 from .results.progress import followed
 from .results.provenance import versions, web_of
@@ -281,6 +281,9 @@ def notices(scene, system):
             yield Finding("surface", f'body "{body.name}": {text}', "body")
     if not system.contact and any(not body.carried for body in system.net.bodies):
         yield Finding("body-not-felt", "the scene has a [[body]] but no [contact]: the web does not feel it", "body")
+    if scene.solve.kind == "static" and any(map(rubs, scene.effects)):
+        text = 'statics has no friction: contact pushes along its normal alone; [solve] kind = "dynamic" has it'
+        yield Finding("left-out", text, "contact")
     yield from _idle(system, getattr(scene.solve, "load_steps", (0.0, *system.corners)))
     if scene.solve.kind == "static" and (parts := system.unsupported_parts):
         axes = ", ".join(sorted({"xyz"[part.axis] for part in parts}))

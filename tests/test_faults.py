@@ -196,6 +196,7 @@ def test_an_interrupted_run_goes_on_within_tolerance(tmp_path, monkeypatch, meth
         np.testing.assert_allclose(found["time"], event["time"], rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_rigid_links_go_on(tmp_path, monkeypatch):
     """A run with rigid links that is interrupted and resumed has the results of one that is not."""
     chain = refweb.Inline(points=[[0.0, 0.0, -0.5 * i] for i in range(4)], lines=[[0, 1], [1, 2], [2, 3]], supports=[0])

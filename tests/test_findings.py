@@ -73,3 +73,19 @@ def test_a_refusal_is_a_finding_and_no_warning(tmp_path):
 
 def test_a_folder_without_codes_has_its_warnings():
     assert read_findings({"warnings": ["slack lines push"]}) == [Finding("", "slack lines push")]
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_statics_says_that_it_has_no_friction(friction):
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[-1, 0, 0], [0, 0, 0.1], [1, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2]),
+        cable=refweb.Cable(law="tension-only", modulus=1e7, area=1e-5, density=1.0),
+        effects=[
+            refweb.Body(name="post", radius=0.1, fixed=True, position=(0.1, 0.0, 0.0)),
+            refweb.Contact(stiffness=1e4, friction=friction),
+            refweb.Load(node=1, force=(0.0, 0.0, -1.0)),
+        ],
+        solve=refweb.Static(),
+    )
+    texts = [finding.text for finding in refweb.run(scene).findings if finding.code == "left-out"]
+    assert len(texts) == (friction > 0.0) and all("no friction" in text for text in texts)

@@ -200,8 +200,13 @@ ALIKE = (
     "spun-tight",
     "falling-net",
     "capture-satellite",
+    "spinning-web",
+    "tethered-web",
+    "ring-on-slack-cable",
+    "closing-net",
+    "by ida",
 )
-"""Scenes that call for what others call for, on another web, or of which others call for every part."""
+"""Scenes that call for what others call for, on another web, or each part of which others call for."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in ALIKE)) for n in SCENES])

@@ -383,6 +383,7 @@ def test_books_of_a_bridle_close(tmp_path):
     assert not drawn.point_data["support"][:4].any()
 
 
+@pytest.mark.slow
 def test_methods_agree_on_a_bridle():
     solve = {"kind": "dynamic", "duration": 0.1}
     found = [

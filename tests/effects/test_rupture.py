@@ -530,6 +530,7 @@ def test_breaks_that_are_none(at):
         Rupture(at=at)
 
 
+@pytest.mark.slow
 def test_auto_and_cost():
     """Breaks are found by whatever method is chosen, and by all that ``refweb cost`` compares but DOP853."""
     scene = thrown([1.0], [Rupture(strength=STRENGTH)])
@@ -548,6 +549,7 @@ def test_the_summary_tells_of_breaks():
     assert len(words) == len(solution.breaks) and words[0].startswith(f"line {solution.breaks[0]['line']} at t = ")
 
 
+@pytest.mark.slow
 def test_pictures_of_broken_lines(tmp_path):
     """Frames and pages mark broken lines, with a colour of their own."""
     from refweb.pictures.record import of_folder

@@ -1069,6 +1069,7 @@ def pushed_together(**contact):
     )
 
 
+@pytest.mark.slow
 def test_a_killed_run_may_choose_its_stiffness_anew(tmp_path):
     """What a kill leaves in the first of several attempts goes on to what the whole run comes to."""
     out, killed = tmp_path / "whole", tmp_path / "killed"

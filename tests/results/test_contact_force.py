@@ -195,7 +195,7 @@ def test_where_a_body_is_touched_most(method):
 # Whom an event means
 
 
-@pytest.mark.ordinary("central-difference", "order 4", "cvode")
+@pytest.mark.ordinary("central-difference", "order 4")
 @pytest.mark.parametrize("method", METHODS)
 def test_what_a_body_touches(method):
     """Two balls meet at (0.3 − 0.2)/2 s far from the web, and the third one falls on it at (0.15 − 0.1)/1 s."""

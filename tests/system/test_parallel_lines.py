@@ -120,6 +120,7 @@ def hung(links, points, masses, duration, **web):
     )
 
 
+@pytest.mark.slow
 def test_a_pendulum_on_a_link_alone(tmp_path):
     """From horizontal it comes back after 4 K(sin²45°) √(L/g); its frame has the node, and no line of it."""
     period = 4.0 * ellipk(0.5) * np.sqrt(0.7 / GRAVITY)

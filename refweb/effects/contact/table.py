@@ -94,6 +94,7 @@ class Contact(Table):
         with 1 − 2/3 d v of it.
     friction : float
         Coefficient of friction μ. Friction rotates free bodies; a push rotates all free bodies but spheres and rings.
+        Statics has no friction.
     slip_velocity : float
         Slip velocity v_s [m/s] at which friction is 1/√2 of its limit; below it, friction is viscous. Explicit steps do
         not depend on it.

@@ -670,6 +670,7 @@ def test_an_error_in_a_callback_reaches_the_user(here, monkeypatch, capsys, line
     assert err.startswith("refweb: internal error, ZeroDivisionError: a fault") and err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_run_may_end_before_it_has_begun(tmp_path):
     """The memory of SuperLU_MT is freed in good order where nothing has been factorized: the process lives on."""
     code = """

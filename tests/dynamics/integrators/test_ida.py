@@ -302,6 +302,7 @@ def test_pendulum(order, rtol):
     assert run.drift < off and (run.constraint_drift < off).all()
 
 
+@pytest.mark.slow
 def test_a_chain_of_links_keeps_its_lengths():
     """20 links swing from horizontal for 1 s, with a whip at its end: lengths to 1e-10, energy to 1e-5."""
     system = chain(20, True)
