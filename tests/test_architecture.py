@@ -7,7 +7,9 @@ that it exports are imported when they are used.
 """
 
 import ast
+import pathlib
 import re
+import subprocess
 
 import pytest
 from import_graph import MODULES, PACKAGES, at_head, imports, uses
@@ -239,3 +241,13 @@ def test_exported_classes_are_described(name):
         assert re.search(r"\n    (Parameters|Attributes)\n    -{10}\n", found.__doc__)
         assert not issubclass(found, Table) or "\n    Raises\n    ------\n    InputError\n" in found.__doc__
         assert "check" not in vars(found) or found.check.__doc__
+
+
+def test_the_top_level_has_the_folders_of_the_project():
+    """What git keeps there: a result folder of a run is none of it."""
+    root = pathlib.Path(__file__).parents[1]
+    if not (root / ".git").exists():
+        pytest.skip("not in a clone")
+    files = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, text=True, check=True).stdout.split("\n")
+    folders = {file.partition("/")[0] for file in files if "/" in file}
+    assert folders == {"refweb", "tests", "validation", ".ci", ".github"}
