@@ -473,9 +473,9 @@ MUTANTS = [
     Mutant("statics/predictor", "if energy < lowest:", "if energy > lowest:"),
     Mutant("system/conjugate_gradients", "p = z + _over(size, last) * p", "p = z"),
     Mutant("system/resting_bodies", "np.eye(3) - cross_matrix(u))", "np.eye(3) + cross_matrix(u))"),
-    Mutant("system/resting_bodies", "(f @ arm) * np.eye(3) - np.outer(arm, f)", "(f @ arm) * np.eye(3)"),
+    Mutant("system/attached_nodes", "(force @ arm) * np.eye(3) - np.outer(arm, force)", "(force @ arm) * np.eye(3)"),
     Mutant("system/resting_bodies", "0.5 * (matrix + matrix.T)[row, column]", "matrix[row, column]"),
-    Mutant("system/resting_bodies", "R @ inverse @ R.T", "R @ R.T"),
+    Mutant("system/resting_bodies", "R @ np.linalg.pinv(self.turns.mobility[n]) @ R.T", "R @ R.T"),
     Mutant("system/static_system", "any(b.velocity) or any(b.angular_velocity) or not", "not"),
     Mutant("statics/dynamic_relaxation", "rates[row] += 2.0 * rates[node]", "rates[row] += 0.02 * rates[node]"),
     Mutant(

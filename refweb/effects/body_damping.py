@@ -52,9 +52,6 @@ def rotation_terms(net, rate, drag, damping, bound):
         terms.append(ForceTerm(cells=column(rows), data=rate * net.mass[rows, None], force=drag, **shared))
     if turning:
         cells = np.array([(body.spin, body.turn) for body in turning], dtype=np.int32)
-        data = [
-            [rate * (b.moment - b.mass * float(b.arm @ b.arm)), *(b.axes.T @ b.mobility @ b.axes).ravel()]
-            for b in turning
-        ]
+        data = [[rate * b.moment_about_centre, *(b.axes.T @ b.mobility @ b.axes).ravel()] for b in turning]
         terms.append(ForceTerm(cells=cells, data=np.array(data), force=fade, **shared))
     return terms

@@ -328,7 +328,9 @@ class RigidBody:
 
     @property
     def moment_about_centre(self):
-        """Moment of inertia about the direction of the axle through the row [kg m²]."""
+        """`moment` without the mass at its arm from an axle: that about the direction of the axle through the row."""
+        if self.moved or not self.axle:
+            return self.moment
         direction = self.axes @ self.axle.direction
         return float(direction @ self.inertia @ direction)
 

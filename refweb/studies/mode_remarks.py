@@ -8,7 +8,7 @@ from ..findings import Finding
 from ..net.tension_laws import LINEAR
 from ..results.state import floor_remark
 from ..statics.remarks import remark_on_open
-from ..system.static_system import on_waiting
+from ..system.static_system import waiting
 from .pencil import STRAIN
 
 
@@ -37,5 +37,6 @@ def left_out(system):
     frames = [term.name for term in system.rotating]
     if any(term.velocity.damping is not None and term.name not in frames for term in system.terms):
         yield Finding("left-out", "forces that depend on velocity, such as damping, are left out")
-    for text in on_waiting(system):
-        yield Finding("left-out", text, "body")
+    if names := [body.name for body in waiting(system)]:
+        which = "bodies that move at the start, turn about an axle or touch nothing are held, and the web does not feel"
+        yield Finding("left-out", f"{which} them: {', '.join(names)}", "body")

@@ -157,17 +157,25 @@ class Carried:
         for c, (node, n) in enumerate(self.turns.carried):
             (arm, *_, angle), f = state[c], force[node]
             expanded = np.zeros((6, 6))
-            expanded[:3] = ((f @ arm) * np.eye(3) - np.outer(arm, f)) @ angle
+            expanded[:3] = lever_stiffness(arm, f) @ angle
             add_to(values, self._spun[n], expanded)
 
     def add_damping(self, values, system, x, v, blocks):
         """Add to the values of C what these nodes have of it, of the blocks of −∂f/∂v."""
         self._arrange(system.pattern, system.free)
-        state = self._state(x, v)
+        self._add_blocks(values, self._state(x, v), lambda cell: blocks[cell.term][cell.at], 1)
+
+    def _add_blocks(self, values, state, block_of, which=0):
+        """Add blocks by the matrices T of their cells, or by T of velocities, 1; cells without a block are left out."""
         for cell, entries in zip(self._cells, self._entries, strict=True):
-            _, fast, _, L = self._matrices(cell, state)
-            block = blocks[cell.term][cell.at]
-            add_to(values, entries, beside(L @ block @ fast, block, cell))
+            if (block := block_of(cell)) is not None:
+                matrices = self._matrices(cell, state)
+                add_to(values, entries, beside(matrices[3] @ block @ matrices[which], block, cell))
+
+
+def lever_stiffness(arm, force):
+    """−∂m/∂p of the moment m of a force on a node that a rotation vector p carries about an arm, shape (3, 3)."""
+    return (force @ arm) * np.eye(3) - np.outer(arm, force)
 
 
 def _entries(rows, size, number, keys):

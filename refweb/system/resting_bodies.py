@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .attached_nodes import Carried, add_to, beside, cross_matrix
+from .attached_nodes import Carried, add_to, cross_matrix, lever_stiffness
 
 NO_TURN = np.hstack([np.eye(3), np.zeros((3, 3))])
 """δθ of the two rows of rotation of a body: the first has it as its displacement."""
@@ -59,16 +59,13 @@ class RestingBodies(Carried):
         """
         self._arrange(system.pattern, system.free)
         state = self._state(x, v)
-        for cell, entries in zip(self._cells, self._entries, strict=True):
-            T, _, _, L = self._matrices(cell, state)
-            block = blocks[cell.term][cell.at]
-            add_to(values, entries, beside(L @ block @ T, block, cell))
+        self._add_blocks(values, state, lambda cell: blocks[cell.term][cell.at])
         if len(self.turns.carried):
             terms = system.terms if only is None else only
             force = sum((system.force_of(term, t, x, v) for term in terms), np.zeros((system.rows, 3)))
             for c, (node, n) in enumerate(self.turns.carried):
                 arm, f = state[c][0], force[node]
-                turned = (f @ arm) * np.eye(3) - np.outer(arm, f)
+                turned = lever_stiffness(arm, f)
                 if definite:
                     size, axes = np.linalg.eigh(0.5 * (turned + turned.T))
                     turned = axes * np.maximum(size, 0.0) @ axes.T
@@ -90,10 +87,7 @@ class RestingBodies(Carried):
         self._arrange(system.pattern, system.free)
         still = np.zeros((system.rows, 3))
         state = self._state(still, still)
-        for cell, entries in zip(self._cells, self._entries, strict=True):
-            if cell.term == lines:
-                T, _, _, L = self._matrices(cell, state)
-                add_to(values, entries, beside(L @ blocks[cell.at] @ T, blocks[cell.at], cell))
+        self._add_blocks(values, state, lambda cell: blocks[cell.at] if cell.term == lines else None)
 
     def add_moves(self, x, moves):
         """Write the moves of nodes to moves of all rows about x, to first order, shape (k, rows, 3)."""
@@ -110,12 +104,16 @@ class RestingBodies(Carried):
         self._arrange(system.pattern, system.free)
         values = values.copy()
         for n, (row, column, at) in enumerate(self._spun):
-            R, block, tensor = np.array(self.matrix(n, x)), np.zeros((6, 6)), np.eye(6)
+            block, tensor = np.zeros((6, 6)), np.eye(6)
             block[row, column] = values[at]
-            inverse = np.linalg.pinv(self.turns.mobility[n])  # nothing turns across an axle
-            tensor[:3, :3] = R @ inverse @ R.T
+            tensor[:3, :3] = self._tensor(n, x)
             values[at] = (block @ tensor)[row, column]
         return values
+
+    def _tensor(self, n, x):
+        """J/I of a body as it stands at x, that about an axle of one that nothing turns across it."""
+        R = np.array(self.matrix(n, x))
+        return R @ np.linalg.pinv(self.turns.mobility[n]) @ R.T
 
     def momenta(self, system, x):
         """Matrix of the unknowns that makes forces by L/I of bodies those by their angular velocity, sparse."""
@@ -128,8 +126,7 @@ class RestingBodies(Carried):
         self._arrange(system.pattern, system.free)
         values = np.zeros(len(system.pattern.indices))
         for n, (row, column, at) in enumerate(self._spun):
-            R, block = np.array(self.matrix(n, x)), np.zeros((6, 6))
-            J = self.turns.moment[n] * R @ np.linalg.inv(self.turns.mobility[n]) @ R.T
+            block, J = np.zeros((6, 6)), self.turns.moment[n] * self._tensor(n, x)
             block[:3, :3] = 2.0 * cross_matrix((0.5 * np.trace(J) * np.eye(3) - J) @ speed)
             values[at] = block[row, column]
         return values

@@ -67,13 +67,6 @@ def waiting(system):
     ]
 
 
-def on_waiting(system):
-    """A sentence on `waiting` bodies, or none."""
-    if names := [body.name for body in waiting(system)]:
-        which = "bodies that move at the start, turn about an axle or touch nothing are held, and the web does not feel"
-        yield f"{which} them: {', '.join(names)}"
-
-
 def _touches(system, body):
     """Tell if a body touches a line where it starts."""
     start = np.zeros((system.rows, 3))

@@ -114,7 +114,7 @@ class Filled(Shape):
 
         wide = vars(self).setdefault("_wide", {})  # kept as long as this: kernels read it where it stands
         if thickness not in wide:
-            points, triangles = self.solid.felt or (self.solid.points, self.solid.triangles)
+            points, triangles = self._felt
             size = float(np.ptp(points, axis=0).max())
             spacing = max((size + 2.0 * thickness) / WIDE, field.spacing)
             cells = max(int(np.ceil(size / spacing)), 1)
@@ -128,7 +128,21 @@ class Filled(Shape):
 
     def remarks(self):
         """Remarks on repairs of its file, and on walls that are thickened."""
-        return *self.solid.remarks, *on_thin_walls(self.solid.field)
+        return *self.solid.remarks, *self._on_thin_walls()
+
+    def _on_thin_walls(self):
+        field = self.solid.field
+        if field.offset > 0.0:
+            cells = round(float(np.ptp(self._felt[0], axis=0).max()) / field.spacing)
+            yield (
+                f"some walls are thinner than {2.0 * WALL:g} cells of its grid, {2.0 * WALL * field.spacing:.2g} m: "
+                f"the body is {field.offset:.2g} m thicker on all sides; grid = {2 * cells} takes half of that"
+            )
+
+    @property
+    def _felt(self):
+        """Corners and triangles of the boundary that its field is made of."""
+        return self.solid.felt or (self.solid.points, self.solid.triangles)
 
     def texts(self):
         """Texts on its size, its centre of mass in the file, and the error of its field at the surface."""
@@ -162,13 +176,3 @@ def field_in(points, triangles, grid, winding=None, fewest=GRID):
             offset = (WALL + 0.5) * field.spacing - field.thickness
             return field_of(points, triangles, cells, winding=winding, offset=offset)
         cells = int(np.ceil(more * cells))
-
-
-def on_thin_walls(field):
-    """A remark on the walls of a solid that are thickened, or none."""
-    if field.offset > 0.0:
-        cells = max(field.counts) - 3 - round(2.0 * (field.margin + field.offset) / field.spacing)
-        yield (
-            f"some walls are thinner than {2.0 * WALL:g} cells of its grid, {2.0 * WALL * field.spacing:.2g} m: "
-            f"the body is {field.offset:.2g} m thicker on all sides; grid = {2 * cells} takes half of that"
-        )

@@ -34,7 +34,7 @@ class TotalAngularMomentum(Nodal):
         counted = np.arange(linear) if every else self.rows(system)
         named = net.bodies if every else self.bodies(net)
         turning = [body for body in named if body.spin is not None and not body.prescribed]
-        moments = [(b.spin, b.moment - b.mass * float(b.arm @ b.arm)) for b in turning]
+        moments = [(b.spin, b.moment_about_centre) for b in turning]
         return np.column_stack([masses, net.points[:linear]]), counted, moments
 
     def of(self, state):

@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import InputError
 from ...kernels import kernel
 from ...net.rotation import matrix_at, times
-from ..probes import MAGNITUDE, PROBE, Probe
+from ..probes import PROBE, Probe, component_of
 from .observable import ANY, Value
 from .rotation import Turning
 
@@ -36,22 +36,17 @@ class _Held(Turning):
             )
 
     def of(self, state):
-        """Compute it as the probe does."""
-        probe = self.probe(state.system)
+        """Value by its probe, which looks at no lines."""
+        probe, lines, where = self.probe(state.system), np.zeros((0, 0)), np.full(2, -1)
         rows, data = np.array(probe.rows, dtype=np.int64), np.ascontiguousarray(probe.data, dtype=float)
         force = state.system.balance(state.time, state.x, state.v).force
-        return Value(float(self.value_of(state.x, state.v, force, rows, data)), None)
+        return Value(float(probe.kernel(state.time, state.x, state.v, force, lines, rows, data, where)), None)
 
 
 class SupportForce(_Held):
     """Force of motion or axle on a body."""
 
     unit = "N"
-
-    @property
-    def value_of(self):
-        """Kernel of the value."""
-        return support_force_of
 
     def probe(self, system):
         """Make the probe of x, v and f."""
@@ -77,11 +72,6 @@ class SupportMoment(_Held):
                 "moment it is: give rotation = [[0, 0, 0, 0]] to hold it"
             )
 
-    @property
-    def value_of(self):
-        """Kernel of the value."""
-        return support_moment_of
-
     def probe(self, system):
         """Make the probe of f alone."""
         return Probe(support_moment, self.rows(system)[:2], np.zeros((0, 0)))
@@ -106,26 +96,13 @@ class AxleAngle(_Held):
                 "{ direction = [...] } and, where it is moved, rotation = ..."
             )
 
-    @property
-    def value_of(self):
-        """Kernel of the value."""
-        return axle_angle_of
-
     def probe(self, system):
         """Make the probe of x alone."""
         return Probe(axle_angle, self.rows(system)[2:], np.zeros((0, 0)))
 
 
-@kernel()
-def component_of(number, p):
-    """Component of a vector by its number, or its size."""
-    if number == MAGNITUDE:
-        return np.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
-    return p[0] if number == 0 else p[1] if number == 1 else p[2]
-
-
-@kernel()
-def support_force_of(x, v, f, rows, data):
+@kernel(PROBE)
+def support_force(t, x, v, f, lines, rows, data, where):
     """Force on a body; ``rows`` is (component, row, rows of rotation), data m, I, r at the start and n; m = 0: −f."""
     b, s = rows[1], rows[2]
     p = 0.0 - f[b, 0], 0.0 - f[b, 1], 0.0 - f[b, 2]
@@ -140,35 +117,17 @@ def support_force_of(x, v, f, rows, data):
             p[1] + faster * (n[2] * r[0] - n[0] * r[2]) + inward * r[1],
             p[2] + faster * (n[0] * r[1] - n[1] * r[0]) + inward * r[2],
         )
-    return component_of(rows[0], p)
-
-
-@kernel()
-def support_moment_of(x, v, f, rows, data):
-    """Moment on a body; ``rows`` is (component, row of rotation)."""
-    s = rows[1]
-    return component_of(rows[0], (0.0 - f[s, 0], 0.0 - f[s, 1], 0.0 - f[s, 2]))
-
-
-@kernel()
-def axle_angle_of(x, v, f, rows, data):
-    """Angle about an axle; ``rows`` is the second row of rotation."""
-    return x[rows[0], 1]
-
-
-@kernel(PROBE)
-def support_force(t, x, v, f, lines, rows, data, where):
-    """Kernel of `support_force_of`."""
-    return support_force_of(x, v, f, rows, data)
+    return component_of(rows[0], p[0], p[1], p[2])
 
 
 @kernel(PROBE)
 def support_moment(t, x, v, f, lines, rows, data, where):
-    """Kernel of `support_moment_of`."""
-    return support_moment_of(x, v, f, rows, data)
+    """Moment on a body; ``rows`` is (component, row of rotation)."""
+    s = rows[1]
+    return component_of(rows[0], 0.0 - f[s, 0], 0.0 - f[s, 1], 0.0 - f[s, 2])
 
 
 @kernel(PROBE)
 def axle_angle(t, x, v, f, lines, rows, data, where):
-    """Kernel of `axle_angle_of`."""
-    return axle_angle_of(x, v, f, rows, data)
+    """Angle about an axle; ``rows`` is the second row of rotation."""
+    return x[rows[0], 1]
