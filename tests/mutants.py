@@ -92,6 +92,7 @@ MIRRORS = {
     "effects/body_damping": "dynamics/test_bodies_come_to_rest.py",
     "effects": "test_contract.py effects/test_{}.py",
     "system/links": "dynamics/integrators/test_ida.py",
+    "system/attached_nodes": "effects/test_attach.py statics/test_free_bodies.py studies/test_modes_with_bodies.py",
     "system/resting_bodies": "statics/test_free_bodies.py studies/test_modes_with_bodies.py",
     "system/static_system": "dynamics/test_bodies_come_to_rest.py dynamics/test_starts.py",
     "system": "system/test_system.py test_contract.py dynamics/integrators/test_cvode.py",
