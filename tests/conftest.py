@@ -1,17 +1,21 @@
 """Processes that tests start run the code under test, from whatever folder: not what is installed beside it.
 
-They compile without a second process: the workers of the tests fill the cores.
+They compile without a second process: the workers of the tests fill the cores. And they read bytecode that the first
+of them has written, which takes each 0.4 s less than to read sources.
 """
 
 import fnmatch
 import os
 import pathlib
+import sys
 
 import pytest
 
 _before = os.environ.get("PYTHONPATH")
 os.environ["PYTHONPATH"] = os.pathsep.join([str(pathlib.Path(__file__).parents[1]), *([_before] if _before else [])])
 os.environ.setdefault("REFWEB_COMPILERS", "1")
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -136,21 +136,11 @@ class Kernel:
     @functools.cached_property
     def _entry(self):
         """The dispatcher that Python calls."""
+        if self.signature is not None:
+            return functools.partial(entry_of(self.signature), self.address())
         name = "entry_" + self.py_func.__qualname__.rpartition(".")[2]
-        given = {**self._options, **numba_internals.ENTRY}
-        if self.signature is None:
-            cache = numba_internals.Cache(name, lambda: f"entry {self._key}", False)
-            return numba_internals.dispatcher(self.py_func, given, cache)
-        names = ", ".join(self.py_func.__code__.co_varnames[: self.py_func.__code__.co_argcount])
-        space = {"own": _ByAddress(self), "__name__": self.py_func.__module__}
-        exec(f"def entry({names}): return own({names})", space)
-        entry = space["entry"]
-        entry.__qualname__ = f"{self.py_func.__qualname__}.entry"
-        cache = numba_internals.Cache(name, lambda: keys.digest(keys.of_function(entry)), False)
-        made = numba_internals.dispatcher(entry, given, cache)
-        made.compile(self.signature)
-        made.disable_compile()
-        return made
+        cache = numba_internals.Cache(name, lambda: f"entry {self._key}", False)
+        return numba_internals.dispatcher(self.py_func, {**self._options, **numba_internals.ENTRY}, cache)
 
     def __call__(self, *arguments):
         if not self.prepared:
@@ -168,6 +158,19 @@ class Kernel:
         kernels = {}
         _collect(self.py_func, kernels, set())
         return list(kernels)
+
+
+@functools.cache
+def entry_of(signature):
+    """The dispatcher by which Python calls all kernels of one signature: its first argument is their address."""
+    names = ", ".join(f"a{n}" for n in range(len(signature.args)))
+    space = {"kernel_at": numba_internals.kernel_at(signature), "__name__": __name__}
+    exec(f"def entry(address, {names}): return kernel_at(address)({names})", space)
+    cache = numba_internals.Cache("entry", lambda: f"entry {signature}", False)
+    made = numba_internals.dispatcher(space["entry"], {**COMMON, **numba_internals.ENTRY}, cache)
+    made.compile(signature.return_type(types.intp, *signature.args))
+    made.disable_compile()
+    return made
 
 
 class _ByAddress:

@@ -40,7 +40,7 @@ from numba.core.imputils import lower_builtin, lower_constant
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, Signature, infer_global
-from numba.extending import models, register_model
+from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import make_array, populate_array
 
 from . import keys, store
@@ -245,6 +245,19 @@ class Called(types.Callable):
 
 
 register_model(Called)(models.OpaqueModel)
+
+
+def kernel_at(signature):
+    """A function for kernels: the kernel of a signature that stands at an address."""
+
+    @intrinsic
+    def at(context, address):
+        def read(context, builder, signature, arguments):
+            return builder.inttoptr(arguments[0], _byte)
+
+        return Called(signature)(types.intp), read
+
+    return at
 
 
 @lower_constant(Called)

@@ -117,7 +117,7 @@ class Record:
                 words.append(int(np.float64(value).view(np.int64)) if isinstance(kind, types.Float) else int(value))
         return np.array(words, dtype=WORD)
 
-    @property
+    @functools.cached_property
     def address(self):
         """Address of the block, which lives as long as the record."""
         return self._block.ctypes.data

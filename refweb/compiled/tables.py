@@ -175,10 +175,13 @@ def refuse(value, kind, name):
     raise TypeError(f"{name} is {getattr(value, 'dtype', type(value).__name__)}, not {kind}")
 
 
+_number_type = functools.cache(from_dtype)
+
+
 def sizes_of(value, kind, name):
     """Address and sizes of an array, which is of a type."""
     fits = isinstance(value, np.ndarray) and value.ndim == kind.ndim and value.flags.c_contiguous
-    if not fits or from_dtype(value.dtype) != kind.dtype or not value.flags.writeable:
+    if not fits or _number_type(value.dtype) != kind.dtype or not value.flags.writeable:
         refuse(value, kind, name)
     return [value.ctypes.data, *value.shape]
 
@@ -276,7 +279,7 @@ class Functions:
     def _head(self):
         return np.array([len(self), self._items.ctypes.data], dtype=WORD)
 
-    @property
+    @functools.cached_property
     def address(self):
         """Address of the table."""
         return self._head.ctypes.data

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import functools
 import importlib.metadata
 import sys
 
@@ -45,7 +45,14 @@ def web_of(system):
 def versions(libraries=LIBRARIES):
     """Versions of refweb, Python, some libraries and the packages of plug-ins, by name; nothing is imported."""
     versions_by_name = {"refweb": __version__, "python": sys.version.split()[0]}
-    for name in (*libraries, *OPTIONAL):
-        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-            versions_by_name[name] = importlib.metadata.version(name)
-    return versions_by_name | PACKAGES
+    numbers = {name: _version_of(name) for name in (*libraries, *OPTIONAL)}
+    return versions_by_name | {name: number for name, number in numbers.items() if number} | PACKAGES
+
+
+@functools.cache
+def _version_of(name):
+    """Version of an installed library, "" where there is none."""
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return ""
