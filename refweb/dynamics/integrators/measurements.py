@@ -57,12 +57,14 @@ class Measurements:
     def __init__(self, probes, sums, book):
         self.observed, self._book = Observed.of(probes, sums, len(book.system.terms)), book
         self._of_terms = [(i, probe.term) for i, probe in enumerate(probes) if probe.term != -1]
-        self._where = np.zeros(2, dtype=np.int64)
+        self._where, self._read = np.zeros(2, dtype=np.int64), None
 
     def _state(self, sample):
         """Arguments of a look at a sample, whose values per cell probes read from now on."""
-        for i, term in self._of_terms:
-            self.observed.data[i] = sample.felt if term == CONTACT else sample.per_cell[term]
+        if sample is not self._read:
+            for i, term in self._of_terms:
+                self.observed.data[i] = sample.felt if term == CONTACT else sample.per_cell[term]
+            self._read = sample
         return sample.time, sample.x, sample.v, sample.force, sample.per_cell.lines
 
     def value(self, piece, slot, sample):
