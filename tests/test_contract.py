@@ -249,9 +249,13 @@ def agrees(change, product):
     return min(errors) < 1e-5
 
 
-@pytest.mark.parametrize("place", [flat, stretched, crumpled, far])
 @pytest.mark.parametrize("name, i, law", CASES)
-def test_derivatives_in_hard_states(name, i, law, place):
+def test_derivatives_in_hard_states(name, i, law):
+    for place in (flat, stretched, crumpled, far):
+        check_derivatives(name, i, law, place)
+
+
+def check_derivatives(name, i, law, place):
     net, system = make(name, i, law, tensionless=place is flat)
     noise = np.random.default_rng(7).standard_normal((2, len(net.points), 3))
     x, v = np.zeros((2, *net.points.shape))

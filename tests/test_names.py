@@ -8,7 +8,6 @@ import inspect
 import itertools
 import re
 
-import pytest
 from import_graph import MODULES
 
 BARE = set(
@@ -35,16 +34,26 @@ def defined(tree):
             yield node.name, node.lineno
 
 
-@pytest.mark.parametrize("name", sorted(MODULES))
-def test_names_and_docstrings_say_what_they_are(name):
-    tree = MODULES[name]
+def test_names_say_what_they_are():
     bare = [
-        f"{word} in line {line}" for word, line in defined(tree) if word.strip("_") in BARE - CONTRACT.get(name, set())
+        f"{word} in line {line} of {name}"
+        for name, tree in MODULES.items()
+        for word, line in defined(tree)
+        if word.strip("_") in BARE - CONTRACT.get(name, set())
     ]
     assert not bare
-    parts = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module))
-    vague = [text for node in parts if (text := ast.get_docstring(node)) and text.split()[0].rstrip(",") in VAGUE]
-    assert not vague, vague[0].splitlines()[0]
+
+
+def test_docstrings_say_what_they_are():
+    parts = [
+        (name, node)
+        for name, tree in MODULES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module)
+    ]
+    texts = [(name, text) for name, node in parts if (text := ast.get_docstring(node))]
+    vague = [(name, text.splitlines()[0]) for name, text in texts if text.split()[0].rstrip(",") in VAGUE]
+    assert not vague
 
 
 def passages(text):
@@ -61,12 +70,14 @@ def passages(text):
     return [" ".join(" ".join(group).split()) for indent, group in groups if indent is not None]
 
 
-@pytest.mark.parametrize("name", sorted(MODULES))
-def test_no_sentence_begins_with_a_what_clause(name):
-    texts = (
-        node.value.value
-        for node in ast.walk(MODULES[name])
+def test_no_sentence_begins_with_a_what_clause():
+    texts = [
+        (name, node.value.value)
+        for name, tree in MODULES.items()
+        for node in ast.walk(tree)
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-    )
-    clauses = [found for text in texts for passage in passages(text) for found in SENTENCE.findall(passage)]
-    assert not clauses, clauses[0]
+    ]
+    clauses = [
+        (name, found) for name, text in texts for passage in passages(text) for found in SENTENCE.findall(passage)
+    ]
+    assert not clauses
