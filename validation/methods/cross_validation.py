@@ -64,6 +64,10 @@ EFFECTS = {
     "[orbit]": {"orbit": {"mean_motion": 2.0}},
     "[drag]": {"drag": {"density": 100.0, "wind": [0.5, 0.0, 0.0]}},
     "[rupture]": {"rupture": {"strength": 2.3e4}},
+    "a line that is reeled in with its mass": {
+        "reel": [{"lines": 0, "factor": [[0.0, 1.0], [0.2, 0.9], [0.3, 1.0]], "mass": "follows"}],
+        "gravity": {"acceleration": [0.0, 0.0, -9.81]},
+    },
     "a box that tumbles into it": {
         "body": [BOX | {"position": [0.1, 0.03, 0.15]}],
         "contact": {"stiffness": 300.0},
