@@ -63,7 +63,7 @@ class Gravity(Table):
             energy=energy,
             balance=Balance("potential_energy", impulse=impulse, moment_free=True),
         )
-        return [steady, *(self._of_flow(net, flow) for flow in net.flows)]
+        return [steady, *(self._of_flow(net, flow) for flow in net.flows)] if net.flows else steady
 
     def _of_flow(self, net, flow):
         """The term of the mass that a reel adds to that of its factor 1."""

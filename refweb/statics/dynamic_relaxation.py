@@ -26,7 +26,7 @@ from .equilibrium import (
     check_supported,
     force_scale,
     residual,
-    where_nothing_touches,
+    with_reason,
 )
 
 SAFETY = 0.6
@@ -154,8 +154,9 @@ class Relaxation:
                     f"no equilibrium found at step {t:g} in {done} steps of relaxation: residual {error:.2e}, limit "
                     f'{LIMIT:g}; use method = "newton"',
                     {"nsteps": done},
+                    x,
                 )
-                raise where_nothing_touches(system, t, failed)
+                raise with_reason(system, t, failed)
             if system.carried.any():
                 self._weigh_bodies(f, inverse)
             self._relax(LOOK, t, x, v, f, inverse, self._kernels, self._cells, data, self._per_cell, *turning)

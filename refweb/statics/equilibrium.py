@@ -22,11 +22,11 @@ WITH_A_WAY_AROUND = 25
 
 
 class NotFound(SolverError):
-    """An equilibrium exists but the iteration did not reach it; ``stats`` tells what it spent."""
+    """An equilibrium exists but the iteration did not reach it; ``stats`` tells what it spent, ``x`` where it ended."""
 
-    def __init__(self, message, stats):
+    def __init__(self, message, stats, x=None):
         super().__init__(message)
-        self.stats = stats
+        self.stats, self.x = stats, x
 
 
 class Stability(NamedTuple):
@@ -135,9 +135,13 @@ def carried_off(system, t, parts):
     return None
 
 
-def where_nothing_touches(system, t, error):
-    """The error with a part on which forces do not balance without contact, if there is such a part."""
+def with_reason(system, t, error):
+    """The error with what contact may have to do with it: two contacts alike, or parts that nothing else holds."""
     from ..system.unsupported_parts import find_parts
+    from .contact_kinks import kink_remark
+
+    if system.contact and error.x is not None and (kink := kink_remark(system, error.x)) is not None:
+        return NotFound(f"no equilibrium found at step {t:g}: {kink}", error.stats)
 
     carried = carried_off(system, t, find_parts(system, touching=False))
     if carried is None:

@@ -246,6 +246,27 @@ REFUSED = [
 ]  # fmt: skip
 
 
+def test_a_run_begins_where_a_static_one_has_turned_a_body(tmp_path):
+    """A wheel that pulls a line keeps its pull where its table begins at that angle; any other table is refused."""
+    wheel = {"name": "wheel", "radius": 0.5, "position": [0, 0, 0], "axle": {"direction": [0, 0, 1]}}
+    scene = dict(
+        web=cable([0.0, 0.5, 0.0], [1.5, 0.5, 0.0], [3.0, 0.5, 0.0]), supports={"nodes": [2]}, body=[wheel],
+        attach=[{"body": "wheel", "node": 0}], observe=observed("tension"),
+    )  # fmt: skip
+
+    def turned(first, last):
+        return [{"body": "wheel", "rotation": [[0.0, 0.0, 0.0, first], [1.0, 0.0, 0.0, last]]}]
+
+    static = refweb.Scene.from_dict({"cable": LINE, **scene, "motion": turned(0.0, 0.5), "solve": {"kind": "static"}})
+    pull = refweb.run(static, out=tmp_path / "static").results["tension"].value
+    solve = dict(start=str(tmp_path / "static"), duration=0.02)
+    still = solved("central-difference", **scene, motion=turned(0.5, 0.5), solve=solve)
+    assert not still.warnings
+    np.testing.assert_allclose(still.history["tension"], pull, rtol=1e-9)  # the residual of statics
+    with pytest.raises(refweb.InputError, match='body "wheel" some 0.* m off the place that .* at t = 0: begin its'):
+        solved("central-difference", **scene, motion=turned(0.0, 0.5), solve=solve)
+
+
 @pytest.mark.parametrize("tables, message", REFUSED)
 def test_what_cannot_be_moved_is_refused(tables, message):
     with pytest.raises(refweb.InputError, match=message):

@@ -65,8 +65,8 @@ class Rates(NamedTuple):
         Power of each term and of motion [W]; the force of the supports, and of what acts from outside without a
         formula of its impulse [N].
     lengths, length_force : ndarray or None
-        Natural lengths [m], and ∂E/∂L of each [N], shape (1, lengths); none where nothing changes them. Masses that
-        follow them are among them, with the energy [J/kg] and, in three rows more, the momentum that comes with them.
+        Natural lengths [m], and ∂E/∂L of each [N]; none where nothing changes them. Masses that follow them are among
+        them, and then four rows have the energy and the momentum that come with each.
     """
 
     flow: np.ndarray
@@ -112,7 +112,7 @@ class Piece(NamedTuple):
         booked = self.before + width * (a * start.flow + b * middle.flow + c * last.flow)
         if start.lengths is not None:
             pull = a * start.length_force + b * middle.length_force + c * last.length_force
-            brought = pull @ (last.lengths - start.lengths)
+            brought = np.atleast_1d(pull @ (last.lengths - start.lengths))
             booked[[-7, -3, -2, -1][: len(brought)]] += brought
         return booked if self.jump is None or t != self.end.time else booked + self.jump
 
@@ -169,7 +169,7 @@ class SimpsonBalance:
             flow[-3:] += rows[: self._linear].sum(axis=0)
         if not system.net.factors:
             return Rates(flow)
-        lengths, force = system.natural_length(sample.time), system.length_force(sample.time, sample.x)[None]
+        lengths, force = system.natural_length(sample.time), system.length_force(sample.time, sample.x)
         if system.net.flows:
             material = system.material_flow
             lengths = np.append(lengths, material.shares(sample.time))
