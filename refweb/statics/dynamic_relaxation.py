@@ -15,6 +15,7 @@ import functools
 
 import numpy as np
 
+from ..errors import InputError
 from ..kernels import FORCE, INDICES, MATRIX, Arrays, Functions, kernel
 from ..net.rotation import RigidRotations, add_forces_to_bodies, turn_by
 from ..system.static_system import at_rest
@@ -124,6 +125,11 @@ class Relaxation:
     """
 
     def __init__(self, system, progress=None, limit=10_000_000, tolerance=TOLERANCE):
+        for body in system.resting:
+            if body.axle:
+                raise InputError(
+                    f'[solve] method = "relaxation" must be "newton" with body "{body.name}", which turns about an axle'
+                )
         self.system, self.progress = system, progress or (lambda text: None)
         self.limit, self.tolerance, self.scale = limit, tolerance, 0.0
         self._stalled = TOUCHING if system.contact else STALLED

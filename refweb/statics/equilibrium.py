@@ -109,10 +109,22 @@ def check_supported(system, t):
             balanced = {"frame": "the axis", "orbit": "the track"}[kind]
             carried += f", or move the web so that its centre of mass is on {balanced} of [{kind}]"
         raise SolverError(f"no equilibrium: {carried}")
+    _check_torques(system, t)
     if system.rotating:
         from .critical_speed import check_speed
 
         check_speed(system, t)
+
+
+def _check_torques(system, t):
+    """Refuse a torque on a body that nothing else turns about its axle."""
+    for body in system.resting:
+        torque = np.interp(t, *np.transpose(body.axle.torque)) if body.axle and body.axle.torque else 0.0
+        if torque and not (body.carried or body.pivot is not None or system.contact):
+            raise SolverError(
+                f'no equilibrium: body "{body.name}" is turned by its torque of {torque:.4g} N m at step {t:g}, and '
+                "nothing holds it: tie it to the web by [[attach]], or leave out the torque"
+            )
 
 
 def carried_off(system, t, parts):

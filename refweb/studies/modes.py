@@ -88,7 +88,7 @@ class Modes(Solution):
         out = Folder(folder, self.scene, COLUMNS, {**self.summary(), "status": "running"}, table="modes.csv")
         for row in zip(*self.history.values(), strict=True):
             out.row(row)
-        for number, shape in enumerate(self.shapes if self.spectra else (), start=1):
+        for number, shape in enumerate(self.spectra[-1].shapes if self.spectra else (), start=1):
             out.frame(number, self.state, shape)
         out.close()
         out.summary(self.summary())

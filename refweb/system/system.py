@@ -197,8 +197,11 @@ class System:
 
     @property
     def resting(self):
-        """Free bodies whose places are unknowns, a list."""
-        return [body for body in self.net.bodies if not self.supported[body.row].all()]
+        """Free bodies whose places are unknowns, and at rest those that turn about axles, a list."""
+        on_axles = [
+            body for body in self.net.bodies if self.angles and body.axle and not self.supported[body.spin].all()
+        ]
+        return [body for body in self.net.bodies if body in on_axles or not self.supported[body.row].all()]
 
     def moved(self, x, step):
         """Displacement [m] behind a step of all rows, both of shape (rows, 3); bodies turn by rotation vectors."""

@@ -220,6 +220,20 @@ def test_it_is_resumed_bit_for_bit_and_its_frames_have_the_mass_of_their_time(tm
     assert whole.state.system.at(1.0).net.mass.sum() == pytest.approx(MASS + 1.1 * DENSE, rel=1e-14)
 
 
+def test_shipped_tether():
+    """Angular momentum about the drum by the places and masses of the end; damping along the line has no moment."""
+    solution = refweb.run(refweb.Scene.load("reeled-tether").replace(accuracy=refweb.Accuracy(error="none")))
+    system, turning = solution.state.system, []
+    for t, x, v in ((0.0, 0.0, system.initial_velocity()), (60.0, solution.state.x, solution.state.v)):
+        places = system.net.points + x
+        turning.append((system.material_flow.masses(t)[:, None] * np.cross(places, v)).sum(axis=0)[2])
+    assert turning[1] == pytest.approx(turning[0], rel=1e-11)  # the rounding of 5000 steps
+    lumped = 0.03 * np.array([0.2, 0.4, 0.6, 0.8, 1.0]) ** 2 @ [1.0, 1.0, 1.0, 1.0, 0.5]
+    moments = [length**2 * (2.0 + length / 100.0 * lumped) for length in (100.0, 80.0)]
+    speed = 0.05 * moments[0] / moments[1] * 80.0
+    assert solution.results["across"].value == pytest.approx(speed, rel=4e-3)  # strains of 1.8e-3, squared
+
+
 @pytest.mark.parametrize(
     "changes, message",
     [

@@ -329,6 +329,20 @@ def test_two_bodies_one_below_the_other():
     assert any('body "upper" can' in text and 'body "lower" can' in text for text in solution.warnings)
 
 
+def test_shipped_platform():
+    """Ropes carry the weights of deck and load, in force and in moment about the place of the deck."""
+    solution = refweb.run("platform-on-ropes")
+    state, (body,) = solution.state, solution.state.system.net.bodies
+    ends = state.position[4:8] - state.position[body.row]
+    ropes = state.position[:4] - state.position[4:8]
+    pulls = solution.tension[:, None] * ropes / np.linalg.norm(ropes, axis=1)[:, None]
+    load = np.array([0.0, 0.0, -400.0])
+    weight = [0.0, 0.0, -G * state.system.net.mass[body.row]]
+    np.testing.assert_allclose(pulls.sum(axis=0) + load + weight, 0.0, atol=1e-6)
+    np.testing.assert_allclose(np.cross(ends, pulls).sum(axis=0) + np.cross(ends[3], load), 0.0, atol=1e-6)
+    assert solution.results["smallest"].value > 100.0 and solution.solver["smallest_pivot"] == 1
+
+
 REFUSED = [
     (dict(body=[{**BEAM, "velocity": [1, 0, 0]}]), r"velocity = \[1.0, 0.0, 0.0\] has no meaning in statics"),
     (dict(body=[{**BEAM, "angular_velocity": [1, 0, 0]}]), r"angular_velocity = .* has no meaning in statics"),
