@@ -559,7 +559,7 @@ MUTANTS = [
     Mutant("results/folder", "int(number[1]) <= row", "int(number[1]) < row"),
     Mutant("results/folder", 'timestep="{number(time)}"', 'timestep="{number(row)}"'),
     Mutant("results/files", "return repr(float(value))", 'return f"{value:.9g}"'),
-    Mutant("pictures/frames", "paths=self.paths + (scale * phase - 1.0)", "paths=self.paths + (scale * phase + 1.0)"),
+    Mutant("pictures/frames", "further = scale * phase - 1.0", "further = scale * phase + 1.0"),
     Mutant("pictures/record", "max(candidates, key=lambda pair: pair[0])[1]", "candidates[-1][1]"),
     Mutant(
         "pictures/movie_writer",

@@ -48,7 +48,7 @@ SMOOTHED = 1.32
 """Error of smoothing over the error that a run with a tenth of it shows, if errors are proportional to η.
 
 For nets that are flat and slack errors are proportional to √η, and a tenth of η leaves √0.1 of them."""
-FAR_WITHIN = 1e-3
+FAR_WITHIN = 1e-2
 """Value over its ± up to which it may be zero, as by symmetry: no smaller ± leaves a digit of it."""
 ZERO = 1e-14
 """Value plus ±, over the size of such results in a net, up to which the value is zero up to rounding."""

@@ -25,9 +25,9 @@ def kink_remark(system, x):
             continue
         rows = term.cells[:, term.contact.felt[0]]
         for body in net.bodies:
-            if body.shape.once and (found := _kinked(net, x, body)) is not None and (rows == body.row).any():
+            if body.shape.once and (line := _kinked(net, x, body)) is not None and (rows == body.row).any():
                 return (
-                    f'body "{body.name}" touches line {found} with two elements alike, and contact with a sphere acts '
+                    f'body "{body.name}" touches line {line} with two elements alike, and contact with a sphere acts '
                     "once a line: no forces balance there; give it a shape that every element touches, shape = "
                     f'"capsule", axis = [0, 0, 1], length = {1e-3 * body.radius:.2g}'
                 )

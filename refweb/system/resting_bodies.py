@@ -56,9 +56,9 @@ class RestingBodies(Carried):
             size = np.abs(values[at[block]]).max() or 1.0
             along = np.outer(self.turns.axles[n], self.turns.axles[n])
             spins = np.unique(pattern.indices[at[block]])
-            rows = np.array([np.flatnonzero(pattern.indices == one) for one in spins])
+            rows = np.array([np.flatnonzero(pattern.indices == spin) for spin in spins])
             values[rows] = along @ values[rows]
-            columns = np.array([np.arange(*pattern.indptr[[one, one + 1]]) for one in spins])
+            columns = np.array([np.arange(*pattern.indptr[[spin, spin + 1]]) for spin in spins])
             values[columns] = along @ values[columns]
             if across:
                 values[at[block]] += size * (np.eye(3) - along)[row[block], column[block]]
