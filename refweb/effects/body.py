@@ -169,7 +169,7 @@ class Body(Table):
     axle : BodyAxle, optional
         Axle that it turns about, ``{ point = ..., direction = ..., torque = ... }``, freely or by ``[[motion]]``. Its
         place and its rotation follow from the angle alone. Statics finds the angle at which it rests, by method =
-        "newton"; start = "equilibrium" and modes hold it.
+        "newton".
 
     Raises
     ------

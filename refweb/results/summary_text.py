@@ -87,7 +87,16 @@ def rows_of_modes(step):
         remarks += ["local"] if step["moving"][k] < 0.1 else []
         share = 100.0 * step["moving"][k]
         moving = f"{share:.0f} %" if share >= 10.0 else f"{share:.2g} %"
-        rows.append([str(k + 1), text, axes, moving, str(result["where"]), ", ".join(remarks)])
+        rows.append(
+            [
+                str(k + 1),
+                text,
+                axes,
+                moving,
+                "" if result["where"] is None else str(result["where"]),
+                ", ".join(remarks),
+            ]
+        )
     return Rows(["mode", "frequency", "along", "moving mass", "most at node", ""], rows, [])
 
 

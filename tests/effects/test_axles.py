@@ -378,4 +378,21 @@ def test_modes_hold_a_body_on_an_axle_and_say_so():
         refweb.modes(scene(body).replace(solve=refweb.Dynamic(duration=1.0)), number=2) for body in ([], [flap])
     )
     np.testing.assert_allclose(beside.frequency, alone.frequency, rtol=1e-9)
-    assert any("turn about an axle" in text and "flap" in text for text in beside.warnings)
+    assert any("touch nothing are held" in text and "flap" in text for text in beside.warnings)
+
+
+def test_a_flap_swings_about_its_equilibrium():
+    """ω² of one mode is the second derivative of the energy of a program of one's own over I; a run there stays."""
+    tables, energy = flap(1)
+    axle = tables["body"][0]["axle"]
+    axle["torque"] = [[0.0, axle["torque"][1][1]]]
+    looked = {"name": "angle", "quantity": "axle_angle", "body": "flap"}
+    angle, h = solved(None, looked, **tables).results["angle"].value, 1e-4
+    second = (energy(angle + h) - 2.0 * energy(angle) + energy(angle - h)) / h**2
+    solve = {"kind": "dynamic", "start": "equilibrium", "duration": 0.2}
+    scene = refweb.Scene.from_dict({**tables, "solve": solve, "observe": [looked]})
+    (body,) = scene.build().net.bodies
+    modes = refweb.modes(scene, 1)
+    assert (2.0 * np.pi * modes.frequency[0]) ** 2 == pytest.approx(second / body.moment, rel=1e-5)  # h² and rounding
+    history = refweb.run(scene).history
+    np.testing.assert_allclose(history["angle"], angle, rtol=0, atol=1e-9)
