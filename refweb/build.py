@@ -82,6 +82,9 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
             system = with_broken_lines(system)
             if net.quasi_static or solve.start == "equilibrium":
                 refuse_broken(system.net)
+    if system.net.flows:
+        with refused_at("[[reel]]"):
+            _ = system.material_flow
     _check_bare(system)
     _check_carried(system, supported, solve)
     _check_motions(system, effects)

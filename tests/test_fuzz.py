@@ -153,7 +153,15 @@ EFFECTS = {
         min_size=1,
         max_size=1,
     ),
-    "reel": st.lists(table(lines=LINES, factor=TABLE), min_size=1, max_size=2),
+    "reel": st.lists(
+        table(
+            lines=LINES,
+            factor=TABLE,
+            optional={"mass": st.sampled_from(["stays", "follows"]), "drum": NUMBER},
+        ),
+        min_size=1,
+        max_size=2,
+    ),
     "temperature": table(expansion=SIGNED, change=SIGNED),
     "support": table(nodes=NODE, components=st.lists(st.sampled_from("xyz"), min_size=1)).map(lambda one: [one]),
     "supports": table(nodes=NODE),

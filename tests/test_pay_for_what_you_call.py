@@ -447,7 +447,8 @@ FILLED = "from refweb.compiled import numba_internals as n; print(*(s for s, slo
 MANY = 70
 """Kernels of a plain impact, at most: some forty of the loop, and those of its effects and observables."""
 ABSENT = (
-    "inner_stages", "turn_on", "carry_nodes", "move_supports", "set_lengths", "viscous_kick", "rubbing_kick",
+    "inner_stages", "turn_on", "carry_nodes", "move_supports", "set_lengths", "set_masses", "exchange_masses",
+    "viscous_kick", "rubbing_kick",
     "take_pairs", "passes_lines", "set_push", "average", "note_events", "look_at_books", "book_powers",
     "add_half_steps", "turning",
 )  # fmt: skip

@@ -15,6 +15,9 @@ from ..net.rotation import quaternion_of
 OFF = 1e-9
 """Distance of a support from its position in the web, over the size of the web, that a finding reports."""
 
+JUMP = 1e-6
+"""The same of a body that tables move: a larger one would throw the web at the start."""
+
 
 class Start(NamedTuple):
     """Initial state of a run.
@@ -62,7 +65,8 @@ def remarks_on(start, system):
     inner = [
         (term.contact.with_lines, system.energy_of(term, 0.0, driven)) for term in system.terms if term.balance.internal
     ]
-    moved = np.flatnonzero((driven != before).any(axis=1))
+    rounding = 1e-14 * max(np.ptp(system.net.points, axis=0).max(), np.abs(before).max())
+    moved = np.flatnonzero((np.abs(driven - before) > rounding).any(axis=1))
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)
         by = "[[motion]]" if system.drives and not system.carried[moved[0]] else "[[attach]]"
@@ -137,7 +141,7 @@ def stored(system, folder):
     Raises
     ------
     InputError
-        Where there is no checkpoint, or it is that of another net.
+        Where there is no checkpoint, or it is that of another net, or bodies that tables move are elsewhere in it.
     """
     path = str(folder)
     net, name = system.net, f'[solve] start = "{path if len(path) <= 60 else "..." + path[-57:]}":'
@@ -161,10 +165,29 @@ def stored(system, folder):
     bearings = _bearings(system, given, bodies, name)
     start = _start_at(system, positions, displacements, velocities, bodies, bearings)
     start = start._replace(broken=broken if len(broken) else None)
+    _refuse_jumps(system, start.x, name)
     x, v = (given.get(f"twin_{key}") for key in ("displacements", "velocities"))
     if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):
         return start, None
     return start, _start_at(system, positions - displacements + x, x, v, bodies, bearings)
+
+
+def _refuse_jumps(system, x, name):
+    """Refuse a start at x from which bodies that tables move would jump to where these have them at t = 0."""
+    driven = x.copy()
+    system.drive(0.0, driven)
+    size = np.ptp(system.net.points, axis=0).max()
+    for body in system.net.bodies:
+        if not body.moved:
+            continue
+        away = np.linalg.norm((driven - x)[[body.row, *body.carried]], axis=1).max()
+        if body.spin is not None:
+            away = max(away, body.extent * float(np.linalg.norm(body.rotation(driven) - body.rotation(x))))
+        if away > JUMP * size:
+            raise InputError(
+                f'{name} has body "{body.name}" some {away:.3g} m off the place that [[motion]] has for it at t = 0: '
+                "begin its tables where that run ended"
+            )
 
 
 def _bearings(system, given, bodies, name):

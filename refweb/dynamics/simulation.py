@@ -186,7 +186,7 @@ class Simulation:
         self.solution.findings += remarks_on(self.begin, self.system)
         absent = waiting(self.system)
         if names := [body.name for body in absent if body.carried]:
-            which = "bodies that move at the start or turn about an axle are held while the web finds its equilibrium"
+            which = "bodies that move at the start are held while the web finds its equilibrium"
             text = f"{which}, and so are the nodes that they carry: {', '.join(names)}"
             self.solution.findings.append(Finding("left-out", text, "body"))
         if self.overlaps is not None and len(absent) < len(self.system.net.bodies):

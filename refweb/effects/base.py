@@ -317,6 +317,12 @@ def refuse_found(terms, what):
             )
 
 
+def refuse_flows(net, name):
+    """Refuse ``name``, which has masses that stay, beside masses that follow a reel; `InputError`."""
+    if net.flows:
+        raise InputError(f'{name} takes masses that stay: leave it out, or [[reel]] mass = "follows"')
+
+
 def without(columns):
     """A `CellElements.disable` that sets some columns, a number or a slice, to zero."""
 

@@ -168,7 +168,8 @@ class Body(Table):
         True if it does not move.
     axle : BodyAxle, optional
         Axle that it turns about, ``{ point = ..., direction = ..., torque = ... }``, freely or by ``[[motion]]``. Its
-        place and its rotation follow from the angle alone.
+        place and its rotation follow from the angle alone. Statics finds the angle at which it rests, by method =
+        "newton".
 
     Raises
     ------
@@ -179,7 +180,7 @@ class Body(Table):
         principal moment above the sum of the others), and a name that is no file name; for a free body without mass, a
         fixed one that moves, and a ring that turns about another axis than its normal; for an axle of a fixed body or a
         ring, and a velocity that it does not allow; from ``extend``, for a name that is listed twice, and in
-        statics a velocity and an axle that nothing turns.
+        statics for a velocity.
 
     Examples
     --------
@@ -324,11 +325,6 @@ class Body(Table):
         for key in ("velocity", "angular_velocity"):
             if net.quasi_static and any(getattr(self, key)):
                 raise InputError(f"{key} = {list(getattr(self, key))} has no meaning in statics: leave it out")
-        if self.axle and not self.moved and net.quasi_static:
-            raise InputError(
-                f"axle = {quote(self.axle.to_dict())} of a body that turns freely cannot be used in statics: leave out "
-                "its mass and give [[motion]] rotation = ..., or fixed = true in place of axle"
-            )
         self.form.settle()
         mass = self.mass or (self.density * self.form.volume() if self.density else 0.0)
         body = RigidBody(

@@ -26,7 +26,7 @@ from ..errors import InputError
 from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real, table
-from .base import LINE_OUT, POWER, Balance, ForceTerm, Tangent, Timing, VelocityForce, column
+from .base import LINE_OUT, POWER, Balance, ForceTerm, Tangent, Timing, VelocityForce, column, refuse_flows
 from .line_kernels import gradient, law_of, line_at, pull_together, strain
 
 
@@ -243,6 +243,8 @@ class Damping(Table):
                     timing=Timing(at_rest=False),
                 )
             )
+        if self.rate:
+            refuse_flows(net, f"rate = {self.rate:g}")
         if self.rate or self.bodies:
             nodes = net.heavy[net.heavy < net.nodes] if self.rate else np.zeros(0, dtype=int)
             rows = np.concatenate([nodes, free if self.bodies else []]).astype(int)

@@ -4,35 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels import ENERGY, FORCE, IMPULSE, kernel
 from ..tables import Several, Table, nodes, rows, table, vector
-from .base import column
-from .outer_load import factor_at, factor_until, outer_load
-
-
-@kernel(FORCE)
-def force(t, x, v, f, cells, data, out):
-    for c in range(cells.shape[0]):
-        row, times = cells[c, 0], factor_at(t, data[c], 3)
-        out[c, 0] = times * (data[c, 0] * v[row, 0] + data[c, 1] * v[row, 1] + data[c, 2] * v[row, 2])
-        for i in range(3):
-            f[row, i] += times * data[c, i]
-
-
-@kernel(ENERGY)
-def energy(t, x, cells, data, out):
-    for c in range(cells.shape[0]):
-        row = cells[c, 0]
-        work = data[c, 0] * x[row, 0] + data[c, 1] * x[row, 1] + data[c, 2] * x[row, 2]
-        out[c] = -factor_at(t, data[c], 3) * work
-
-
-@kernel(IMPULSE)
-def impulse(t, x, cells, data, total):
-    times = factor_until(t, data[0], 3) if cells.shape[0] else 0.0
-    for c in range(cells.shape[0]):
-        for i in range(3):
-            total[i] += times * data[c, i]
+from .outer_load import nodal_load
 
 
 @table
@@ -72,6 +45,4 @@ class Load(Table):
     def on(self, net):
         """The term of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
-        data = np.tile(self.force, (len(loaded), 1))
-        kernels = dict(impulse=impulse, force=force, energy=energy)
-        return outer_load(net, "load", column(loaded), data, self.factor, **kernels)
+        return nodal_load(net, "load", loaded, np.tile(self.force, (len(loaded), 1)), self.factor)

@@ -31,6 +31,7 @@ from ..kernels import (
 from .base import column
 from .elasticity import length_force
 from .line_kernels import LINE
+from .mass_flow import FollowedMass, set_masses
 from .time_tables import flattened, interpolate
 
 
@@ -52,6 +53,8 @@ class NaturalLengths(Record):
     corners : ndarray
         Times at which a factor has a corner [s], increasing; if there are factors, then ∞ for the end of a row and −∞
         for its start.
+    masses : refweb.effects.mass_flow.FollowedMass
+        Masses that follow the lengths.
     """
 
     elements: Integers
@@ -61,6 +64,7 @@ class NaturalLengths(Record):
     tables: VectorTable
     by_length: EnergyTable
     corners: Vector
+    masses: FollowedMass
 
     @classmethod
     def of(cls, net):
@@ -78,18 +82,21 @@ class NaturalLengths(Record):
             tables=Arrays(VECTOR, [np.array(flattened(table)) for _, table in factors]),
             by_length=Functions(ENERGY, [length_force(net)] if factors else []),
             corners=np.array([*corners, *([np.inf] if factors else []), -np.inf]),
+            masses=FollowedMass.none(),
         )
 
 
 @kernel(apart=("lengths",))
 def set_lengths(t: float, lengths: NaturalLengths, lines: Matrix) -> None:
-    """Write natural lengths at time t to the numbers of all ``lines``."""
+    """Write natural lengths at time t to the numbers of all ``lines``, and masses that follow them."""
     for c in range(lengths.elements.size):
         record_at(LINE, lines, lengths.elements[c], 0).natural_length = lengths.built[c]
     for i in range(len(lengths.tables)):
         factor, cells = interpolate(t, lengths.tables[i], 0, 2, 1)[0], lengths.cells[i]
         for c in range(cells.shape[0]):
             record_at(LINE, lines, cells[c, 0], 0).natural_length *= factor
+    if lengths.masses.rows.size:
+        set_masses(t, lengths.masses)
 
 
 def with_factor(net, lines, table):

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels import kernel
-from .base import Balance, ForceTerm, Timing
+from ..kernels import ENERGY, FORCE, IMPULSE, kernel
+from .base import Balance, ForceTerm, Timing, column
 from .time_tables import flattened, integrate, interpolate
 
 
@@ -61,3 +61,33 @@ def outer_load(net, name, cells, data, factor, impulse=None, **parts):
         timing=Timing(tuple(t for t, _ in table)),
         **parts,
     )
+
+
+@kernel(FORCE)
+def force(t, x, v, f, cells, data, out):
+    for c in range(cells.shape[0]):
+        row, times = cells[c, 0], factor_at(t, data[c], 3)
+        out[c, 0] = times * (data[c, 0] * v[row, 0] + data[c, 1] * v[row, 1] + data[c, 2] * v[row, 2])
+        for i in range(3):
+            f[row, i] += times * data[c, i]
+
+
+@kernel(ENERGY)
+def energy(t, x, cells, data, out):
+    for c in range(cells.shape[0]):
+        row = cells[c, 0]
+        work = data[c, 0] * x[row, 0] + data[c, 1] * x[row, 1] + data[c, 2] * x[row, 2]
+        out[c] = -factor_at(t, data[c], 3) * work
+
+
+@kernel(IMPULSE)
+def impulse(t, x, cells, data, total):
+    times = factor_until(t, data[0], 3) if cells.shape[0] else 0.0
+    for c in range(cells.shape[0]):
+        for i in range(3):
+            total[i] += times * data[c, i]
+
+
+def nodal_load(net, name, rows, forces, factor):
+    """The `ForceTerm` of dead loads ``forces (rows, 3)`` [N] on rows, times a factor as that of `outer_load`."""
+    return outer_load(net, name, column(rows), forces, factor, impulse=impulse, force=force, energy=energy)

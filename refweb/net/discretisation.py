@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .elements import gauss, line_element, values
+from .elements import gauss, line_element, lumped_shares, values
 from .line_data import LineData
 from .net import Net
 from .tension_laws import NAMES, Law
@@ -155,14 +155,13 @@ def _line_data(web, line, pieces, length, values):
 
 def _masses(element, cells, share, rows, consistent):
     """Lumped mass of each row, and consistent less lumped mass of each element or None; ``share`` is its mass."""
-    at, weights = gauss(element.maxdeg + 1)  # exact for products of two functions
-    functions = values(element, at)[0]
-    lumped = np.atleast_1d(weights @ functions) if element.maxdeg > 1 else np.array([0.5, 0.5])
-    mass = np.zeros(rows)
+    mass, lumped = np.zeros(rows), lumped_shares(element)
     for a in range(cells.shape[1]):
         np.add.at(mass, cells[:, a], share * lumped[a])
     if not consistent:
         return mass, None
+    at, weights = gauss(element.maxdeg + 1)  # exact for products of two functions
+    functions = values(element, at)[0]
     apart = np.einsum("q,qa,qb->ab", weights, functions, functions) - np.diag(lumped)
     return mass, share[:, None, None] * apart
 
@@ -196,6 +195,7 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
         law=Law(list(NAMES)[laws[0]]) if len(laws) == 1 else None,
         points=cut.points,
         mass=mass,
+        element_mass=share,
         cells=cut.cells,
         line=cut.line,
         line_data=_line_data(web, cut.line, pieces, length, values),

@@ -36,6 +36,14 @@ def gauss(points):
     return 0.5 * (places[None] + 1.0), 0.5 * weights
 
 
+def lumped_shares(element):
+    """Share of each node in the lumped mass of an element, ∫N_a dξ."""
+    if element.maxdeg == 1:
+        return np.array([0.5, 0.5])
+    at, weights = gauss(element.maxdeg + 1)
+    return weights @ values(element, at)[0]
+
+
 def values(element, places):
     """Functions of an element at places, shape (places, nodes), and their derivatives, the same shape."""
     local = np.reshape(places, (1, -1))

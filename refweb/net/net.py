@@ -36,6 +36,8 @@ class Net:
         line, then bodies.
     mass : ndarray, shape (rows,)
         Lumped mass [kg].
+    element_mass : ndarray, shape (cells,)
+        Mass of each element, of its natural length as built [kg].
     cells : ndarray of int32, shape (cells, nodes per cell)
         Rows that each element couples, in the order of dN/dξ: ends first. Elements of a line follow each other.
     line : ndarray of int32, shape (cells,)
@@ -44,6 +46,8 @@ class Net:
         Numbers of each element.
     factors : tuple
         Factors of reels and heat on natural lengths, which are multiplied: (elements, table of (t, factor)).
+    flows : tuple of refweb.effects.mass_flow.MassFlow
+        Masses that follow factors of reels; ``mass`` is that of factors of 1.
     end : float
         Time at which a run ends at the latest [s], or its last load step.
     area, strength : ndarray, shape (cells,)
@@ -80,6 +84,7 @@ class Net:
     law: Law | None
     points: np.ndarray
     mass: np.ndarray
+    element_mass: np.ndarray
     cells: np.ndarray
     line: np.ndarray
     line_data: LineData
@@ -96,6 +101,7 @@ class Net:
     bodies: tuple = ()
     spins: int = 0
     factors: tuple = ()
+    flows: tuple = ()
     end: float = math.inf
     allowed_share: np.ndarray | None = None
     point_mass: np.ndarray | None = None

@@ -399,6 +399,7 @@ def turn_by(x, y, v, turns):
         last = e * r + h * w + f * q - g * p
         size = 1.0 / math.sqrt(first * first + second * second + third * third + last * last)
         y[t, 0] = first * size - 1.0
+        y[t, 1] += turns.axles[n, 0] * a + turns.axles[n, 1] * b + turns.axles[n, 2] * c
         y[s, 0], y[s, 1], y[s, 2] = second * size, third * size, last * size
     update_attached_nodes(y, v, turns)
 

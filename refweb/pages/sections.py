@@ -38,13 +38,8 @@ def results(record):
     else:
         tables = [tag("p", "There are no results." if summary else "Results are not known.")]
     said += [] if record.kind == "modes" else on_results(values)
-    events = [
-        [event["name"], "did not happen" if event["time"] is None else f"t = {event['time']:.6g} s"]
-        for event in summary.get("events") or []
-    ]
     more = [*on_run(summary), *(("solver", text) for text in (on_solver(summary["solver"]) if values else ()))]
-    parts = [*tables, listing(said) if said else "", table(["event", "time"], events) if events else ""]
-    return section("results", "Results", *parts, pairs(more) if more else "")
+    return section("results", "Results", *tables, listing(said) if said else "", pairs(more) if more else "")
 
 
 def warnings(record, lacking=()):

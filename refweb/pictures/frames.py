@@ -79,7 +79,11 @@ class Frame(NamedTuple):
     def posed(self, scale=1.0, phase=1.0):
         """The frame with displacements times a factor; of a mode, its shape times that and −1…1 of a swing."""
         if self.swing is not None:
-            return self._replace(paths=self.paths + (scale * phase - 1.0) * self.swing)
+            further = scale * phase - 1.0
+            swung = {
+                name: body._replace(points=body.points + further * body.swing) for name, body in self.bodies.items()
+            }
+            return self._replace(paths=self.paths + further * self.swing, bodies=swung)
         if scale == 1.0:
             return self
         bodies = {
@@ -99,11 +103,15 @@ class Frame(NamedTuple):
 
 
 class Body(NamedTuple):
-    """Surface of a body: points and displacement [m], shape (points, 3), and triangles, shape (triangles, 3)."""
+    """Surface of a body: points and displacement [m], shape (points, 3), and triangles, shape (triangles, 3).
+
+    Of a mode ``swing`` is the part of the displacement that it has [m], else zero.
+    """
 
     points: np.ndarray
     triangles: np.ndarray
     displacement: np.ndarray
+    swing: np.ndarray
 
 
 class Masses(NamedTuple):
@@ -209,12 +217,13 @@ def frame_of(number, time, meshes, supported, point_mass=None):
     for _, cells in blocks:
         edges, used[cells] = edges + cells.shape[0] * (cells.shape[1] - 1), True
     tree = bool(edges < np.count_nonzero(used))
-    bodies = {name: _surface(mesh) for name, mesh in meshes.items() if name != "web"}
+    amplitude = _amplitude(web.points, web.point_data["shape"]) if "shape" in web.point_data else 0.0
+    bodies = {name: _surface(mesh, amplitude) for name, mesh in meshes.items() if name != "web"}
     ends = np.concatenate([cells[:, :2] for _, cells in blocks])
     lifted = np.broadcast_to(web.points - origin, web.points.shape)[supported]
     swing = None
     if "shape" in web.point_data:
-        mode = _amplitude(web.points, web.point_data["shape"]) * web.point_data["shape"]
+        mode = amplitude * web.point_data["shape"]
         swing = np.concatenate([_curves(mode[cells], samples) for _, cells in blocks])
     fixed = web.points[supported]
     masses = None
@@ -295,8 +304,8 @@ def _curves(nodes, samples):
     return np.einsum("sn,enx->esx", weights, nodes)
 
 
-def _surface(mesh):
-    """Points and triangles of a body."""
+def _surface(mesh, amplitude):
+    """The `Body` of a mesh, in a mode with a factor [m] on its shape."""
     corners = [np.zeros((0, 3), dtype=int)]
     for block in mesh.cells:
         if block.type == "triangle":
@@ -304,4 +313,5 @@ def _surface(mesh):
         elif block.type == "quad":
             corners += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
     moved = np.reshape(mesh.point_data.get("displacement", np.zeros((1, 3))), (-1, 3))
-    return Body(mesh.points, np.concatenate(corners), moved)
+    swing = amplitude * np.reshape(mesh.point_data.get("shape", np.zeros((1, 3))), (-1, 3))
+    return Body(mesh.points, np.concatenate(corners), moved, swing)

@@ -187,7 +187,7 @@ def of_solution(solution, with_frames=True):
     summary = solution.summary()
     states = {number: (state, None) for number, state in solution.frames}
     if summary.get("kind") == "modes" and solution.table is not None and solution.spectra:
-        states = {number: (solution.state, shape) for number, shape in enumerate(solution.shapes, start=1)}
+        states = {number: (solution.state, shape) for number, shape in enumerate(solution.spectra[-1].shapes, start=1)}
     if not states and solution.path is not None:
         return of_folder(solution.path, with_frames)
     from ..results.vtu import meshes

@@ -29,7 +29,8 @@ def dynamic_energies(system):
 
 def vectors(system):
     """Names of the vectors of the momentum balance."""
-    return VECTORS[: len(VECTORS) - all(term.balance.internal for term in system.terms)]
+    closed = not system.net.flows and all(term.balance.internal for term in system.terms)
+    return VECTORS[: len(VECTORS) - closed]
 
 
 def components(names):

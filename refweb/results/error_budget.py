@@ -48,6 +48,8 @@ SMOOTHED = 1.32
 """Error of smoothing over the error that a run with a tenth of it shows, if errors are proportional to η.
 
 For nets that are flat and slack errors are proportional to √η, and a tenth of η leaves √0.1 of them."""
+FAR_WITHIN = 1e-2
+"""Value over its ± up to which it may be zero, as by symmetry: no smaller ± leaves a digit of it."""
 ZERO = 1e-14
 """Value plus ±, over the size of such results in a net, up to which the value is zero up to rounding."""
 MOST_DIGITS = 12
@@ -146,11 +148,17 @@ def scales_of(system):
     net = system.net
     axial = float(net.axial.max())
     energy = float((net.axial * net.line_data.natural_length).sum())
+    size, mass = float(np.ptp(net.points, axis=0).max()), float(net.mass[: len(net.mass) - net.spins].sum())
+    speed = math.sqrt(energy / mass) if mass > 0.0 else 0.0
     return {
-        "m": float(np.ptp(net.points, axis=0).max()),
+        "m": size,
         "N": axial,
+        "N m": axial * size,
         "Pa": float((net.axial / net.area).max()),
         "J": energy,
+        "m/s": speed,
+        "rad": 1.0,
+        "1": 1.0,
     }
 
 
@@ -179,11 +187,14 @@ def with_verdict(result, remedies, mesh_only=False, scales=None):
         return result._replace(verdict=None, verdict_text="its error is not known")
     if error > 0.0 and value + error <= ZERO * (scales or {}).get(result.unit, 0.0):
         return result._replace(verdict=DETERMINED, verdict_text="zero but for rounding", digits=0)
+    if value == error == 0.0:
+        text = f"zero, but {_not_estimated(missing)}" if missing else "zero"
+        return result._replace(verdict=None if missing else DETERMINED, verdict_text=text, digits=0)
     if error <= ALLOWED * value or error == 0.0:
         digits = digits_of(value, error)
         plural = "s" * (digits != 1)
         if missing:
-            text = f"{digits} digit{plural}, but {listed(missing)} {'is' if len(missing) == 1 else 'are'} not estimated"
+            text = f"{digits} digit{plural}, but {_not_estimated(missing)}"
             return result._replace(verdict=None, verdict_text=text, digits=digits)
         return result._replace(verdict=DETERMINED, verdict_text=f"{digits} digit{plural}", digits=digits)
     largest = max(numbers, key=lambda part: numbers[part])
@@ -192,6 +203,10 @@ def with_verdict(result, remedies, mesh_only=False, scales=None):
     if largest in MODELS:
         return _judged(result, MODEL, cause, remedies)
     return _judged(result, STATISTICAL if largest == "chance" else WIDE, cause, remedies)
+
+
+def _not_estimated(missing):
+    return f"{listed(missing)} {'is' if len(missing) == 1 else 'are'} not estimated"
 
 
 def _judged(result, verdict, cause, remedies):
@@ -330,8 +345,9 @@ def _remedies(result, solution, price):
             NO_LIMIT: "",
             MODEL: _of_model(result, solution.scene.cable).partition(", or ask")[0],
         }
+    zero = abs(result.value) <= FAR_WITHIN * (result.error or 0.0)
     return {
-        WIDE: f"[accuracy] digits = 1 makes it smaller{cost}",
+        WIDE: "the value is zero within ±" if zero else f"[accuracy] digits = 1 makes it smaller{cost}",
         STATISTICAL: _of_statistics(solution),
         MODEL: _of_model(result, solution.scene.cable),
         NO_LIMIT: "ask for its mean over a time (average = 0.01), which is an impulse",

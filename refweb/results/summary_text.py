@@ -39,6 +39,8 @@ def verdict_of(result):
     verdict, digits = result.get("verdict"), result.get("digits")
     if verdict == DETERMINED and digits == 0:
         return f"{verdict}, {result['verdict_text']}"
+    if verdict is None and digits == 0:
+        return result["verdict_text"].partition(",")[0]
     count = "" if digits is None else f"{digits} digit{'s' * (digits != 1)}"
     return ", ".join(filter(None, [verdict, count]))
 
@@ -83,8 +85,18 @@ def rows_of_modes(step):
         remarks += ["zero within ±"] if error >= value else []
         remarks += [f"equal to {k}"] if k and _equal(result, results[k - 1]) else []
         remarks += ["local"] if step["moving"][k] < 0.1 else []
-        moving = f"{100.0 * step['moving'][k]:.2g} %"
-        rows.append([str(k + 1), text, axes, moving, str(result["where"]), ", ".join(remarks)])
+        share = 100.0 * step["moving"][k]
+        moving = f"{share:.0f} %" if share >= 10.0 else f"{share:.2g} %"
+        rows.append(
+            [
+                str(k + 1),
+                text,
+                axes,
+                moving,
+                "" if result["where"] is None else str(result["where"]),
+                ", ".join(remarks),
+            ]
+        )
     return Rows(["mode", "frequency", "along", "moving mass", "most at node", ""], rows, [])
 
 
@@ -106,12 +118,15 @@ def on_results(results):
 
 
 def on_run(summary):
-    """(Name, sentence) of horizon, contact, breaks and strength."""
+    """(Name, sentence) of horizon, events, contact, breaks and strength."""
     if horizon := summary.get("horizon"):
         yield "horizon", _horizon(horizon)
         for name, r in horizon.get("ensemble", {}).items():
             text = readable(r["mean"], r["deviation"], summary["results"][name]["unit"])
             yield "", f"{name} {text} over the ensemble, standard deviation"
+    for n, event in enumerate(summary.get("events") or []):
+        when = "did not happen" if event["time"] is None else f"at t = {readable(event['time'], event['error'], 's')}"
+        yield "events" * (n == 0), f"{event['name']} {when}"
     for n, (name, thrown) in enumerate(summary.get("throw", {}).items()):
         yield "throw" * (n == 0), f"{name.replace('_', ' ')} {_of_throw(thrown)}"
     for name, body in summary.get("bodies", {}).items():

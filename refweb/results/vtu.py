@@ -22,14 +22,16 @@ def meshes(state, shape=None):
     ----------
     state : refweb.results.state.State
         State of the frame.
-    shape : ndarray, shape (nodes, 3), optional
+    shape : ndarray, shape (rows, 3), optional
         Mode shape that is added to the positions.
 
     Returns
     -------
     dict of str to meshio.Mesh
     """
-    return {"web": web_mesh(state, shape), **{body.name: body_mesh(body, state) for body in state.system.net.bodies}}
+    net = state.system.net
+    web = web_mesh(state, None if shape is None else shape[: net.nodes])
+    return {"web": web, **{body.name: body_mesh(body, state, shape) for body in net.bodies}}
 
 
 def web_mesh(state, shape=None):
@@ -46,8 +48,11 @@ def web_mesh(state, shape=None):
     return meshio.Mesh(points, lines, point_data, {key: [values] for key, values in cell_data.items()})
 
 
-def body_mesh(body, state):
-    """The surface of a body at its current position, as it has turned; its points have their own velocity."""
+def body_mesh(body, state, shape=None):
+    """The surface of a body at its current position, as it has turned; its points have their own velocity.
+
+    The ``shape`` of a mode (rows, 3) moves and turns it, to first order.
+    """
     import meshio
 
     rotation, centre = body.rotation(state.x) if body.turn is not None else None, state.position[body.row]
@@ -58,7 +63,19 @@ def body_mesh(body, state):
         away = points - centre
         point_data["displacement"] += away - away @ rotation
         point_data["velocity"] += np.cross(body.turning(state.x, state.v), away)
+    if shape is not None:
+        move = np.tile(shape[body.row], (len(points), 1))
+        if body.spin is not None:
+            move += np.cross(shape[body.spin], points - centre)
+        points = points + _drawn_size(state) * move
+        point_data["displacement"] = point_data["displacement"] + _drawn_size(state) * move
+        point_data["shape"] = move
     return meshio.Mesh(points, [("triangle", triangles)], point_data)
+
+
+def _drawn_size(state):
+    """Size of the largest displacement of a mode as it is drawn [m]."""
+    return SHAPE_SIZE * np.linalg.norm(np.ptp(state.position[: state.system.net.nodes], axis=0))
 
 
 def write_mesh(path, mesh):
@@ -77,9 +94,8 @@ def frame_data(state, shape=None):
     curved = [points, *point_data[:2]]
     point_data.append(state.system.fixed[: net.nodes].all(axis=1).astype(float))
     if shape is not None:
-        large = SHAPE_SIZE * np.linalg.norm(np.ptp(points, axis=0))
         for values in curved[:2]:
-            values += large * shape
+            values += _drawn_size(state) * shape
         point_data.append(shape.copy())
         curved.append(point_data[-1])
     if net.order > 2:

@@ -15,6 +15,7 @@ import functools
 
 import numpy as np
 
+from ..errors import InputError
 from ..kernels import FORCE, INDICES, MATRIX, Arrays, Functions, kernel
 from ..net.rotation import RigidRotations, add_forces_to_bodies, turn_by
 from ..system.static_system import at_rest
@@ -26,7 +27,7 @@ from .equilibrium import (
     check_supported,
     force_scale,
     residual,
-    where_nothing_touches,
+    with_reason,
 )
 
 SAFETY = 0.6
@@ -124,6 +125,11 @@ class Relaxation:
     """
 
     def __init__(self, system, progress=None, limit=10_000_000, tolerance=TOLERANCE):
+        for body in system.resting:
+            if body.axle:
+                raise InputError(
+                    f'[solve] method = "relaxation" must be "newton" with body "{body.name}", which turns about an axle'
+                )
         self.system, self.progress = system, progress or (lambda text: None)
         self.limit, self.tolerance, self.scale = limit, tolerance, 0.0
         self._stalled = TOUCHING if system.contact else STALLED
@@ -154,8 +160,9 @@ class Relaxation:
                     f"no equilibrium found at step {t:g} in {done} steps of relaxation: residual {error:.2e}, limit "
                     f'{LIMIT:g}; use method = "newton"',
                     {"nsteps": done},
+                    x,
                 )
-                raise where_nothing_touches(system, t, failed)
+                raise with_reason(system, t, failed)
             if system.carried.any():
                 self._weigh_bodies(f, inverse)
             self._relax(LOOK, t, x, v, f, inverse, self._kernels, self._cells, data, self._per_cell, *turning)

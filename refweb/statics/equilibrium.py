@@ -22,11 +22,11 @@ WITH_A_WAY_AROUND = 25
 
 
 class NotFound(SolverError):
-    """An equilibrium exists but the iteration did not reach it; ``stats`` tells what it spent."""
+    """An equilibrium exists but the iteration did not reach it; ``stats`` tells what it spent, ``x`` where it ended."""
 
-    def __init__(self, message, stats):
+    def __init__(self, message, stats, x=None):
         super().__init__(message)
-        self.stats = stats
+        self.stats, self.x = stats, x
 
 
 class Stability(NamedTuple):
@@ -109,10 +109,22 @@ def check_supported(system, t):
             balanced = {"frame": "the axis", "orbit": "the track"}[kind]
             carried += f", or move the web so that its centre of mass is on {balanced} of [{kind}]"
         raise SolverError(f"no equilibrium: {carried}")
+    _check_torques(system, t)
     if system.rotating:
         from .critical_speed import check_speed
 
         check_speed(system, t)
+
+
+def _check_torques(system, t):
+    """Refuse a torque on a body that nothing else turns about its axle."""
+    for body in system.resting:
+        torque = np.interp(t, *np.transpose(body.axle.torque)) if body.axle and body.axle.torque else 0.0
+        if torque and not (body.carried or body.pivot is not None or system.contact):
+            raise SolverError(
+                f'no equilibrium: body "{body.name}" is turned by its torque of {torque:.4g} N m at step {t:g}, and '
+                "nothing holds it: tie it to the web by [[attach]], or leave out the torque"
+            )
 
 
 def carried_off(system, t, parts):
@@ -135,9 +147,13 @@ def carried_off(system, t, parts):
     return None
 
 
-def where_nothing_touches(system, t, error):
-    """The error with a part on which forces do not balance without contact, if there is such a part."""
+def with_reason(system, t, error):
+    """The error with what contact may have to do with it: two contacts alike, or parts that nothing else holds."""
     from ..system.unsupported_parts import find_parts
+    from .contact_kinks import kink_remark
+
+    if system.contact and error.x is not None and (kink := kink_remark(system, error.x)) is not None:
+        return NotFound(f"no equilibrium found at step {t:g}: {kink}", error.stats)
 
     carried = carried_off(system, t, find_parts(system, touching=False))
     if carried is None:

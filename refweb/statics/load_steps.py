@@ -12,7 +12,7 @@ import numpy as np
 
 from ..net.tension_laws import FORCE_DENSITY, LINEAR, TENSION_ONLY
 from ..system.static_system import at_rest
-from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, where_nothing_touches
+from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, with_reason
 from .newton import Newton
 
 MOST = 400
@@ -52,7 +52,7 @@ def solve(system, load_steps, progress=None):
         try:
             state = _equilibrium(newton, t, _start(system, t, states), warm=bool(states))
         except NotFound as error:
-            raise where_nothing_touches(system, t, error) from None
+            raise with_reason(system, t, error) from None
         if system.net.forming.any():
             _refuse_far(system, t, state)
         if system.convex:

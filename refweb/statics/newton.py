@@ -299,6 +299,7 @@ class Newton:
             f"{LIMIT:g}; raise the load in smaller load_steps, use a larger smoothing, or "
             'method = "relaxation"',
             stats,
+            iterate.x,
         )
 
     @property

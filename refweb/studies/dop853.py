@@ -52,9 +52,11 @@ class Dop853:
     """
 
     def __init__(self, system, begin):
+        from ..effects.base import refuse_flows
         from ..system.mass import refuse_massless
 
         refuse_massless(system, NAME)
+        refuse_flows(system.net, NAME)
         if system.constraints:
             raise InputError(f'[[link]] needs method = "ida": {NAME} does not hold lengths')
         if system.weakness is not None and (system.weakness.watched or system.weakness.times):

@@ -38,5 +38,5 @@ def left_out(system):
     if any(term.velocity.damping is not None and term.name not in frames for term in system.terms):
         yield Finding("left-out", "forces that depend on velocity, such as damping, are left out")
     if names := [body.name for body in waiting(system)]:
-        which = "bodies that move at the start, turn about an axle or touch nothing are held, and the web does not feel"
+        which = "bodies that move at the start or touch nothing are held, and the web does not feel"
         yield Finding("left-out", f"{which} them: {', '.join(names)}", "body")

@@ -88,7 +88,7 @@ class Modes(Solution):
         out = Folder(folder, self.scene, COLUMNS, {**self.summary(), "status": "running"}, table="modes.csv")
         for row in zip(*self.history.values(), strict=True):
             out.row(row)
-        for number, shape in enumerate(self.shapes if self.spectra else (), start=1):
+        for number, shape in enumerate(self.spectra[-1].shapes if self.spectra else (), start=1):
             out.frame(number, self.state, shape)
         out.close()
         out.summary(self.summary())
@@ -188,17 +188,26 @@ def _follow(result, rest, number, tell):
         totals = {key: totals[key] + stats[key] for key in totals}
         result.solver = {**stats, **totals}
         result.steps.append(
-            {"step": computed.step, "results": _results(computed), "solver": stats, **_described(computed)}
+            {
+                "step": computed.step,
+                "results": _results(computed, rest.net.nodes),
+                "solver": stats,
+                **_described(computed),
+            }
         )
         remarks.record(computed.step, remarks_on(computed, result.state, equilibrium))
         result.findings = [*remarks.findings(), *rest.remarks()]
 
 
-def _results(computed):
-    """Frequencies of a spectrum by name; the position of each is that of the largest displacement of its shape."""
+def _results(computed, nodes):
+    """Frequencies of a spectrum by name; the position of each is that of the largest displacement of its shape.
+
+    It is None where a body without nodes moves most, of a number of nodes.
+    """
     values = zip(computed.frequency.tolist(), computed.error.tolist(), computed.nodes.tolist(), strict=True)
     return {
-        f"frequency_{k}": Result(f, error, "Hz", computed.step, node) for k, (f, error, node) in enumerate(values, 1)
+        f"frequency_{k}": Result(f, error, "Hz", computed.step, node if node < nodes else None)
+        for k, (f, error, node) in enumerate(values, 1)
     }
 
 

@@ -135,7 +135,11 @@ def _ordered(pencil, vectors):
 
 def _described(pencil, squared, bound, residual, vectors, unstable, zero):
     """The `Spectrum` of vectors with φ*Mφ = 1."""
-    system, modes = pencil.system, np.arange(len(squared))
+    system = pencil.system
+    if system.angles:
+        kept = system.carriers.turns_about_axles(system, vectors)
+        squared, bound, residual, vectors = (values[..., kept] for values in (squared, bound, residual, vectors))
+    modes = np.arange(len(squared))
     shapes = np.zeros((len(modes), system.rows, 3), dtype=vectors.dtype)
     kinetic = np.zeros_like(shapes)
     shapes.reshape(len(modes), -1)[:, system.free] = vectors.T

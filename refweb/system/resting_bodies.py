@@ -6,6 +6,9 @@ all has a potential Π, the second derivative of Π along such steps is the symm
 matrix of m ×, vanishes with the moment in an equilibrium. So Newton's method with the symmetric part goes down Π, is
 exact to second order, and its pivots say whether an equilibrium is stable. Without a potential K is −∂m/∂p as it is.
 
+A body on an axle turns about that alone: its moment counts along the direction n of the axle, and of K what is n nᵀ K n
+nᵀ, beside a stiffness across that moves nothing.
+
 A node at the arm a of a body moves by δ + p × a, so that a block K of lines becomes Lᵀ K L with L = (1, −a ×), and as
 the arm turns f·a 1 − a⊗f of the force f on the node is added, as in `refweb.system.attached_nodes`. Kernels of contact
 have columns for the quaternion q = (w, u); those of p follow by δw = −½ u·p and δu = ½ (w p + p × u).
@@ -17,6 +20,8 @@ import numpy as np
 
 from .attached_nodes import Carried, add_to, cross_matrix, lever_stiffness
 
+ACROSS = 1e-6
+"""Moment of inertia across an axle over that about it: what it makes are modes a thousand times as fast, of no body."""
 NO_TURN = np.hstack([np.eye(3), np.zeros((3, 3))])
 """δθ of the two rows of rotation of a body: the first has it as its displacement."""
 
@@ -26,6 +31,8 @@ class RestingBodies(Carried):
 
     def __init__(self, net, terms):
         super().__init__(net, terms)
+        moved = [body.moved for body in net.bodies if body.turn is not None]
+        self._on_axles = [n for n in np.flatnonzero(self.turns.axles.any(axis=1)).tolist() if not moved[n]]
         self._columns = []
         for i, term in enumerate(terms):
             for n, (_, spin, turn) in enumerate(self.turns.rows):
@@ -33,6 +40,30 @@ class RestingBodies(Carried):
                     cells = np.flatnonzero((term.cells[:, at] == spin) & (term.cells[:, at + 1] == turn))
                     if len(cells):
                         self._columns.append((i, cells, 3 * at, n))
+
+    def add_forces_to_bodies(self, x, f):
+        """Add the forces on the nodes to those on the bodies, shape (rows, 3); axles bear moments across them."""
+        super().add_forces_to_bodies(x, f)
+        for n in self._on_axles:
+            axle, spin = self.turns.axles[n], self.turns.rows[n, 1]
+            f[spin] = (axle @ f[spin]) * axle
+
+    def _leave_along_axles(self, pattern, values, across=True):
+        """Leave in values what turns bodies about their axles, with a stiffness ``across`` them."""
+        for n in self._on_axles:
+            row, column, at = self._spun[n]
+            block = np.flatnonzero((row < 3) & (column < 3))
+            if not len(block):  # its rotation is no unknown
+                continue
+            size = np.abs(values[at[block]]).max() or 1.0
+            along = np.outer(self.turns.axles[n], self.turns.axles[n])
+            spins = np.unique(pattern.indices[at[block]])
+            rows = np.array([np.flatnonzero(pattern.indices == spin) for spin in spins])
+            values[rows] = along @ values[rows]
+            columns = np.array([np.arange(*pattern.indptr[[spin, spin + 1]]) for spin in spins])
+            values[columns] = along @ values[columns]
+            if across:
+                values[at[block]] += size * (np.eye(3) - along)[row[block], column[block]]
 
     def convert(self, x, blocks):
         """Make columns of rotation vectors of those of quaternions, in blocks of −∂f/∂x of all terms."""
@@ -74,6 +105,7 @@ class RestingBodies(Carried):
                 add_to(values, self._spun[n], expanded)
         if system.conservative:
             self._make_symmetric(values)
+        self._leave_along_axles(system.pattern, values)
 
     def _make_symmetric(self, values):
         """Leave the symmetric part of what a rotation of each body has of its own moment."""
@@ -88,6 +120,7 @@ class RestingBodies(Carried):
         still = np.zeros((system.rows, 3))
         state = self._state(still, still)
         self._add_blocks(values, state, lambda cell: blocks[cell.at] if cell.term == lines else None)
+        self._leave_along_axles(system.pattern, values, across=False)
 
     def add_moves(self, x, moves):
         """Write the moves of nodes to moves of all rows about x, to first order, shape (k, rows, 3)."""
@@ -111,9 +144,21 @@ class RestingBodies(Carried):
         return values
 
     def _tensor(self, n, x):
-        """J/I of a body as it stands at x, that about an axle of one that nothing turns across it."""
+        """J/I of a body as it stands at x; about an axle with a little across it, so that it has an inverse."""
         R = np.array(self.matrix(n, x))
-        return R @ np.linalg.pinv(self.turns.mobility[n]) @ R.T
+        tensor = R @ np.linalg.pinv(self.turns.mobility[n]) @ R.T
+        return tensor + ACROSS * (np.eye(3) - tensor) if n in self._on_axles else tensor
+
+    def turns_about_axles(self, system, vectors):
+        """Mask of the vectors (unknowns, modes) that turn no body across its axle, shape (modes,)."""
+        turned = np.ones(vectors.shape[1], dtype=bool)
+        for n in self._on_axles:
+            of_it = np.flatnonzero(system.free // 3 == self.turns.rows[n, 1])
+            if len(of_it):
+                spun, along = vectors[of_it], self.turns.axles[n]
+                across = spun - np.outer(along, along @ spun)
+                turned &= (np.abs(across) ** 2).sum(axis=0) <= 0.5 * (np.abs(vectors) ** 2).sum(axis=0)
+        return turned
 
     def momenta(self, system, x):
         """Matrix of the unknowns that makes forces by L/I of bodies those by their angular velocity, sparse."""

@@ -54,17 +54,12 @@ def at_rest(system):
 def waiting(system):
     """Free bodies that take no part in an equilibrium that dynamics starts from, a list.
 
-    Those that move at the start or turn about an axle, and those at rest that carry no nodes and touch nothing; in
-    statics none.
+    Those that move at the start, and those at rest that carry no nodes and touch nothing; in statics none.
     """
     if system.net.quasi_static:
         return []
     free = [body for body in system.net.bodies if not body.prescribed]
-    return [
-        b
-        for b in free
-        if b.axle or any(b.velocity) or any(b.angular_velocity) or not (b.carried or _touches(system, b))
-    ]
+    return [b for b in free if any(b.velocity) or any(b.angular_velocity) or not (b.carried or _touches(system, b))]
 
 
 def _touches(system, body):

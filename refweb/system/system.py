@@ -197,8 +197,11 @@ class System:
 
     @property
     def resting(self):
-        """Free bodies whose places are unknowns, a list."""
-        return [body for body in self.net.bodies if not self.supported[body.row].all()]
+        """Free bodies whose places are unknowns, and at rest those that turn about axles, a list."""
+        on_axles = [
+            body for body in self.net.bodies if self.angles and body.axle and not self.supported[body.spin].all()
+        ]
+        return [body for body in self.net.bodies if body in on_axles or not self.supported[body.row].all()]
 
     def moved(self, x, step):
         """Displacement [m] behind a step of all rows, both of shape (rows, 3); bodies turn by rotation vectors."""
@@ -287,6 +290,13 @@ class System:
 
         return NaturalLengths.of(self.net)
 
+    @cached_property
+    def material_flow(self):
+        """The `refweb.system.material_flow.MaterialFlow` of masses that follow reels."""
+        from .material_flow import MaterialFlow
+
+        return MaterialFlow(self)
+
     def line_data(self, t):
         """`Net.line_data` with the natural lengths of time t."""
         if not self.net.factors:
@@ -305,11 +315,14 @@ class System:
         return self.line_data(t).natural_length
 
     def at(self, t):
-        """The system as it stands at time t: its natural lengths are those of that time, and stay."""
+        """The system as it stands at time t: its natural lengths and masses are those of that time, and stay."""
         if not self.net.factors:
             return self
         view = self.with_line_data(self.line_data(t))
         view.net = replace(view.net, factors=())
+        if self.net.flows:
+            view.net = replace(view.net, flows=(), mass=self.material_flow.masses(t))
+            view.__dict__.pop("mass", None)
         return view
 
     def with_line_data(self, numbers):

@@ -27,6 +27,7 @@ def find_parts(system, touching=True):
     cells = [f.cells for f in terms if f.cells.shape[1] > 1]
     pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
     joined = [(body.row, node) for body in system.net.bodies if not body.fixed for node in body.carried]
+    joined += [(body.row, body.base) for body in system.net.bodies if body.pivot is not None]
     pairs = np.vstack([pairs, *([joined] if joined else [])])
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(system.rows, system.rows))
     count, part = connected_components(graph, directed=False)

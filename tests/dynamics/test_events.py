@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 
 import refweb
 from refweb.dynamics.twin_error import _add_lateness
+from refweb.results.summary_text import on_run
 
 MODULUS, AREA = 7e7, 1e-4
 EA = MODULUS * AREA
@@ -321,6 +322,10 @@ def test_a_run_stops_at_its_event(solve, tmp_path):
     assert -0.5 - STEP < below <= -0.5 + PHASE
     assert abs(below + 0.5) <= kept.results["x"].error * RATE  # ± of the time is in that of what has its value there
     assert kept.results["y"].value == kept.results["x"].value
+    told = [text for name, text in on_run(summary) if name in ("events", "")]
+    assert (
+        len(told) == 3 and told[0] == "back did not happen" and told[1].startswith(f"down at t = {1e3 * end:.3g}"[:-1])
+    )
 
 
 def test_an_event_that_ends_one_of_two_runs():

@@ -4,6 +4,8 @@ import nets
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
 import refweb
@@ -22,8 +24,9 @@ SOFT = dict(law="linear", modulus=1e6, area=1e-6, density=1000.0)
 
 
 def solved(method, *observe, **tables):
-    """Run of a scene by a method of `nets.METHODS`, which looks at quantities of a body."""
-    solve = {"kind": "dynamic", **nets.METHODS[method], **tables.pop("solve", {})}
+    """Run of a scene by a method of `nets.METHODS`, or statics, which looks at quantities of a body."""
+    kind = {"kind": "static"} if method is None else {"kind": "dynamic", **nets.METHODS[method]}
+    solve = kind | tables.pop("solve", {})
     name = tables["body"][-1]["name"]
     observe = [o if isinstance(o, dict) else {"name": o, "quantity": o, "body": name} for o in observe]
     scene = {"web": WEB, "cable": SOFT, **tables, "observe": [*tables.pop("observe", []), *observe], "solve": solve}
@@ -93,6 +96,27 @@ def test_torque_turns_a_wheel(method):
     np.testing.assert_allclose(found["axle_angle"], exact[0], rtol=0, atol=tolerance * exact[0].max())
     worked = 0.5 * 0.05 * (exact[1] ** 2 - 9.0)
     np.testing.assert_allclose(found["work"], worked, rtol=0, atol=tolerance * np.abs(worked).max())
+
+
+@pytest.mark.ordinary("central-difference", "adams")
+@pytest.mark.parametrize("method", nets.METHODS)
+def test_an_axle_bears_what_a_body_gives_across_it(method):
+    """A box about a skew axle off its centre by 0.7 N m: the moment is J α n + ω² n × J n − 0.7 n, J about the axle."""
+    n, arm = np.array([1.0, 2.0, 2.0]) / 3.0, np.array([0.2, -0.2, 0.1])  # at right angles
+    axle = {"point": [0.0, 4.0, 0.0], "direction": n.tolist(), "torque": 0.7}
+    body = ROD | {"position": (arm + [0.0, 4.0, 0.0]).tolist(), "axle": axle}
+    looked = [
+        {"name": name, "quantity": quantity, "body": "rod"}
+        for name, quantity in (("moment", "support_moment"), ("angle", "axle_angle"), ("rate", "angular_velocity"))
+    ]
+    found = solved(method, *looked, body=[body], solve={"duration": 0.3}).results
+    J = np.diag(INERTIA) + MASS * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    alpha = 0.7 / (n @ J @ n)
+    rate = alpha * 0.3
+    exact = J @ n * alpha + rate**2 * np.cross(n, J @ n) - 0.7 * n  # of the axes of the body, as all sizes are
+    tolerance = 1e-4 if method in ("bdf", "ida") else 1e-8
+    assert found["rate"].value == pytest.approx(rate, rel=tolerance)
+    assert found["moment"].value == pytest.approx(np.linalg.norm(exact), rel=2 * tolerance)
 
 
 def test_a_number_is_a_torque_that_stays():
@@ -264,10 +288,77 @@ def test_what_does_not_turn_is_refused(given, message):
         ).build()
 
 
-def test_statics_takes_no_axle():
-    body = NO | {"axle": {"direction": [0, 0, 1]}}
-    with pytest.raises(refweb.InputError, match=r"turns freely cannot be used in statics: leave out its mass and give"):
-        refweb.Scene.from_dict(dict(web=WEB, cable=SOFT, body=[body], solve={"kind": "static"})).build()
+def flap(seed):
+    """A box that turns about a skew axle, off it or on it, with a torque, on two ropes; and a program of its energy."""
+    rng = np.random.default_rng(seed)
+    direction, point = rng.normal(size=3), 0.3 * rng.normal(size=3) * (seed % 2)
+    direction /= np.linalg.norm(direction)
+    ends, tops = 0.3 * rng.normal(size=(2, 3)), rng.normal(size=(2, 3)) + [0.0, 0.0, 2.0]
+    length, torque = 0.9 * np.linalg.norm(tops - ends, axis=1), float(rng.normal())
+    axle = {"point": point.tolist(), "direction": direction.tolist(), "torque": [[0.0, 0.0], [1.0, torque]]}
+    tables = dict(
+        web={"kind": "inline", "points": [*tops.tolist(), *ends.tolist()], "lines": [[0, 2], [1, 3]]},
+        supports={"nodes": [0, 1]}, cable=dict(law="tension-only", modulus=1e6, area=1e-4, density=1000.0),
+        gravity={"acceleration": [0.0, 0.0, -G]}, attach=[{"body": "flap", "node": [2, 3]}],
+        body=[{"name": "flap", "shape": "box", "size": [0.4, 0.3, 0.2], "mass": 2.0, "position": [0, 0, 0],
+               "axle": axle}],
+    )  # fmt: skip
+    tables["web"]["natural_length"] = length.tolist()
+
+    def energy(angle, torque=torque):
+        turn = Rotation.from_rotvec(angle * direction)
+        places = point + turn.apply(np.vstack([ends, np.zeros(3)]) - point)
+        stretch = np.maximum(np.linalg.norm(places[:2] - tops, axis=1) - length, 0.0)
+        weight = G * (0.5 * 1000.0 * 1e-4 * length @ places[:2, 2] + 2.0 * places[2, 2])
+        return 0.5 * (100.0 / length) @ stretch**2 + weight - torque * angle
+
+    return tables, energy
+
+
+@pytest.mark.parametrize("seed", nets.some([0, 1, 2, 3, 4, 5], 2))
+def test_equilibrium_about_an_axle(seed):
+    """The angle is where a program of one's own has the least energy nearby; and so with half of the torque."""
+    tables, energy = flap(seed)
+    looked = (
+        {"name": name, "quantity": quantity, "body": "flap"}
+        for name, quantity in (("angle", "axle_angle"), ("moment", "support_moment"))
+    )
+    found = solved(None, *looked, **tables, solve={"load_steps": [0.5, 1.0]})
+    for step, angle in zip((0.5, 1.0), found.history["angle"], strict=True):
+        torque = step * tables["body"][0]["axle"]["torque"][1][1]
+        least = minimize_scalar(energy, bounds=(angle - 0.2, angle + 0.2), args=(torque,), options={"xatol": 1e-9})
+        assert least.x == pytest.approx(angle, abs=1e-6)  # roots of rounding in the energy
+    assert found.solver["residual"] < 1e-9 and found.solver["smallest_pivot"] == 1
+    state, (body,) = found.state, found.state.system.net.bodies
+    weight = [0.0, 0.0, -G * (2.0 + 0.05 * sum(tables["web"]["natural_length"]))]  # with that of the ends of the ropes
+    ropes, base = state.position[:2] - state.position[2:4], state.position[body.base]
+    pulls = found.tension[:, None] * ropes / np.linalg.norm(ropes, axis=1)[:, None]
+    moment = np.cross(state.position[2:4] - base, pulls).sum(axis=0) + np.cross(state.position[body.row] - base, weight)
+    across = np.linalg.norm(np.cross(body.axle.direction, moment))
+    assert found.results["moment"].value == pytest.approx(across, rel=1e-7)
+
+
+def test_a_pendulum_at_rest_hangs_below_its_axle():
+    """Nothing but its weight turns it, by a quarter, and the axle bears that."""
+    arm = dict(
+        name="arm", radius=0.1, mass=3.0, position=[0.5, 0, 0], axle={"point": [0, 0, 0], "direction": [0, 1, 0]}
+    )
+    found = solved(
+        None, {"name": "angle", "quantity": "axle_angle", "body": "arm"},
+        {"name": "held", "quantity": "support_force", "body": "arm", "component": "z"},
+        web=WEB, cable=SOFT, body=[arm], gravity={"acceleration": [0.0, 0.0, -G]},
+    ).results  # fmt: skip
+    assert found["angle"].value == pytest.approx(0.5 * np.pi, abs=1e-8)
+    assert found["held"].value == pytest.approx(3.0 * G, rel=1e-12)
+
+
+def test_a_torque_that_nothing_balances_is_refused():
+    body = NO | {"axle": {"direction": [0, 0, 1], "torque": 0.5}}
+    with pytest.raises(refweb.SolverError, match='"it" is turned by its torque of 0.5 N m at step 1, and nothing'):
+        solved(None, "axle_angle", body=[body])
+    tables, _ = flap(0)
+    with pytest.raises(refweb.InputError, match='"relaxation" must be "newton" with body "flap", which turns about'):
+        solved(None, "axle_angle", **tables, solve={"method": "relaxation"})
 
 
 def test_modes_hold_a_body_on_an_axle_and_say_so():
@@ -287,4 +378,21 @@ def test_modes_hold_a_body_on_an_axle_and_say_so():
         refweb.modes(scene(body).replace(solve=refweb.Dynamic(duration=1.0)), number=2) for body in ([], [flap])
     )
     np.testing.assert_allclose(beside.frequency, alone.frequency, rtol=1e-9)
-    assert any("turn about an axle" in text and "flap" in text for text in beside.warnings)
+    assert any("touch nothing are held" in text and "flap" in text for text in beside.warnings)
+
+
+def test_a_flap_swings_about_its_equilibrium():
+    """ω² of one mode is the second derivative of the energy of a program of one's own over I; a run there stays."""
+    tables, energy = flap(1)
+    axle = tables["body"][0]["axle"]
+    axle["torque"] = [[0.0, axle["torque"][1][1]]]
+    looked = {"name": "angle", "quantity": "axle_angle", "body": "flap"}
+    angle, h = solved(None, looked, **tables).results["angle"].value, 1e-4
+    second = (energy(angle + h) - 2.0 * energy(angle) + energy(angle - h)) / h**2
+    solve = {"kind": "dynamic", "start": "equilibrium", "duration": 0.2}
+    scene = refweb.Scene.from_dict({**tables, "solve": solve, "observe": [looked]})
+    (body,) = scene.build().net.bodies
+    modes = refweb.modes(scene, 1)
+    assert (2.0 * np.pi * modes.frequency[0]) ** 2 == pytest.approx(second / body.moment, rel=1e-5)  # h² and rounding
+    history = refweb.run(scene).history
+    np.testing.assert_allclose(history["angle"], angle, rtol=0, atol=1e-9)

@@ -114,6 +114,16 @@ def test_line_winds_onto_a_drum():
     assert values["support_moment"] == pytest.approx(-values["tension"] * RADIUS, rel=2.0 * out)
 
 
+def test_shipped_winch():
+    """The mass rises by R θ and by what the rope stretches less, and the moment is R times the weight that hangs."""
+    found, angle, h = refweb.run("winch-drum").results, 2.0, 0.02
+    hangs = 9.81 * (5.0 + 1150.0 * 7e-6 * (1.0 - RADIUS * angle))
+    out = (h / RADIUS) ** 2 / 8.0  # chords on the drum stand out by that of R
+    stretched = 1.0 + hangs / (3e9 * 7e-6)
+    assert found["height"].value == pytest.approx(RADIUS * angle - stretched, abs=out * RADIUS * angle)
+    assert found["moment"].value == pytest.approx(-RADIUS * hangs, rel=out)
+
+
 TURNS = [[0.0, 0.0, 0.0, 0.0], [0.1, 0.3, -0.2, 0.9], [0.25, 1.4, 0.1, 0.3], [0.4, 0.0, 0.0, 0.0]]
 """Rotation vectors of no common axis."""
 
@@ -238,12 +248,33 @@ REFUSED = [
     (dict(body=[{"name": "drum", "shape": "plane", "normal": [0, 0, 1], "position": [0, 0, -1]}]),
      r"mass is missing: .*fixed = true holds it"),
     (dict(body=[DRUM | {"fixed": True}], observe=observed("support_force", body="drum")),
-     r'body = "drum" is neither moved by \[\[motion\]\] nor on an axle; the force of contact'),
+     r'body = "drum" is neither moved by \[\[motion\]\] nor on an axle: hold it by .*; the force of contact'),
     (dict(motion=[{"body": "drum", "displacement": STILL}], observe=observed("support_moment", body="drum")),
      r"is not turned by \[\[motion\]\] rotation"),
     (dict(motion=[HELD], observe=observed("axle_angle", body="drum")),
      r"turns about no axle: give axle = { direction = \[...\] }"),
 ]  # fmt: skip
+
+
+def test_a_run_begins_where_a_static_one_has_turned_a_body(tmp_path):
+    """A wheel that pulls a line keeps its pull where its table begins at that angle; any other table is refused."""
+    wheel = {"name": "wheel", "radius": 0.5, "position": [0, 0, 0], "axle": {"direction": [0, 0, 1]}}
+    scene = dict(
+        web=cable([0.0, 0.5, 0.0], [1.5, 0.5, 0.0], [3.0, 0.5, 0.0]), supports={"nodes": [2]}, body=[wheel],
+        attach=[{"body": "wheel", "node": 0}], observe=observed("tension"),
+    )  # fmt: skip
+
+    def turned(first, last):
+        return [{"body": "wheel", "rotation": [[0.0, 0.0, 0.0, first], [1.0, 0.0, 0.0, last]]}]
+
+    static = refweb.Scene.from_dict({"cable": LINE, **scene, "motion": turned(0.0, 0.5), "solve": {"kind": "static"}})
+    pull = refweb.run(static, out=tmp_path / "static").results["tension"].value
+    solve = dict(start=str(tmp_path / "static"), duration=0.02)
+    still = solved("central-difference", **scene, motion=turned(0.5, 0.5), solve=solve)
+    assert not still.warnings
+    np.testing.assert_allclose(still.history["tension"], pull, rtol=1e-9)  # the residual of statics
+    with pytest.raises(refweb.InputError, match='body "wheel" some 0.* m off the place that .* at t = 0: begin its'):
+        solved("central-difference", **scene, motion=turned(0.0, 0.5), solve=solve)
 
 
 @pytest.mark.parametrize("tables, message", REFUSED)

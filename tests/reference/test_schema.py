@@ -64,7 +64,7 @@ TEXTS = [
     "max",
     "a" * 81,
 ]
-TEXTS += ["a" * 201, "a" * 4097, "middle", "dyneema", "contact", "twin", "lumped", "bdf", "dynamic", "static"]
+TEXTS += ["a" * 201, "a" * 4097, "middle", "dyneema", "contact", "twin", "lumped", "bdf", "dynamic", "static", "stays"]
 TEXTS += ["square", *WEBS]
 LISTS_OF = [
     [],

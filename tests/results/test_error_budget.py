@@ -44,7 +44,8 @@ def test_error_is_the_sum_of_what_is_known():
         (1.0, dict(time=0.2, contact_stiffness=0.3), "depends on the model", None),
         (1.0, dict(time=0.2, smoothing=0.3), "depends on the model", None),
         (1.0, dict(time=0.2, chance=0.3), "statistical", None),
-        (0.0, dict(time=0.0), "determined", 12),
+        (0.0, dict(time=0.0), "determined", 0),
+        (0.0, dict(time=0.0, elements=OPEN), None, 0),
         (0.0, dict(time=1e-3), "wide", None),
     ],
 )
@@ -59,6 +60,23 @@ def test_what_is_zero_but_for_rounding_has_no_digits():
     found = with_verdict(made, {}, scales={"m": 1.0})
     assert (found.verdict, found.digits, found.verdict_text) == ("determined", 0, "zero but for rounding")
     assert with_verdict(made, {}, scales={"m": 1e-6}).verdict == "wide"
+
+
+@pytest.mark.parametrize("quantity, keys", [("velocity", {"node": 1}), ("tension", {"line": 0})])
+def test_what_stays_zero_has_no_digits_and_no_price(quantity, keys):
+    """A node at rest on lines without tension; and its place across a pull, which is zero within ± by symmetry."""
+    pull = refweb.Load(node=1, force=(0.0, 0.0, 1.0))
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[-1, 0, 0], [0, 0, 0], [1, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2]),
+        cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-6, density=1000.0),
+        solve=refweb.Dynamic(duration=0.1),
+        observe=[refweb.Observe(name="it", quantity=quantity, **keys)],
+    )
+    still = refweb.run(scene).results["it"]
+    assert still.value == 0.0 and still.digits == 0 and still.verdict_text.startswith("zero")
+    across = refweb.Observe(name="it", quantity="position", node=1, component="x")
+    pulled = refweb.run(scene.replace(effects=[pull], observe=[across])).results["it"]
+    assert "CPU" not in pulled.verdict_text and pulled.digits in (None, 0)
 
 
 def test_a_number_of_the_mesh_has_no_limit_whatever_its_error():

@@ -221,6 +221,18 @@ def test_a_body_at_rest_in_a_net(body):
         assert relaxed.results[name].value == pytest.approx(result.value, rel=1e-7)
 
 
+def test_a_ball_that_touches_a_line_twice():
+    """Contact with a sphere has a kink where a line bends around it; the remedy of the message is solved."""
+    steep = {"web": {"kind": "window", "mesh": "square", "rows": 6, "columns": 6, "side": 0.1}}
+    ball = {"name": "ball", "radius": 0.15, "mass": 1.0, "position": [0.02, 0.01, 0.16]}
+    ropes = {**ROPES, "modulus": 7e7, "area": 1e-5, "density": 900.0}
+    with pytest.raises(refweb.SolverError, match='"ball" touches line .* with two elements alike.* length = 0.00015'):
+        refweb.run(in_net(ball, cable={**ropes, "subdivide": 2}, **steep))
+    capsule = {**ball, "shape": "capsule", "axis": [0, 0, 1], "length": 0.00015}
+    solution = refweb.run(in_net(capsule, cable={**ropes, "subdivide": 2}, **steep))
+    assert solution.results["push"].value == pytest.approx(G, rel=1e-9)
+
+
 def test_a_ball_in_a_mesh_beside_a_program():
     """A ball in a square of ropes: it presses each by the depth of the nearest point of a segment."""
     outer, inner = [[1.0, 1.1, 0], [-1.1, 1, 0], [-1, -1, 0.1], [1, -0.9, 0]], [[1, 1], [-1, 1], [-1, -1], [1, -1]]
@@ -315,6 +327,20 @@ def test_two_bodies_one_below_the_other():
     place = solution.state.position[[0, 1, 2, 3]]
     np.testing.assert_allclose(np.cross(np.diff(place, axis=0), [1.0, 0.0, -G]), 0.0, atol=1e-8)
     assert any('body "upper" can' in text and 'body "lower" can' in text for text in solution.warnings)
+
+
+def test_shipped_platform():
+    """Ropes carry the weights of deck and load, in force and in moment about the place of the deck."""
+    solution = refweb.run("platform-on-ropes")
+    state, (body,) = solution.state, solution.state.system.net.bodies
+    ends = state.position[4:8] - state.position[body.row]
+    ropes = state.position[:4] - state.position[4:8]
+    pulls = solution.tension[:, None] * ropes / np.linalg.norm(ropes, axis=1)[:, None]
+    load = np.array([0.0, 0.0, -400.0])
+    weight = [0.0, 0.0, -G * state.system.net.mass[body.row]]
+    np.testing.assert_allclose(pulls.sum(axis=0) + load + weight, 0.0, atol=1e-6)
+    np.testing.assert_allclose(np.cross(ends, pulls).sum(axis=0) + np.cross(ends[3], load), 0.0, atol=1e-6)
+    assert solution.results["smallest"].value > 100.0 and solution.solver["smallest_pivot"] == 1
 
 
 REFUSED = [

@@ -3,6 +3,8 @@
 import numpy as np
 
 import refweb
+from refweb.pictures.frames import frame_of
+from refweb.results.vtu import meshes
 from refweb.studies.turning import coriolis
 from refweb.system.static_system import at_rest
 
@@ -43,6 +45,23 @@ def test_a_plate_on_four_ropes():
     shapes = found.shapes  # nodes that the plate carries go with it
     np.testing.assert_allclose(np.linalg.norm(shapes[2, 4:], axis=1), 1.0, rtol=1e-9)
     assert found.spectra[0].shares[2].sum() < 1e-9  # all of its energy is rotation
+
+
+def test_a_body_is_drawn_where_its_mode_takes_it():
+    """In each mode the drawn plate moves as the rigid body whose four corners the drawn ends of the ropes are."""
+    found = refweb.modes(platform([0.1, 0.05, -0.2]), 6)
+    state, (body,) = found.state, found.state.system.net.bodies
+    still = meshes(state)
+    for shape in found.spectra[-1].shapes:
+        drawn = meshes(state, shape)
+        moved = {name: drawn[name].points - still[name].points for name in still}
+        arms = still["web"].points[4:] - state.position[body.row]
+        matrix = np.vstack([np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]]) for x, y, z in arms])
+        motion, left, *_ = np.linalg.lstsq(matrix, moved["web"][4:].ravel(), rcond=None)
+        expected = motion[:3] + np.cross(motion[3:], still["plate"].points - state.position[body.row])
+        np.testing.assert_allclose(moved["plate"], expected, rtol=0, atol=1e-9)
+        frame = frame_of(1, 1.0, drawn, state.system.fixed[:8].any(axis=1)).posed(phase=0.0)
+        np.testing.assert_allclose(frame.bodies["plate"].points, still["plate"].points, rtol=0, atol=1e-9)
 
 
 def test_a_weight_off_the_middle_beside_the_tangent_by_differences():

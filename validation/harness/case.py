@@ -61,6 +61,7 @@ CASES = {
         "lattice_green",
         "conic_programming",
         "hanging_platform",
+        "clamps_and_forms",
     ),
     "dynamics": (
         "transverse_impact",
@@ -74,6 +75,7 @@ CASES = {
         "frequencies",
         "free_net",
         "tumbling",
+        "winches",
     ),
     "missions": (
         "published_throw",

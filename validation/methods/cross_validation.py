@@ -7,8 +7,9 @@ of theirs. The errors of peaks of stress are large because a peak is the highest
 that is changes with every digit.
 
 Effects that no impact has stand in a small thrown net, an orbit much faster than any among them, so that it shows, a
-box that tumbles into it, one that is tied to its middle, one that falls on a ball, and lines so weak that some break;
-two strings are thrown at each other. The three methods have to agree as well, on which lines break, and when.
+box that tumbles into it, one that is tied to its middle, one on an axle, one that falls on a ball, a ball that is
+pressed into it, a line that is reeled in with its mass, and lines so weak that some break; two strings are thrown at
+each other. The three methods have to agree as well, on which lines break, and when.
 
 Where nothing is hit there are digits to compare: 1 kg thrown at 1 m/s from the centre of a square web (smooth law,
 η = 1e-4). Central differences of two step sizes, extrapolated by their order 2, CVODE at rtol = 1e-10 and the explicit
@@ -64,6 +65,30 @@ EFFECTS = {
     "[orbit]": {"orbit": {"mean_motion": 2.0}},
     "[drag]": {"drag": {"density": 100.0, "wind": [0.5, 0.0, 0.0]}},
     "[rupture]": {"rupture": {"strength": 2.3e4}},
+    "a line that is reeled in with its mass": {
+        "reel": [{"lines": 0, "factor": [[0.0, 1.0], [0.2, 0.9], [0.3, 1.0]], "mass": "follows"}],
+        "gravity": {"acceleration": [0.0, 0.0, -9.81]},
+    },
+    "a ball that is pressed into it": {
+        "body": [{"name": "press", "radius": 0.3, "position": [0.0, 0.0, 0.32]}],
+        "motion": [{"body": "press", "displacement": [[0.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, -0.3]]}],
+        "contact": {"stiffness": 300.0},
+        "observe": [
+            *SMALL["observe"],
+            {"name": "push", "quantity": "support_force", "body": "press", "component": "z", "average": 0.05}
+            | {"reduce": "min"},
+        ],
+    },
+    "a box on an axle that is tied to it": {
+        "body": [
+            {key: BOX[key] for key in ("name", "shape", "size", "mass")}
+            | {"position": [0.0, 0.0, -0.2], "axle": {"point": [0.0, 0.0, -0.3], "direction": [0.0, 1.0, 0.0]}}
+        ],
+        "attach": [{"body": "box", "node": "centre"}],
+        "velocity": [{"node": "all", "value": [0.0, 0.0, 0.0]}],
+        "load": [{"node": 3, "force": [1.0, 0.0, 2.0]}],
+        "observe": [*SMALL["observe"][:1], {"name": "turned", "quantity": "axle_angle", "body": "box"}],
+    },
     "a box that tumbles into it": {
         "body": [BOX | {"position": [0.1, 0.03, 0.15]}],
         "contact": {"stiffness": 300.0},

@@ -168,7 +168,8 @@ class CentralDifference(Integrator):
         monitors = begin_monitors(self._observed, extremes, total, self._events)
         energy, stored = own_energies(total, system.working)
         ledger = MomentumBalance.empty()
-        open_balance.call(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
+        mass = self._model.inertia.mass[:, None]
+        open_balance.call(x, mass * np.where(system.supported, 0.0, v), self._model.outside, ledger)
         return ExplicitState(
             time=0.0,
             x=x,

@@ -79,6 +79,9 @@ class Cvode(Sundials):
             self._mass_factor = Symmetric(system.pattern)
             self._mass_factor.update(self._mass_values)
 
+    def _set_masses(self, mass):
+        self._mass = mass
+
     def _times_mass(self, v):
         return self._mass_matrix @ v if self._consistent else self._mass * v
 
@@ -186,7 +189,7 @@ class Cvode(Sundials):
         """Rows and columns of −M⁻¹K, of the diagonal, of the unit matrix and of −M⁻¹C, for a lumped mass."""
         pattern, n = self.system.pattern, self.unknowns
         row, column, at = pattern.indices, np.repeat(np.arange(n), np.diff(pattern.indptr)), np.arange(n)
-        self._heavy, self._unit = self._mass[row], np.ones(n)
+        self._force_rows, self._unit = row, np.ones(n)
         rows, columns = [n + row, at, at, n + row], [column, at, n + at, n + column]
         if self.rotations:
             self._unit[self.rotations.places] = 0.0
@@ -197,8 +200,9 @@ class Cvode(Sundials):
     def _jacobian(self, t, y, yp, J):
         n, (K, C) = self.unknowns, self._tangent(t, y)
         if not self._consistent:
-            damped = np.zeros(K.shape) if C is None else -C / self._heavy
-            parts = [-K / self._heavy, np.zeros(n), self._unit, damped]
+            heavy = self._mass[self._force_rows]
+            damped = np.zeros(K.shape) if C is None else -C / heavy
+            parts = [-K / heavy, np.zeros(n), self._unit, damped]
             if self.rotations:
                 parts += [self.rotations.X.ravel(), self.rotations.V.ravel()]
             self._write(J, np.concatenate(parts))

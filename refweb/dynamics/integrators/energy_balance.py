@@ -12,6 +12,7 @@ import numpy as np
 
 from ...compiled.rows import record_at
 from ...effects.line_kernels import LINE
+from ...effects.mass_flow import exchange_masses
 from ...effects.natural_lengths import NaturalLengths, set_lengths
 from ...errors import EnergyDriftError
 from ...kernels import (
@@ -31,7 +32,7 @@ from ...kernels import (
 from ...net.rotation import RigidRotations, more_kinetic
 
 if TYPE_CHECKING:
-    from .records import ForceTerms, Model
+    from .records import ForceTerms, Model, Running
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
@@ -207,9 +208,15 @@ def write_length_force(
 
 
 @kernel(leaf=True, apart=("lengths",))
-def change_lengths(t: float, x: Matrix, model: Model, was: Vector, length_force: Matrix, work: Vector) -> None:
-    """Set natural lengths at time t, and add the work of that, ½ (∂E/∂L + ∂E/∂L) ΔL."""
+def change_lengths(t: float, h: float, model: Model, was: Vector, running: Running) -> None:
+    """Set natural lengths at the end t of a step, and add the work of that, ½ (∂E/∂L + ∂E/∂L) ΔL.
+
+    Masses that follow them change as well.
+    """
     lengths, cells, lines = model.lengths, model.terms.cells[0], model.terms.data[0]
+    x, length_force, work = running.x, running.length_force, running.work
+    if lengths.masses.rows.size:
+        exchange_masses(t, h, x, running.v, lengths.masses, work, running.ledger.pushed)
     for c in range(was.size):
         was[c] = record_at(LINE, lines, lengths.elements[c], 0).natural_length
     set_lengths(t, lengths, lines)

@@ -164,7 +164,7 @@ def run_steps(
         if moves:
             move_supports(now, h, x, v, f, space.aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
-            change_lengths(now, x, model, space.was, running.length_force, work)
+            change_lengths(now, h, model, space.was, running)
         if near:
             update_neighbours(drift, x, v, bits, before, model)
             look_back_at_drift(now - h, model, running)

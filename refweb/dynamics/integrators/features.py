@@ -11,7 +11,8 @@ def features(scheme, model, observed, events):
     set of str
         ``stages`` or ``kicks`` (steps of one drift); ``watched`` (extremes), ``books`` (of energies), ``averages``,
         ``looks`` (any of these), ``events``; ``turning`` bodies and ``carried`` nodes; ``driven`` rows, ``lengths``
-        that change; ``powers``, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped`` (integrated impulses),
+        that change, masses that ``follows`` them;
+        ``powers``, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped`` (integrated impulses),
         ``booked`` (powers, lengths or pushing), ``angular`` momentum that is kept; ``near`` cells, ``pairs`` that are
         found; lines that push each other (``guard``), bodies that push lines (``walls``), ``guarded`` (either);
         ``contacts`` of bodies.
@@ -29,6 +30,7 @@ def features(scheme, model, observed, events):
         "carried": len(inertia.turns.carried),
         "driven": len(inertia.driven) + len(model.motions.kernels),
         "lengths": len(model.lengths.elements),
+        "follows": len(model.lengths.masses.rows),
         "powers": len(terms.powers),
         "viscous": len(terms.viscous),
         "rubbing": len(model.implicit_contacts.terms),

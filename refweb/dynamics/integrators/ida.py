@@ -101,6 +101,9 @@ class Ida(Sundials):
         self._choose(linear_solver, *(("sparse", ", and links") if self._links else ("block",)))
         self._adrift = 0.0, None
 
+    def _set_masses(self, mass):
+        self._M.data[self.system.pattern.diagonal] = mass
+
     # The residual
 
     def _parts(self, y):
@@ -280,12 +283,15 @@ class Ida(Sundials):
     def _initial(self, t, x, v):
         heavy, rest = self._heavy, np.zeros(self._count)
         rows = self._rows(t, np.concatenate([x, v[heavy]]), np.concatenate([v, v[heavy]]))
+        system = self.system.at(t) if self.system.net.flows else self.system
         force = self.system.force(t, *rows)
+        if system is not self.system:
+            force += self.system.material_flow.force(t, rows[1])
         slope = multipliers = np.zeros(0)
         if self._links:
             slope, multipliers = self._links.start(*rows, force)
         elif len(heavy):
-            slope = self.system.mass.moved_by(force).ravel()[self.system.free[heavy]]
+            slope = system.mass.moved_by(force).ravel()[system.free[heavy]]
         rate = v.copy()
         if self.rotations:
             self.rotations.set_rates(*rows, rate)

@@ -5,7 +5,8 @@ supports and of all other external forces. Dead loads and gravity have impulses 
 steps: their factors are piecewise linear, with an exact antiderivative. Damping in proportion to mass has −rate Σ m Δx.
 Therefore the balance finds a load that steps have omitted or applied twice. Follower loads and the inertia forces of a
 rotating frame have no such formula. They are *integrated along the steps* with the weights of the method, as are the
-forces of supports and of fixed bodies: there the balance only checks the method with its forces.
+forces of supports and of fixed bodies: there the balance only checks the method with its forces. The momentum of mass
+that follows a reel is that which the steps bring.
 
 The angular momentum about the centre of mass, with that of rotating bodies, has a balance as well, if there is no
 support and all forces are internal or have no moment about it, such as gravity. A ring keeps its plane, which takes
@@ -166,7 +167,7 @@ def _inverse_reach(net):
 def kept_axes(system):
     """Unit vectors along which the angular momentum about the centre of mass is kept, shape (axes, 3)."""
     kept = all(f.balance.moment_free or (f.balance.internal and not f.balance.twists) for f in system.terms)
-    if system.fixed.any() or not kept:
+    if system.fixed.any() or system.net.flows or not kept:
         return np.zeros((0, 3))
     normals = np.array([body.axes[2] for body in system.net.bodies if body.shape.planar]).reshape(-1, 3)
     if not len(normals):

@@ -7,12 +7,14 @@ effects. Features that a scene does not have are empty tables or arrays, and the
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 from numba import from_dtype, types
 
 from ... import kernels as k
+from ...effects.mass_flow import FollowedMass
 from ...effects.natural_lengths import NaturalLengths
 from ...kernels import (
     INDICES,
@@ -148,7 +150,7 @@ class Inertia(Record):
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
         moving, fixed = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.fixed)
         return cls(
-            net.mass,
+            net.mass.copy() if net.flows else net.mass,
             inverse,
             np.empty((2, system.rows)),
             moving,
@@ -265,9 +267,11 @@ class Model(Record):
     @classmethod
     def of(cls, system, outs):
         """Make the record of a `refweb.system.system.System`, whose terms write their values to ``outs``."""
-        inertia = Inertia.of(system)
+        inertia, lengths = Inertia.of(system), system.lengths
+        if system.net.flows:
+            lengths = replace(lengths, masses=FollowedMass.of(system, inertia.mass, inertia.inverse))
         forces = inertia, ForceTerms.of(system, outs), ImplicitContacts.of(system, inertia.turns)
-        changes = Motions.of(system), system.lengths, system.corners, Outside.of(system)
+        changes = Motions.of(system), lengths, system.corners, Outside.of(system)
         return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), BodyCcd.of(system), Contacts.of(system))
 
 

@@ -65,7 +65,8 @@ class Rates(NamedTuple):
         Power of each term and of motion [W]; the force of the supports, and of what acts from outside without a
         formula of its impulse [N].
     lengths, length_force : ndarray or None
-        Natural lengths [m], and ∂E/∂L of each [N]; none where nothing changes them.
+        Natural lengths [m], and ∂E/∂L of each [N]; none where nothing changes them. Masses that follow them are among
+        them, and then four rows have the energy and the momentum that come with each.
     """
 
     flow: np.ndarray
@@ -111,7 +112,8 @@ class Piece(NamedTuple):
         booked = self.before + width * (a * start.flow + b * middle.flow + c * last.flow)
         if start.lengths is not None:
             pull = a * start.length_force + b * middle.length_force + c * last.length_force
-            booked[-7] += pull @ (last.lengths - start.lengths)
+            brought = np.atleast_1d(pull @ (last.lengths - start.lengths))
+            booked[[-7, -3, -2, -1][: len(brought)]] += brought
         return booked if self.jump is None or t != self.end.time else booked + self.jump
 
     @property
@@ -167,7 +169,12 @@ class SimpsonBalance:
             flow[-3:] += rows[: self._linear].sum(axis=0)
         if not system.net.factors:
             return Rates(flow)
-        return Rates(flow, system.natural_length(sample.time), system.length_force(sample.time, sample.x))
+        lengths, force = system.natural_length(sample.time), system.length_force(sample.time, sample.x)
+        if system.net.flows:
+            material = system.material_flow
+            lengths = np.append(lengths, material.shares(sample.time))
+            force = np.hstack([np.vstack([force, np.zeros((3, force.size))]), material.brought(sample.v)])
+        return Rates(flow, lengths, force)
 
     def piece(self, course, end, at):
         """The `Piece` from where a course is to a time, by the dense output ``at`` of the step.
@@ -189,8 +196,8 @@ class SimpsonBalance:
             self._hold(end.x, after)
             last, end = (Sample(self.system, end.time, end.x, v) for v in (before, after))
             jump = np.zeros(len(course.work) + 6)
-            jump[-7] = self.kinetic(end.x, after) - self.kinetic(end.x, before)
-            jump[-6:-3] = self.momentum(after) - self.momentum(before)
+            jump[-7] = self.kinetic(end.time, end.x, after) - self.kinetic(end.time, end.x, before)
+            jump[-6:-3] = self.momentum(end.time, after) - self.momentum(end.time, before)
         rates = self.rates(course.sample), self.rates(middle), self.rates(last)
         before = np.concatenate([course.work, course.impulse, course.ledger.pushed])
         return Piece(course.sample, middle, end, rates, before, course.step, jump, at)
@@ -198,20 +205,26 @@ class SimpsonBalance:
     def uneven(self, course, piece):
         """Tell if powers change too much within a piece."""
         apart = piece.unevenness
-        return apart > UNEVEN * course.largest and apart > UNEVEN * self.kinetic(piece.end.x, piece.end.v)
+        return apart > UNEVEN * course.largest and apart > UNEVEN * self.kinetic(
+            piece.end.time, piece.end.x, piece.end.v
+        )
 
-    def kinetic(self, x, v):
+    def _mass(self, t):
+        """The `refweb.system.mass.Mass` at time t."""
+        return self.system.at(t).mass if self.system.net.flows else self.system.mass
+
+    def kinetic(self, t, x, v):
         """Kinetic energy [J]."""
-        energy = 0.5 * (v * self.system.mass.momentum(v)).sum()
+        energy = 0.5 * (v * self._mass(t).momentum(v)).sum()
         return energy + more_kinetic(x, v, self._turns) if len(self._turns.moment) else energy
 
-    def momentum(self, v):
+    def momentum(self, t, v):
         """Momentum of what is free [N s], shape (3,)."""
-        return self._momenta(v)[: self._linear].sum(axis=0)
+        return self._momenta(t, v)[: self._linear].sum(axis=0)
 
-    def _momenta(self, v):
+    def _momenta(self, t, v):
         """M v of what is free, by row [N s]."""
-        return self.system.mass.momentum(np.where(self._supported, 0.0, v))
+        return self._mass(t).momentum(np.where(self._supported, 0.0, v))
 
     def energies(self, sample, work, step):
         """Energy of each term, kinetic energy, work [J] and step size [s], for the work of each term."""
@@ -219,7 +232,7 @@ class SimpsonBalance:
         if system.net.factors:
             self._lines[:] = system.line_data(t).matrix
         book_energies(t, x, v, system.net.mass, self._turns, *self._terms, work, self._working, total)
-        total[-3] = self.kinetic(x, v)
+        total[-3] = self.kinetic(t, x, v)
         total[-1] = step
         return total
 
@@ -229,13 +242,13 @@ class SimpsonBalance:
 
     def open(self, course, energies):
         """Note the energy and the momentum at the start of a course."""
-        open_balance(course.x, self._momenta(course.v), self._outside, course.ledger)
+        open_balance(course.x, self._momenta(course.time, course.v), self._outside, course.ledger)
         course.energy, stored = own_energies(energies, self._working)
         course.largest = max(stored, self.least_energy)
 
     def impulses(self, course, row):
         """Write momentum, impulse of the supports and of all else from outside [N s], held against each other."""
-        momenta = self._momenta(course.v)
+        momenta = self._momenta(course.time, course.v)
         note_momentum(course.time, course.x, momenta, course.impulse, self._outside, course.ledger, self._still, row)
 
     def note_largest(self, course, energies):

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...effects.base import refuse_flows
 from ...errors import InputError, IntegrationError
 from ...system.mass import refuse_massless
 from .energy_balance import DRIFT, refuse_open
@@ -98,8 +99,9 @@ class StepObserver(Integrator):
     on_progress = staticmethod(lambda t: None)
     course_type = ObservedState
     _made_of: tuple
-    takes_massless = takes_links = takes_rotations = False
-    """True if the method's equations can include nodes without mass, rigid links, and rotating bodies."""
+    takes_massless = takes_links = takes_rotations = takes_flows = False
+    """True if the method's equations can include nodes without mass, rigid links, rotating bodies, and masses that
+    change."""
     rotations = None  # the `refweb.dynamics.integrators.rotations.Rotations` of such bodies
     restarts = False
     """True if the method restarts at corners of tables. The polynomial of IDA through the steps before a pulse of 1e-8
@@ -118,6 +120,8 @@ class StepObserver(Integrator):
             refuse_massless(system, self.method)
         if system.constraints and not self.takes_links:
             raise InputError(f'[[link]] needs method = "ida": {self.method} does not hold lengths')
+        if not self.takes_flows:
+            refuse_flows(system.net, f'[solve] method = "{self.method}"')
         if system.turning:
             from .rotations import followed
 

@@ -47,7 +47,7 @@ class Sundials(StepObserver):
         Linear solver, and the reason for it.
     """
 
-    takes_rotations = True
+    takes_rotations = takes_flows = True
     linear_solver = choice = ""
     max_order: int
     _symmetric: Symmetric
@@ -65,6 +65,27 @@ class Sundials(StepObserver):
             self.rotations.scale(both[0], False)
             self.rotations.scale(both[1], True)
         return both
+
+    def force_at(self, t, x, v):
+        """Force on each unknown [N], with that of material that comes or goes; masses become those of the time."""
+        force = super().force_at(t, x, v)
+        if self.system.net.flows:
+            flow, free = self.system.material_flow, self.system.free
+            self._set_masses(np.repeat(flow.masses(t), 3)[free])
+            force = force + flow.force(t, v).ravel()[free]
+        return force
+
+    def tangents(self, t, x, v):
+        """Values of K, and of C or None, at a state of all rows; a drum that moves is not coupled."""
+        K, C = super().tangents(t, x, v)
+        if self.system.net.flows:
+            C = np.zeros_like(K) if C is None else C
+            C[self.system.pattern.diagonal] += np.repeat(self.system.material_flow.rates(t), 3)[self.system.free]
+        return K, C
+
+    def _set_masses(self, mass):
+        """Take other masses of the unknowns [kg]."""
+        raise NotImplementedError
 
     # What a subclass brings, besides `_jacobian` as its solver calls it
 

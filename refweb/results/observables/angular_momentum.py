@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
+from ...effects.base import refuse_flows
 from ...kernels import kernel
+from ...messages import quote
 from ..probes import MAGNITUDE, PROBE, Probe
 from .nodal import Nodal
 from .observable import Value
@@ -27,6 +29,7 @@ class TotalAngularMomentum(Nodal):
     def _parts(self, system):
         """Masses and reference positions of rows (rows, 4), rows that count, and rows of rotation with moments."""
         net, observe = system.net, self.observe
+        refuse_flows(net, f"quantity = {quote(observe.quantity)}")
         linear = system.rows - net.spins
         masses = net.mass[:linear].copy()
         masses[[body.row for body in net.bodies if body.fixed]] = 0.0

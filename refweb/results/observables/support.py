@@ -5,7 +5,8 @@ negative, and what the centre of mass takes to go round an axle:
 
     F = m (α n × r − ω² r) − f,        α = n·M/I,
 
-with the arm r from the axle to the centre of mass, the moment M of all that acts and I about the axle.
+with the arm r from the axle to the centre of mass, the moment M of all that acts and I about the axle. An axle bears
+the moment across it, J α n + ω² n × J n − M with the tensor of inertia J about the same point.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...kernels import kernel
-from ...net.rotation import matrix_at, times
+from ...net.rotation import add_forces_to_bodies, matrix_at, times
 from ..probes import PROBE, Probe, component_of
 from .observable import ANY, Value
 from .rotation import Turning
@@ -32,7 +33,8 @@ class _Held(Turning):
         if not (body.moved or body.axle):
             raise InputError(
                 f'quantity = "{self.observe.quantity}": body = "{body.name}" is neither moved by [[motion]] nor on an '
-                'axle; the force of contact on it is quantity = "reaction"'
+                "axle: hold it by [[motion]] displacement = [[0, 0, 0, 0]] and rotation = [[0, 0, 0, 0]] in place of "
+                'fixed = true; the force of contact on it is quantity = "reaction"'
             )
 
     def of(self, state):
@@ -58,23 +60,39 @@ class SupportForce(_Held):
 
 
 class SupportMoment(_Held):
-    """Moment of the motion of a body on it, about its position or the point of its axle."""
+    """Moment of the motion or the axle of a body on it, about its position or the nearest point of the axle."""
 
     unit = "N m"
 
     def on(self, system):
-        """Refuse a body that is not turned by a motion."""
+        """Refuse a body that is moved, and not turned."""
         super().on(system)
         body = self.body(system.net)
-        if not body.moved or body.spin is None:
+        if body.spin is None:
             raise InputError(
                 f'quantity = "support_moment": body = "{body.name}" is not turned by [[motion]] rotation = ..., whose '
                 "moment it is: give rotation = [[0, 0, 0, 0]] to hold it"
             )
 
+    def of(self, state):
+        """Value by its probe; in statics of the moments that an axle bears as well."""
+        body, system = self.body(state.system.net), state.system
+        if body.moved or not system.angles:
+            return super().of(state)
+        force = sum((system.force_of(term, state.time, state.x) for term in system.terms), np.zeros((system.rows, 3)))
+        add_forces_to_bodies(state.x, force, system.carriers.turns)
+        axle, moment = body.axle.direction, force[body.spin]
+        across = (axle @ moment) * axle - moment
+        return Value(float(component_of.py_func(self.rows(system)[0], *across)), None)
+
     def probe(self, system):
-        """Make the probe of f alone."""
-        return Probe(support_moment, self.rows(system)[:2], np.zeros((0, 0)))
+        """Make the probe of x, v and f."""
+        body, (component, spin, turn) = self.body(system.net), self.rows(system)
+        if body.moved:
+            return Probe(support_moment, [component, spin], np.zeros((0, 0)))
+        about_base = body.axes.T @ body.inertia @ body.axes
+        about_base += body.mass * (body.arm @ body.arm * np.eye(3) - np.outer(body.arm, body.arm))
+        return Probe(axle_moment, [component, spin, turn], np.vstack([about_base, body.axle.direction]))
 
 
 class AxleAngle(_Held):
@@ -125,6 +143,27 @@ def support_moment(t, x, v, f, lines, rows, data, where):
     """Moment on a body; ``rows`` is (component, row of rotation)."""
     s = rows[1]
     return component_of(rows[0], 0.0 - f[s, 0], 0.0 - f[s, 1], 0.0 - f[s, 2])
+
+
+@kernel(PROBE)
+def axle_moment(t, x, v, f, lines, rows, data, where):
+    """Moment of an axle; ``rows`` is (component, rows of rotation), data has J at the start by rows, and n."""
+    s, m, n = rows[1], matrix_at(x, rows[1], rows[2]), (data[3, 0], data[3, 1], data[3, 2])
+    tensor = (
+        (data[0, 0], data[0, 1], data[0, 2]),
+        (data[1, 0], data[1, 1], data[1, 2]),
+        (data[2, 0], data[2, 1], data[2, 2]),
+    )
+    p = times(m, times(tensor, n))  # J n: n stays as it turns
+    rate = n[0] * v[s, 0] + n[1] * v[s, 1] + n[2] * v[s, 2]
+    faster = (n[0] * f[s, 0] + n[1] * f[s, 1] + n[2] * f[s, 2]) / (n[0] * p[0] + n[1] * p[1] + n[2] * p[2])
+    square = rate * rate
+    return component_of(
+        rows[0],
+        faster * p[0] + square * (n[1] * p[2] - n[2] * p[1]) - f[s, 0],
+        faster * p[1] + square * (n[2] * p[0] - n[0] * p[2]) - f[s, 1],
+        faster * p[2] + square * (n[0] * p[1] - n[1] * p[0]) - f[s, 2],
+    )
 
 
 @kernel(PROBE)

@@ -1,0 +1,259 @@
+"""Mass that follows a reel: closed equations by scipy, angular momentum, drums that move, weight at rest, refusals."""
+
+import nets
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.ida import Ida
+from refweb.errors import InputError
+
+AXIAL, DENSE, MASS, FAST, GRAVITY = 1e3, 0.5, 0.3, 3.0, 9.81
+"""EA [N], mass of a line by its length [kg/m], a point mass at its end [kg], its speed across [m/s], and g [m/s²]."""
+IN, OUT_AND_IN = [(0.0, 1.0), (1.0, 0.6)], [(0.0, 1.0), (0.4, 1.3), (1.0, 1.1)]
+WEIGHT = refweb.Gravity(acceleration=(0.0, 0.0, -GRAVITY))
+DRIVES = {"drum at rest": (0.0, 0.0, 0.0), "drum that moves": (0.3, -0.2, 0.5)}
+
+
+def straight(pieces=1, supports=(0,), end=1.0):
+    points = [[end * i / pieces, 0.0, 0.0] for i in range(pieces + 1)]
+    lines = [[i, i + 1] for i in range(pieces)]
+    return refweb.Inline(points=points, lines=lines, supports=list(supports))
+
+
+CABLE = refweb.Cable(law="linear", modulus=1e4 * AXIAL, area=1e-4, density=DENSE / 1e-4)
+
+
+def whirled(factor, *effects, drive=(0.0, 0.0, 0.0), pieces=1):
+    """A line along x with a mass at its end that is thrown across, both in a frame that moves."""
+    given = [
+        refweb.PointMass(node=pieces, mass=MASS),
+        *(refweb.Velocity(node=i, value=np.add(drive, (0.0, i * FAST / pieces, 0.0))) for i in range(1, pieces + 1)),
+        refweb.Reel(lines="all", factor=factor, mass="follows"),
+        *effects,
+    ]
+    if any(drive):
+        given.append(refweb.Motion(node=0, displacement=[(0.0, 0.0, 0.0, 0.0), (2.0, *np.multiply(2.0, drive))]))
+    return nets.system(straight(pieces, () if any(drive) else (0,)).web(), CABLE, given, quasi_static=False)
+
+
+def by_scipy(factor, drive, weight, end=1.0):
+    """Place, velocity, and work that the motion of the drum and the reel have done, in closed equations.
+
+    The reel gives the force −(EA/2)(l² − L²)/L² = −∂E/∂L of the line times −L', and material of the drum's velocity u
+    the power ρA L'/2 (u·v − ½ v²); the moved drum has half of the line's mass, and pulls with the line's tension.
+    """
+    times, factors = np.transpose(factor)
+    u = np.array(drive)
+
+    def rate(t, y, slope, at, before):
+        natural = before + slope * (t - at)
+        away, v = y[:3] - u * t, y[3:6]
+        length = np.linalg.norm(away)
+        pull = -AXIAL * (length / natural - 1.0) * away / length
+        mass, brought = MASS + 0.5 * DENSE * natural, 0.5 * DENSE * slope
+        push = pull + brought * (u - v) + mass * weight
+        work = -0.5 * AXIAL * (length**2 / natural**2 - 1.0) * slope + brought * (u @ v - 0.5 * v @ v)
+        work += 0.5 * brought * u @ u - (0.5 * DENSE * natural * weight - pull) @ u
+        # Weight of factor 1 is stored in the energy of gravity; what is beyond it does work, on the drum's node too.
+        work += 0.5 * DENSE * (natural - 1.0) * weight @ (v + u)
+        return np.concatenate([v, push / mass, [work]])
+
+    y = np.array([1.0, 0.0, 0.0, *np.add(drive, (0.0, FAST, 0.0)), 0.0])
+    for a, b, f, g in zip(times, times[1:], factors, factors[1:], strict=False):
+        given = dict(args=((g - f) / (b - a), a, f), method="DOP853", rtol=1e-12, atol=1e-13)
+        y = solve_ivp(rate, (a, min(b, end)), y, **given).y[:, -1]
+    return y[:3], y[3:6], y[6]
+
+
+def far(run, system, truth):
+    """Errors of place, velocity and work."""
+    own = system.net.points[1] + run.x[1], run.v[1], run.work.sum()
+    return [np.abs(one - other).max() for one, other in zip(own, truth, strict=True)]
+
+
+@pytest.mark.parametrize("factor", [IN, OUT_AND_IN], ids=["in", "out and in"])
+@pytest.mark.parametrize("drum", DRIVES)
+def test_a_mass_that_is_whirled_by_central_differences(factor, drum):
+    """Order 2 in place, velocity and work; momentum to rounding, and angular momentum about a drum at rest as well."""
+    drive, errors = DRIVES[drum], []
+    system = whirled(factor, WEIGHT, drive=drive)
+    truth = by_scipy(factor, drive, np.array(WEIGHT.acceleration))
+    for safety in (0.2, 0.1, 0.05):
+        solver = CentralDifference(system, safety=safety)
+        run = solver.start()
+        solver.advance(run, np.linspace(0.1, 1.0, 10))
+        errors.append([run.nsteps, *far(run, system, truth)])
+        assert run.ledger.drifts[0] < 1e-13
+        if not any(drive):
+            turning = (MASS + 0.5 * DENSE * factor[-1][1]) * np.cross(system.net.points[1] + run.x[1], run.v[1])
+            # Gravity has no moment about z through the drum, which the line is bound to; 1e3 roundings.
+            np.testing.assert_allclose(turning[2], (MASS + 0.5 * DENSE) * FAST, rtol=1e-13)
+    nsteps, *errors = np.array(errors).T
+    for error in errors:
+        slope = np.polyfit(np.log(1.0 / nsteps), np.log(error), 1)[0]
+        assert abs(slope - 2.0) < 0.2  # steps of 0.2 of the bound leave the next term
+
+
+@pytest.mark.parametrize("solver", nets.some([Cvode, Ida], 2))
+@pytest.mark.parametrize("drum", DRIVES)
+def test_a_mass_that_is_whirled_by_sundials(solver, drum):
+    """Errors go with rtol to the power 2/3, by 21 over two decades, of which a third is asked for; balances close."""
+    drive, errors = DRIVES[drum], []
+    system = whirled(OUT_AND_IN, WEIGHT, drive=drive)
+    truth = by_scipy(OUT_AND_IN, drive, np.array(WEIGHT.acceleration))
+    for rtol in (1e-5, 1e-7):
+        one = solver(system, rtol=rtol)
+        run = one.start()
+        one.advance(run, np.linspace(0.1, 1.0, 10))
+        errors.append([*far(run, system, truth), run.drift, run.ledger.drifts[0]])
+    coarse, fine = np.array(errors)
+    assert (coarse > 7.0 * fine).all()
+    assert fine[0] < 1e-4 and fine[1] < 2e-3 and fine[2] < 1e-3 and fine[3] < 1e-4 and fine[4] < 1e-5
+
+
+def test_a_tether_keeps_its_angular_momentum():
+    """Four elements about a pin: Σ m r × v about it stays to rounding, with the mass of each at its time."""
+    system, rows = whirled(IN, pieces=4), []
+    solver = CentralDifference(system)
+    run = solver.start()
+    for time in (0.0, 0.3, 1.0):
+        if time:
+            solver.advance(run, [time])
+        mass = system.material_flow.masses(time)
+        rows.append((mass[:, None] * np.cross(system.net.points + run.x, run.v)).sum(axis=0)[2])
+    lumped = DENSE * 0.25 * np.array([1.0, 1.0, 1.0, 0.5])
+    lumped[-1] += MASS
+    np.testing.assert_allclose(rows, lumped @ np.linspace(0.25, 1.0, 4) ** 2 * FAST, rtol=1e-13)
+    np.testing.assert_allclose(mass.sum(), MASS + 0.6 * DENSE, rtol=1e-14)
+
+
+@pytest.mark.parametrize("method", ["newton", "relaxation"])
+def test_a_line_that_is_paid_out_hangs_by_the_weight_it_has(method):
+    """At each load step the tension in an element is the weight of the nodes below it, ρA L(t) g in all."""
+    web, steps = straight(3), (0.0, 0.5, 1.0)
+    factor = [(0.0, 1.0), (1.0, 2.5)]
+    scene = refweb.Scene(
+        web=web,
+        cable=CABLE,
+        effects=[
+            refweb.Gravity(acceleration=(GRAVITY, 0.0, 0.0)),
+            refweb.Reel(lines="all", factor=factor, mass="follows"),
+        ],
+        solve=refweb.Static(load_steps=steps, method=method),
+        observe=[refweb.Observe(name=f"of_{line}", quantity="tension", line=line) for line in range(3)],
+    )
+    history = refweb.run(scene).history
+    for step, *found in zip(steps, *(history[f"of_{line}"] for line in range(3)), strict=True):
+        piece = DENSE * GRAVITY * np.interp(step, *np.transpose(factor)) / 3.0
+        np.testing.assert_allclose(found, piece * np.array([2.5, 1.5, 0.5]), rtol=1e-9)  # the residual of statics
+
+
+def test_a_drum_on_a_body():
+    """A body of 1e12 kg that drifts is a drum that is moved; the mass of its node stays with it."""
+    drive = DRIVES["drum that moves"]
+    truth = whirled(IN, drive=drive)
+    effects = [
+        refweb.Body(name="ship", radius=0.1, mass=1e12, position=(-0.1, 0.0, 0.0), velocity=drive),
+        refweb.Attach(body="ship", node=0),
+        *thrown(drive),
+    ]
+    system = nets.system(straight(1, ()).web(), CABLE, effects, quasi_static=False)
+    places = []
+    for one in (truth, system):
+        solver = CentralDifference(one, safety=0.2)
+        run = solver.start()
+        solver.advance(run, [0.5, 1.0])
+        assert run.ledger.drifts[0] < 1e-12
+        places.append(run.x[1])
+    np.testing.assert_allclose(*places, rtol=0, atol=1e-9)  # steps differ by the bound of the body's node: none here
+
+
+def thrown(drive):
+    return [
+        refweb.PointMass(node=1, mass=MASS),
+        refweb.Velocity(node=1, value=np.add(drive, (0.0, FAST, 0.0))),
+        refweb.Reel(lines="all", factor=IN, mass="follows"),
+    ]
+
+
+def whirl(**changes):
+    given = {
+        "web": {"kind": "inline", "points": [[0, 0, 0], [0.5, 0, 0], [1, 0, 0]], "lines": [[0, 1], [1, 2]]},
+        "cable": {"law": "tension-only", "modulus": 1e7, "area": 1e-4, "density": DENSE / 1e-4},
+        "supports": {"nodes": [0]},
+        "point_mass": [{"node": 2, "mass": MASS}],
+        "gravity": {"acceleration": [0.0, 0.0, -1.0]},
+        "velocity": [{"node": [1], "value": [0.0, 1.5, 0.0]}, {"node": [2], "value": [0.0, 3.0, 0.0]}],
+        "reel": [{"lines": "all", "factor": OUT_AND_IN, "mass": "follows"}],
+        "solve": {"kind": "dynamic", "duration": 1.0},
+        "output": {"interval": 0.05},
+        "observe": [
+            {"name": "far", "quantity": "position", "node": 2, "component": "y"},
+            {"name": "pull", "quantity": "tension", "line": 0, "average": 0.3, "reduce": "max"},
+            {"name": "done", "quantity": "work"},
+        ],
+    }
+    given["web"]["supports"] = []
+    return given | changes
+
+
+def test_methods_agree():
+    """Within the sum of their ±, which are small."""
+    found = []
+    for solve in ({"safety": 0.1}, {"method": "cvode", "rtol": 1e-6}):
+        found.append(refweb.run(refweb.Scene.from_dict(whirl(solve={"kind": "dynamic", "duration": 1.0, **solve}))))
+        assert not found[-1].warnings
+    for name, one in found[0].results.items():
+        other = found[1].results[name]
+        assert abs(one.value - other.value) <= one.error + other.error < 0.05 * abs(one.value), name
+
+
+def test_it_is_resumed_bit_for_bit_and_its_frames_have_the_mass_of_their_time(tmp_path):
+    scene = refweb.Scene.from_dict(whirl(output={"interval": 0.05, "frames": 2}, accuracy={"error": "none"}))
+    whole, resumed = nets.whole_and_resumed(scene, tmp_path)
+    for name, values in whole.history.items():
+        np.testing.assert_array_equal(resumed.history[name], values)
+    assert whole.state.system.at(1.0).net.mass.sum() == pytest.approx(MASS + 1.1 * DENSE, rel=1e-14)
+
+
+def test_shipped_tether():
+    """Angular momentum about the drum by the places and masses of the end; damping along the line has no moment."""
+    solution = refweb.run(refweb.Scene.load("reeled-tether").replace(accuracy=refweb.Accuracy(error="none")))
+    system, turning = solution.state.system, []
+    for t, x, v in ((0.0, 0.0, system.initial_velocity()), (60.0, solution.state.x, solution.state.v)):
+        places = system.net.points + x
+        turning.append((system.material_flow.masses(t)[:, None] * np.cross(places, v)).sum(axis=0)[2])
+    assert turning[1] == pytest.approx(turning[0], rel=1e-11)  # the rounding of 5000 steps
+    lumped = 0.03 * np.array([0.2, 0.4, 0.6, 0.8, 1.0]) ** 2 @ [1.0, 1.0, 1.0, 1.0, 0.5]
+    moments = [length**2 * (2.0 + length / 100.0 * lumped) for length in (100.0, 80.0)]
+    speed = 0.05 * moments[0] / moments[1] * 80.0
+    assert solution.results["across"].value == pytest.approx(speed, rel=4e-3)  # strains of 1.8e-3, squared
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"reel": [{"lines": "all", "factor": IN, "drum": 0}]}, r"\[\[reel\]\] 1 drum has no meaning where mass"),
+        ({"reel": [{"lines": "all", "factor": IN, "mass": "follow"}]}, 'did you mean "follows"'),
+        ({"supports": {"nodes": []}}, r"\[\[reel\]\] mass = \"follows\": no node of line 0 .* drum = "),
+        ({"supports": {"nodes": [0, 2]}}, r"2 nodes \(0, 2\) of line 0"),
+        ({"reel": [{"lines": 0, "factor": IN, "mass": "follows", "drum": 2}]}, "drum = 2 is no end"),
+        ({"reel": 2 * [{"lines": 0, "factor": IN, "mass": "follows"}]}, r"\[\[reel\]\] 2 line 0 has a reel"),
+        ({"solve": {"kind": "dynamic", "duration": 1.0, "method": "cvode", "mass": "consistent"}}, '"lumped"'),
+        ({"solve": {"kind": "dynamic", "duration": 1.0, "method": "explicit"}}, r"takes no .*\[\[reel\]\]|takes no"),
+        ({"damping": {"rate": 1.0}}, r"\[damping\] rate = 1 takes masses that stay"),
+        ({"orbit": {"mean_motion": 1.0}, "gravity": None}, r"\[orbit\].* takes masses that stay"),
+        (
+            {"observe": [{"name": "h", "quantity": "total_angular_momentum"}]},
+            'quantity = "total_angular_momentum" takes masses that stay',
+        ),
+    ],
+)
+def test_refusals(changes, message):
+    given = {key: value for key, value in whirl(**changes).items() if value is not None}
+    with pytest.raises(InputError, match=message):
+        refweb.run(refweb.Scene.from_dict(given))

@@ -1,0 +1,149 @@
+"""Winches: a drum that winds up a rope, a lever on an axle, and lines that are reeled in with their mass.
+
+A drum of radius R that turns by θ winds up R θ of a rope, which hangs from its side with a mass. Without friction the
+moment on it is R times all weight that hangs. Elements of length h lie on it as chords, which stand out by (h/R)²/8 of
+R.
+
+A lever of mass M whose centre is at the arm a of an axle, with a rope of EA and natural length L from its end at 2a to
+a point straight above, rests at the angle θ at which the energy of rope and weight is least.
+
+A mass m on a line of ρA is whirled about a pin while the line is reeled in or paid out, its natural length L(t). Half
+of the line's mass is at its end, and material leaves and comes through the pin, where it has no velocity:
+
+    (m + ½ ρA L) v' = F − ½ ρA L' v,        so that the angular momentum about the pin stays.
+
+The independent methods are DOP853 on these equations and a minimisation of the energy by Brent's method.
+"""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
+
+import refweb
+from refweb.scene import Scene
+
+from ..harness import plots
+from ..harness.case import Case, Figure, Row
+
+G = 9.81
+REELED = ((0.0, 1.0), (0.4, 1.3), (1.0, 0.8))
+DENSE, MASS, AXIAL, FAST = 0.5, 0.3, 1e3, 3.0
+"""ρA [kg/m], m [kg], EA [N] and the speed across at the start [m/s]."""
+METHODS = {
+    "central-difference": dict(safety=0.1),
+    "cvode": dict(method="cvode", rtol=1e-4),
+    "ida": dict(method="ida", rtol=1e-4),
+}
+
+
+def whirled(keys):
+    """Solution of a mass of `MASS` whirled on a line that is reeled."""
+    return refweb.run(
+        refweb.Scene(
+            web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
+            cable=refweb.Cable(law="linear", modulus=1e4 * AXIAL, area=1e-4, density=1e4 * DENSE),
+            effects=[
+                refweb.PointMass(node=1, mass=MASS),
+                refweb.Velocity(node=1, value=(0.0, FAST, 0.0)),
+                refweb.Reel(lines=0, factor=REELED, mass="follows"),
+            ],
+            solve=refweb.Dynamic(duration=1.0, **keys),
+            output=refweb.Output(interval=0.02),
+            observe=[
+                refweb.Observe(name="x", quantity="position", node=1, component="x"),
+                refweb.Observe(name="y", quantity="position", node=1, component="y"),
+                refweb.Observe(name="speed", quantity="velocity", node=1),
+            ],
+        )
+    )
+
+
+def path(times):
+    """Place and velocity of the mass by DOP853, shape (4, times)."""
+    knots, factors = np.transpose(REELED)
+
+    def rate(t, y, slope, at, before):
+        natural = before + slope * (t - at)
+        length = np.hypot(*y[:2])
+        force = -AXIAL * (length / natural - 1.0) * y[:2] / length - 0.5 * DENSE * slope * y[2:]
+        return np.concatenate([y[2:], force / (MASS + 0.5 * DENSE * natural)])
+
+    y, found = np.array([1.0, 0.0, 0.0, FAST]), []
+    for a, b, f, g in zip(knots, knots[1:], factors, factors[1:], strict=False):
+        run = solve_ivp(
+            rate, (a, b), y, "DOP853", dense_output=True, args=((g - f) / (b - a), a, f), rtol=1e-12, atol=1e-13
+        )
+        inside = times[(times >= a) & ((times < b) | (b == knots[-1]))]
+        found += [run.sol(t) for t in inside]
+        y = run.y[:, -1]
+    return np.array(found).T
+
+
+def lever(torque):
+    """(Solution, angle by a minimisation) of the lever, with a torque about its axle [N m]."""
+    arm, natural, mass = 0.5, 0.9, 2.0
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[1, 0, 1], [1, 0, 0]], lines=[[0, 1]], natural_length=[natural], supports=[0]),
+        cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-4, density=0.0),
+        effects=[
+            refweb.Gravity(acceleration=(0.0, 0.0, -G)),
+            refweb.Body(
+                name="lever", shape="box", size=(1.0, 0.2, 0.1), mass=mass, position=(arm, 0, 0),
+                axle={"point": [0, 0, 0], "direction": [0, 1, 0], "torque": torque},
+            ),
+            refweb.Attach(body="lever", node=1),
+        ],
+        observe=[refweb.Observe(name="angle", quantity="axle_angle", body="lever")],
+    )  # fmt: skip
+
+    def energy(angle):
+        end = np.array([np.cos(angle), -np.sin(angle)])
+        stretch = max(np.hypot(*(end - [1.0, 1.0])) - natural, 0.0)
+        return 0.5 * 100.0 / natural * stretch**2 + mass * G * arm * end[1] - torque * angle
+
+    least = minimize_scalar(energy, bounds=(-0.5, 0.8), method="bounded", options={"xatol": 1e-10})
+    return refweb.run(scene), least.x
+
+
+def case(quick):
+    rows = []
+    drum = refweb.run(Scene.load("winch-drum")).results
+    radius, angle, piece = 0.1, 2.0, 0.02
+    out = (piece / radius) ** 2 / 8.0
+    hanging = 1.0 - radius * angle
+    reason = "chords on the drum stand out by (h/R)²/8 of R, and contact gives way by 0.26 mm"
+    pull = G * (5.0 + 1150.0 * 7e-6 * hanging)
+    height = radius * angle - (1.0 + pull / (3e9 * 7e-6))
+    given = dict(unit="m", error=drum["height"].error, scale=radius * angle)
+    rows.append(Row("drum, height", drum["height"].value, height, "R θ", out, reason, **given))
+    rows.append(Row("drum, moment", drum["moment"].value, -radius * pull, "R times the weight", out, reason, "N m"))
+    for torque in (0.0, 3.0):
+        solution, exact = lever(torque)
+        result, reason = solution.results["angle"], "roots of rounding of the energy"
+        rows.append(Row(f"lever, {torque:g} N m", result.value, exact, "Brent", 1e-7, reason, "rad", result.error, 1.0))
+    spun = refweb.run(Scene.load("reeled-tether")).results["across"]
+    ends = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
+    moments = [2.0 * L**2 + 0.03 * L / 100.0 * L**2 * (ends**2 @ [1, 1, 1, 1, 0.5]) for L in (100.0, 80.0)]
+    reason = "the moment of inertia has the square of a strain of 1.8e-3"
+    exact = 0.05 * moments[0] / moments[1] * 80.0
+    rows.append(Row("tether, speed of its end", spun.value, exact, "angular momentum", 4e-3, reason, "m/s", spun.error))
+    runs = {name: whirled(keys) for name, keys in METHODS.items() if not quick or name != "ida"}
+    end = path(np.array([1.0]))[:, 0]
+    exact = {"x": end[0], "y": end[1], "speed": np.hypot(*end[2:])}
+    reason = "± of the method covers it, at these tolerances"
+    for method, solution in runs.items():
+        for name, value in exact.items():
+            result, scale, unit = solution.results[name], *((FAST, "m/s") if name == "speed" else (1.0, "m"))
+            given = dict(unit=unit, error=result.error, scale=scale, covered=True)
+            rows.append(Row(f"whirled mass, {name} by {method}", result.value, value, "DOP853", 2e-2, reason, **given))
+
+    def drawn():
+        page, plot = plots.axes("x [m]", "y [m]")
+        fine = path(np.linspace(0.0, 1.0, 400))
+        plot.plot(*fine[:2], **plots.REFERENCE)
+        history = runs["cvode"].history
+        plot.plot(history["x"], history["y"], "o")
+        plot.set_aspect("equal")
+        return page
+
+    return Case(rows=rows, figures=[Figure("Path of the whirled mass: refweb (markers) on DOP853 (line).", drawn)])
