@@ -116,6 +116,14 @@ SHAPES = {
     "terrain": "refweb.net.shapes.terrain:Terrain",
 }
 """Shapes of ``[[body]]``; how to write one says `refweb.net.rigid_body`."""
+LAWS = {
+    "smooth": "refweb.net.laws.smooth:Smooth",
+    "tension-only": "refweb.net.laws.straight:TensionOnly",
+    "linear": "refweb.net.laws.straight:Linear",
+    "force-density": "refweb.net.laws.straight:ForceDensity",
+    "constant-force": "refweb.net.laws.straight:ConstantForce",
+}
+"""Tension laws of lines; how to write one says `refweb.net.laws`."""
 
 
 class Method(NamedTuple):
@@ -265,6 +273,7 @@ _WORD, _WORDS = "[a-z][a-z0-9_]*", "[a-z][a-z0-9_-]*"
 KINDS = {
     "effect": Kind(EFFECTS, "refweb.tables:Table", _WORD),
     "shape": Kind(SHAPES, "refweb.net.rigid_body:Shape", _WORDS),
+    "law": Kind(LAWS, "refweb.net.laws.law:TensionLaw", _WORDS),
     "observable": Kind(OBSERVABLES, "refweb.results.observables.observable:Observable", _WORDS),
     "integrator": Kind(INTEGRATORS, "refweb.dynamics.integrators.integrator:Integrator", _WORDS),
     "verb": Kind(COMMANDS, "", _WORDS),

@@ -21,7 +21,7 @@ from import_graph import loaded_with
 import refweb
 from refweb.dynamics.integrators import central_difference
 from refweb.kernels import Functions, Record
-from refweb.registry import EFFECTS, INTEGRATORS, OBSERVABLES, SHAPES, STATICS, WEBS, load
+from refweb.registry import EFFECTS, INTEGRATORS, LAWS, OBSERVABLES, SHAPES, STATICS, WEBS, load
 from refweb.scene import SHIPPED_SCENES
 
 # Modules
@@ -75,6 +75,7 @@ def roots(given, method):
     yield from (registered(EFFECTS[effect]) for effect in given.keys() & EFFECTS.keys())
     yield from (registered(OBSERVABLES[observe["quantity"]]) for observe in given.get("observe", DEFAULT))
     yield from (registered(SHAPES[shape]) for shape in shapes)
+    yield registered(LAWS[law])
     if given["web"].get("path", "").endswith(".csv"):
         yield "net.csv_files"
     if "fold" in given or "positions" in given["web"]:

@@ -49,3 +49,13 @@ def record_at(typing, kind, matrix, row, column):
         return builder.bitcast(builder.gep(array.data, [first]), context.get_value_type(signature.return_type))
 
     return kind.dtype(kind, matrix, types.intp, types.intp), build
+
+
+@_intrinsic
+def narrowed(typing, kind, record):
+    """The same record with the fields of another dtype alone, over the same memory, in kernels."""
+
+    def build(context, builder, signature, arguments):
+        return builder.bitcast(arguments[1], context.get_value_type(signature.return_type))
+
+    return kind.dtype(kind, record), build

@@ -9,10 +9,11 @@ import numpy as np
 
 from ..errors import InputError, refused_at
 from ..messages import quote
+from ..registry import LAWS
 from ..tables import LARGEST, Table, by_group, choice, integer, real, table
 from .groups import givers
 from .materials import FILLED, MATERIALS
-from .tension_laws import CONSTANT_FORCE, FORCE_DENSITY, FORM_FINDING, NAMES, SMOOTH, strains_of
+from .tension_laws import law_of, strains_of
 
 SMOOTH_LAW = {"slackness": 0.0, "smoothing": 1e-5}
 """Parameters of the smooth law where none are given."""
@@ -64,7 +65,7 @@ class Group(Table):
         prestrain = 1e-3
     """
 
-    law: str | None = choice(*NAMES, default=None)
+    law: str | None = choice(LAWS, default=None)
     material: str | None = choice(*MATERIALS, default=None)
     modulus: float | None = real(default=None, above=0, unit="Pa")
     area: float | None = real(default=None, above=0, unit="m²")
@@ -96,7 +97,7 @@ class Cable(Table):
     Parameters
     ----------
     law : {"smooth", "tension-only", "linear", "force-density", "constant-force"}
-        Tension law, see `refweb.net.tension_laws`. Groups may have others: struts beside cables. Lines that can push
+        Tension law, see `refweb.net.laws`. Groups may have others: struts beside cables. Lines that can push
         end the proven bound that statics has where all lines are tension-only. The last two are those of form finding,
         for statics: the tension of a line is ``force_density`` times its length, or ``pretension``, whatever its
         natural length is, and `refweb.form` makes a net of elastic lines of the shape.
@@ -160,7 +161,7 @@ class Cable(Table):
 
     either = ("modulus", "density"), ("material",)
 
-    law: str = choice(*NAMES, default="smooth")
+    law: str = choice(LAWS, default="smooth")
     material: str | None = choice(*MATERIALS, default=None)
     modulus: Any = real(default=None, above=0, unit="Pa")
     area: float = real(above=0, unit="m²")
@@ -211,7 +212,7 @@ class Cable(Table):
         Returns
         -------
         dict of str to ndarray
-            ``law`` (its number), ``modulus``, ``area``, ``density``, ``slackness``, ``smoothing``, ``strength``
+            ``law`` (its name), ``modulus``, ``area``, ``density``, ``slackness``, ``smoothing``, ``strength``
             (infinite where none is given), ``safety_factor``, ``knot_factor`` and ``natural_length``, each of shape
             (lines,).
 
@@ -224,10 +225,10 @@ class Cable(Table):
         values = self._values(web)
         _check_laws(values)
         values["natural_length"] = _natural_lengths(web, values)
-        forming, area = np.isin(values["law"], FORM_FINDING), values["area"]
+        forming, area = _forming(values["law"]), values["area"]
         density, force = values.pop("force_density"), values.pop("pretension")
         with np.errstate(over="ignore"):
-            size = np.where(values["law"] == FORCE_DENSITY, density * values["natural_length"], force)
+            size = np.where(values["law"] == "force-density", density * values["natural_length"], force)
             values["modulus"] = np.where(forming, size / area, values["modulus"])
             stiffness = np.abs(values["modulus"]) * area / values["natural_length"]
             mass = values["density"] * values["area"] * values["natural_length"]
@@ -247,31 +248,37 @@ class Cable(Table):
             **dict.fromkeys((*LENGTHS[1:], DENSITY), np.nan),
         }
         for key in (f.name for f in fields(Group) if f.name != "material"):
-            values[key] = np.full(len(web.lines), _number(self, key, missing))
+            dtype = object if key == "law" else float
+            values[key] = np.full(len(web.lines), _number(self, key, missing), dtype)
             for number, group in enumerate(self.groups.values()):
                 if key in given and getattr(group, key) is not None:
                     values[key][given[key] == number] = _number(group, key, missing)
         _replace_lengths(values, given)
-        by_group, forming = given.get("law", np.full(len(web.lines), -1)) >= 0, np.isin(values["law"], FORM_FINDING)
+        by_group, forming = given.get("law", np.full(len(web.lines), -1)) >= 0, _forming(values["law"])
         left_out = {  # of what the cable gives to lines of its own law
-            DENSITY: values["law"] != FORCE_DENSITY,
-            "pretension": values["law"] == FORCE_DENSITY,
+            DENSITY: values["law"] != "force-density",
+            "pretension": values["law"] == "force-density",
             "prestrain": forming,
             "sag": forming,
         }
         for key, lines in left_out.items():
             by_key = given.get(key, np.full(len(by_group), -1)) >= 0
             values[key][lines & by_group & ~by_key] = 0.0 if key == "prestrain" else np.nan
-        plain = values["law"] != SMOOTH
+        plain = values["law"] != "smooth"
         for key in SMOOTH_LAW:
             for line in np.flatnonzero(plain & (given.get(key, np.full(len(plain), -1)) >= 0))[:1]:
-                group, law = list(self.groups)[given[key][line]], list(NAMES)[values["law"][line]]
+                group, law = list(self.groups)[given[key][line]], values["law"][line]
                 raise InputError(
                     f"[cable.groups] {quote(group)} gives {key} to line {line}, where it has no meaning with law = "
                     f'"{law}"'
                 )
             values[key][plain] = 0.0
         return values
+
+
+def _forming(laws):
+    """True for each law by name that is one of form finding, an array."""
+    return np.isin(laws, [name for name in set(laws) if law_of(name).forming])
 
 
 def _fill(table):
@@ -305,31 +312,30 @@ def _replace_lengths(values, given):
 def _check_laws(values):
     """Refuse what the law of a line does not take, and what it does not have."""
     law, density, force = values["law"], values[DENSITY], values["pretension"]
-    forming, needs = np.isin(law, FORM_FINDING), {FORCE_DENSITY: density, CONSTANT_FORCE: force}
+    forming, needs = _forming(law), {"force-density": density, "constant-force": force}
     taken = [
-        (DENSITY, ~np.isnan(density) & (law != FORCE_DENSITY)),
-        ("pretension", ~np.isnan(force) & (law == FORCE_DENSITY)),
+        (DENSITY, ~np.isnan(density) & (law != "force-density")),
+        ("pretension", ~np.isnan(force) & (law == "force-density")),
         ("prestrain", forming & (values["prestrain"] != 0.0)),
         ("sag", forming & ~np.isnan(values["sag"])),
     ]
     for key, wrong in taken:
         for line in np.flatnonzero(wrong)[:1]:
-            name = list(NAMES)[law[line]]
             raise InputError(
-                f'[cable] {key} = {values[key][line]:g} has no meaning with law = "{name}", which line {line} has: '
-                "leave it out"
+                f'[cable] {key} = {values[key][line]:g} has no meaning with law = "{law[line]}", which line {line} has'
+                ": leave it out"
             )
-    for number, key in ((FORCE_DENSITY, DENSITY), (CONSTANT_FORCE, "pretension")):
-        missing = np.isnan(needs[number]) | (needs[number] == 0.0)
-        for line in np.flatnonzero((law == number) & missing)[:1]:
-            unit, name = ("N/m" if key == DENSITY else "N"), list(NAMES)[number]
+    for name, key in (("force-density", DENSITY), ("constant-force", "pretension")):
+        missing = np.isnan(needs[name]) | (needs[name] == 0.0)
+        for line in np.flatnonzero((law == name) & missing)[:1]:
+            unit = "N/m" if key == DENSITY else "N"
             raise InputError(f'[cable] law = "{name}" of line {line} needs {key} = ..., not 0 [{unit}]')
 
 
 def _natural_lengths(web, values):
     """Natural length of each line [m], shape (lines,); takes the keys that say so out of the values."""
     prestrain, sag = values.pop("prestrain"), values.pop("sag")
-    tension, forming = values["pretension"], np.isin(values["law"], FORM_FINDING)
+    tension, forming = values["pretension"], _forming(values["law"])
     tense, hangs = ~np.isnan(tension) & ~forming, ~np.isnan(sag)
     for key, given, value in (
         ("prestrain", prestrain != 0.0, prestrain),
@@ -340,9 +346,8 @@ def _natural_lengths(web, values):
             raise InputError(f"[cable] {key} = {value[line]:g} cannot be used: the web's natural lengths are given")
     strain = prestrain.copy()
     if tense.any():
-        numbers = (values[key] for key in ("modulus", "area", "slackness", "smoothing"))
         with refused_at("[cable] pretension:"):
-            strain += strains_of(values["law"], np.where(tense, tension, 0.0), *numbers)
+            strain += strains_of(values, np.where(tense, tension, 0.0))
     length = web.natural_length / (1.0 + strain)
     if hangs.any():
         from .sag import over_chord
@@ -357,6 +362,6 @@ def _smoothed(table, share):
 
 
 def _number(table, key, missing):
-    """A value of a cable or a group as a number, that of ``missing`` where it has none."""
+    """A value of a cable or a group, that of ``missing`` where it has none."""
     value = getattr(table, key)
-    return NAMES[value] if key == "law" else missing[key] if value is None else value
+    return missing[key] if value is None else value

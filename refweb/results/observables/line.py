@@ -6,7 +6,7 @@ import numpy as np
 
 from ...effects.base import STRAIN
 from ...errors import InputError
-from ...net.tension_laws import TENSION_ONLY
+from ...net.tension_laws import law_of
 from .observable import ANY, NOT_NEGATIVE, SELECTIONS, Observable, Value
 
 
@@ -87,7 +87,7 @@ class Line(Observable):
         """
         if self.observe.select == "abs":
             return NOT_NEGATIVE
-        pulls = system.net.laws[self.elements(system.net)] == TENSION_ONLY
+        pulls = ~system.net.law_is("pushes")[self.elements(system.net)]
         alone = sum(term.over_lines for term in system.terms) == 1
         certain = pulls.all() if self.observe.select == "min" else pulls.any()
         return NOT_NEGATIVE if self.pull and certain and alone else ANY
@@ -99,7 +99,8 @@ class Line(Observable):
         cable = tables.get("cable", {})
         laws = {table["law"] for table in (cable, *cable.get("groups", {}).values()) if "law" in table}
         damped = tables.get("damping", {}).get("time", 0.0) > 0.0
-        return NOT_NEGATIVE if self.pull and laws == {"tension-only"} and not damped else ANY
+        pushes = damped or not laws or any(law_of(law).pushes for law in laws)
+        return NOT_NEGATIVE if self.pull and not pushes else ANY
 
     def column(self, system):
         """Column of tension in the output of lines."""
