@@ -122,6 +122,7 @@ LAWS = {
     "linear": "refweb.net.laws.straight:Linear",
     "force-density": "refweb.net.laws.straight:ForceDensity",
     "constant-force": "refweb.net.laws.straight:ConstantForce",
+    "table": "refweb.net.laws.curve:Table",
 }
 """Tension laws of lines; how to write one says `refweb.net.laws`."""
 
@@ -279,6 +280,8 @@ KINDS = {
     "verb": Kind(COMMANDS, "", _WORDS),
 }
 """Kinds that `register` and entry points, of the group ``refweb.`` + kind + ``s``, may add."""
+LINE_COLUMNS = {"natural_length", "ea", "g0", "r0", "reference", "distance", "law", "damping_time", "rupture_energy"}
+"""Numbers of a line that no parameter of a law may be called as, besides ``slackness`` and ``smoothing``."""
 SHIPPED = {kind: frozenset(entry.table) for kind, entry in KINDS.items()}
 """Names of what refweb ships, by kind."""
 RESERVED = {"effect": {"schema", "title", "seed", "web", "solve", *PARTS, *LISTS}, "integrator": {"auto"}}
@@ -350,7 +353,23 @@ def _entry(kind, name, value):
         raise InputError(f"{quote(_reference(value))} must be a class derived from {base.replace(':', '.')}")
     if not base and not (hasattr(value, "add_arguments") and hasattr(value, "run")):
         raise InputError(f"{quote(str(value))} must be a module with the functions add_arguments and run")
+    if kind == "law":
+        _check_law(name, value)
     return _method(name, value) if kind == "integrator" else value
+
+
+def _check_law(name, law):
+    """Give a class of laws the columns of its parameters; refuse another name of it, and of parameters."""
+    from .errors import InputError
+    from .messages import quote
+
+    if law.name != name:
+        raise InputError(f"name = {quote(law.name)} of the class must be the same name")
+    parameters = [f for f in getattr(law, "__dataclass_fields__", ())]
+    for parameter in parameters:
+        if parameter in LINE_COLUMNS:
+            raise InputError(f"the parameter {quote(parameter)} has a name of refweb's own, call it otherwise")
+    law.columns = (*law.columns, *(parameter for parameter in parameters if parameter not in law.columns))
 
 
 def _method(name, integrator):
@@ -452,7 +471,7 @@ def load_installed(*kinds):
     return messages
 
 
-FILES = {"web": ("path", "lines"), "body": ("file", "heights"), "fold": ("file",)}
+FILES = {"web": ("path", "lines"), "cable": ("stress", "tension"), "body": ("file", "heights"), "fold": ("file",)}
 """Keys of tables of a scene that are paths of files."""
 
 
@@ -462,6 +481,9 @@ def with_files(given, change, tables=tuple(FILES)):
     def placed(table, keys):
         if not isinstance(table, dict):
             return table
+        groups = table.get("groups")
+        if isinstance(groups, dict):
+            table = {**table, "groups": {name: placed(group, keys) for name, group in groups.items()}}
         return {k: change(value) if k in keys and isinstance(value, str) else value for k, value in table.items()}
 
     given, changed = with_fold(given), {}

@@ -59,3 +59,15 @@ def narrowed(typing, kind, record):
         return builder.bitcast(arguments[1], context.get_value_type(signature.return_type))
 
     return kind.dtype(kind, record), build
+
+
+@_intrinsic
+def number_at(typing, address, index):
+    """The number of an index in an array of numbers at an address, which Python keeps, in kernels."""
+
+    def build(context, builder, signature, arguments):
+        address, index = arguments
+        numbers = builder.inttoptr(address, context.get_value_type(types.float64).as_pointer())
+        return builder.load(builder.gep(numbers, [index]))
+
+    return types.float64(types.int64, types.int64), build

@@ -42,6 +42,8 @@ def _probes_of_warnings(system, followed, step_size):
     tell = [scale for _, scale in scales.values()]
     if not any(_tells_strain(system, scale) for scale in (*tell, *(p.data[:, 0] for p in followed if _of_tension(p)))):
         scales["strain"] = STRAIN, np.ones(len(net.cells))
+    if net.curve_scale is not None:
+        scales["curve"] = STRAIN, net.curve_scale
     by_name = {
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
         for name, (column, scale) in scales.items()
@@ -368,6 +370,12 @@ class Watch:
         cell = int(places[at])
         tension, line = values[[at]] / self.probes[at].data[cell, 0], net.line_data[[cell]]
         return float(net.law.strain_of(tension, line)[0]) if tension > 0.0 else 0.0, int(net.line[cell])
+
+    def share_of_curve(self, course):
+        """Largest strain over the last one of a curve in all steps [1], and its element; None without a curve."""
+        if (at := self._of_warning("curve")) is None:
+            return None
+        return float(course.extremes.values[at]), int(course.extremes.places[at])
 
     def overlap_of_lines(self, course):
         """(Deepest overlap of lines in all steps [m], its time [s], its cell), None where lines do not touch lines."""

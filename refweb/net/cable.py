@@ -11,7 +11,9 @@ from ..errors import InputError, refused_at
 from ..messages import quote
 from ..registry import LAWS
 from ..tables import LARGEST, Table, by_group, choice, integer, real, table
+from . import law_keys
 from .groups import givers
+from .law_keys import numbers_by_name, points
 from .materials import FILLED, MATERIALS
 from .tension_laws import law_of, strains_of
 
@@ -31,7 +33,7 @@ class Group(Table):
 
     Parameters
     ----------
-    law : {"smooth", "tension-only", "linear", "force-density", "constant-force"}, optional
+    law : {"smooth", "tension-only", "linear", "force-density", "constant-force", "table"}, optional
         Tension law; of the smooth one ε0 = 0 and η = 1e-5 where the cable has another and the group none of its own.
     material : str, optional
         As for `Cable`: modulus, density and strength of the group where it has none of its own.
@@ -48,6 +50,10 @@ class Group(Table):
         Natural length, see `Cable`; one of them takes the place of what the cable gives.
     force_density : float, optional
         Of the law "force-density" [N/m], not 0.
+    stress, tension : list of list of float or str, optional
+        Of the law "table", see `Cable`; one of them takes the place of what the cable gives.
+    parameters : dict of str to float, optional
+        Of a law of another package, see `Cable`; a number takes the place of that of the cable.
     strength : float, optional
         Stress at which a line breaks [Pa], > 0.
     safety_factor, knot_factor : float, optional
@@ -76,6 +82,9 @@ class Group(Table):
     pretension: float | None = real(default=None, unit="N")
     sag: float | None = real(default=None, at_least=0, at_most=DEEPEST, unit="1")
     force_density: float | None = real(default=None, unit="N/m")
+    stress: Any = points(unit="Pa")
+    tension: Any = points(unit="N")
+    parameters: dict | None = numbers_by_name()
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float | None = real(default=None, above=0, unit="1")
     knot_factor: float | None = real(default=None, above=0, at_most=1, unit="1")
@@ -96,7 +105,7 @@ class Cable(Table):
 
     Parameters
     ----------
-    law : {"smooth", "tension-only", "linear", "force-density", "constant-force"}
+    law : {"smooth", "tension-only", "linear", "force-density", "constant-force", "table"}
         Tension law, see `refweb.net.laws`. Groups may have others: struts beside cables. Lines that can push
         end the proven bound that statics has where all lines are tension-only. The last two are those of form finding,
         for statics: the tension of a line is ``force_density`` times its length, or ``pretension``, whatever its
@@ -106,7 +115,7 @@ class Cable(Table):
         which ``refweb help materials`` lists with their sources. A braid is softer and weaker than its fibre.
     modulus : float
         Asymptotic modulus E [Pa], > 0; of the laws of form finding that of the lines that `refweb.form` makes. It may
-        be left out beside a material.
+        be left out beside a material, and the law "table" has none.
     area : float
         Cross section A [m²], > 0.
     density : float
@@ -126,6 +135,16 @@ class Cable(Table):
         Of the law "force-density": tension over length of a line, or of its chord where it is in several elements
         [N/m], not 0; negative pushes. Where it is above 0 on all lines, beside lines of the law "tension-only", the
         equilibrium under dead loads is the only one and its errors are proven; where it is negative they are estimates.
+    stress : list of list of float or str, optional
+        Of the law "table": points of a measured curve, [[strain, stress in Pa], ...], or a CSV file with the columns
+        ``strain`` [1] and ``stress`` [Pa]. Both increase from a strain ≥ 0 and a stress of 0 on, and below lines are
+        slack. Between points the curve is smooth and rises (PCHIP); beyond the last point its last slope goes on, and
+        results that lie there get a warning. Its modulus is its largest slope.
+    tension : list of list of float or str, optional
+        The same as tension, [[strain, tension in N], ...], or a file with ``strain`` and ``tension`` [N]: of a rope
+        that is sold without a section, whose area then counts for mass and stress alone.
+    parameters : dict of str to float, optional
+        Numbers that a law of another package asks for, by name.
     strength : float, optional
         Stress at which a line breaks [Pa]; utilisation is reported against it.
     safety_factor : float
@@ -159,7 +178,7 @@ class Cable(Table):
         density = 200.0
     """
 
-    either = ("modulus", "density"), ("material",)
+    either = ("modulus", "density"), ("material",), ("stress", "density"), ("tension", "density")
 
     law: str = choice(LAWS, default="smooth")
     material: str | None = choice(*MATERIALS, default=None)
@@ -172,6 +191,9 @@ class Cable(Table):
     pretension: float | None = real(default=None, unit="N")
     sag: float | None = real(default=None, at_least=0, at_most=DEEPEST, unit="1")
     force_density: float | None = real(default=None, unit="N/m")
+    stress: Any = points(unit="Pa")
+    tension: Any = points(unit="N")
+    parameters: dict | None = numbers_by_name()
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float = real(default=1.0, above=0, unit="1")
     knot_factor: float = real(default=1.0, above=0, at_most=1, unit="1")
@@ -181,10 +203,14 @@ class Cable(Table):
 
     def check(self):
         """Fill in what the material gives and the smooth law's parameters; refuse what does not fit together."""
+        own_modulus = self.modulus
         _fill(self)
         _check_lengths(self)
+        law_keys.check(self, own_modulus)
+        tables = (self, *self.groups.values())
+        needs = any((table.law or self.law) != "table" and table.modulus is None for table in tables)
         for key, unit in (("modulus", "Pa"), ("density", "kg/m³")):
-            if getattr(self, key) is None:
+            if getattr(self, key) is None and (needs or key != "modulus"):
                 raise InputError(
                     f"{key} is missing: give {key} = ... [{unit}] or a material, see refweb help materials"
                 )
@@ -224,6 +250,11 @@ class Cable(Table):
         """
         values = self._values(web)
         _check_laws(values)
+        if "curve" in values:
+            lines = values["law"] == "table"
+            steepest = np.array([curve.steepest for curve in values["curve"][lines]])
+            by_tension = np.array([curve.unit == "N" for curve in values["curve"][lines]])
+            values["modulus"][lines] = steepest / np.where(by_tension, values["area"][lines], 1.0)
         values["natural_length"] = _natural_lengths(web, values)
         forming, area = _forming(values["law"]), values["area"]
         density, force = values.pop("force_density"), values.pop("pretension")
@@ -243,11 +274,12 @@ class Cable(Table):
         given, values = givers(web.groups, self.groups, len(web.lines), "[cable.groups]"), {}
         missing = {
             "strength": np.inf,
+            "modulus": np.nan,
             "slackness": 0.0,
             "smoothing": 0.0,
             **dict.fromkeys((*LENGTHS[1:], DENSITY), np.nan),
         }
-        for key in (f.name for f in fields(Group) if f.name != "material"):
+        for key in (f.name for f in fields(Group) if f.name not in ("material", "parameters", *law_keys.CURVES)):
             dtype = object if key == "law" else float
             values[key] = np.full(len(web.lines), _number(self, key, missing), dtype)
             for number, group in enumerate(self.groups.values()):
@@ -273,7 +305,9 @@ class Cable(Table):
                     f'"{law}"'
                 )
             values[key][plain] = 0.0
-        return values
+        if (values["law"] == "table").any() or any(key in given for key in law_keys.CURVES):
+            values["curve"] = law_keys.curves_of(self, values["law"], given)
+        return values | law_keys.parameters_of(self, values["law"], given)
 
 
 def _forming(laws):

@@ -52,6 +52,8 @@ class Net:
         Knot factor over safety factor: the share of the strength that is allowed; None where it is 1 of all.
     point_mass : ndarray, shape (nodes,), optional
         Part of ``mass`` that point masses have added [kg]; None where there are none.
+    kept : tuple of refweb.net.laws.curve.Curve
+        Curves whose addresses stand in ``line_data``: they live as long as the net.
     gradients : ndarray, shape (points, nodes per cell)
         dN/dξ on the reference element [0, 1].
     weights : ndarray, shape (points,)
@@ -99,6 +101,7 @@ class Net:
     end: float = math.inf
     allowed_share: np.ndarray | None = None
     point_mass: np.ndarray | None = None
+    kept: tuple = ()
 
     @property
     def allowed(self):
@@ -129,6 +132,14 @@ class Net:
     def forming(self):
         """True for each element with a law of form finding, shape (cells,)."""
         return self.law_is("forming")
+
+    @property
+    def curve_scale(self):
+        """Inverse of the last strain of the curve of each element [1], 0 without a curve; None where there is none."""
+        if "last_strain" not in self.line_data.dtype.names:
+            return None
+        last = self.line_data.last_strain
+        return np.where(last > 0.0, 1.0 / np.where(last > 0.0, last, 1.0), 0.0)
 
     def evaluated(self, which, strain):
         """A kernel of the laws by name, ``"stress"`` for one, at a strain of each element, or of each of its points."""

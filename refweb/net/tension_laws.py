@@ -103,7 +103,9 @@ def strains_of(values, tension):
     strain = np.zeros(len(tension))
     for name in dict.fromkeys(values["law"]):
         law, lines = law_of(name), (values["law"] == name) & (tension != 0.0)
-        if law.forming and lines.any():
+        if not lines.any():
+            continue
+        if law.forming:
             raise InputError(f'law = "{name}" is for form finding: give "tension-only", "linear" or "smooth"')
         for line in np.flatnonzero(lines & (tension < 0.0))[:1] if not law.bar else ():
             raise InputError(f'line {line} pushes with {-tension[line]:g} N, and law = "{name}" does not: use "linear"')

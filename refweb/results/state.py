@@ -196,6 +196,18 @@ def strain_remark(strain):
         )
 
 
+def curve_remark(net, share, element):
+    """Find a strain beyond the last point of the curve of an element, by the largest ``share`` of that strain."""
+    if share > 1.0:
+        last = net.line_data.last_strain[element]
+        yield Finding(
+            "beyond-curve",
+            f"line {net.line[element]} is strained by {100.0 * share * last:.4g} %, beyond the last point of its curve at "
+            f"{100.0 * last:.4g} %, where its last slope goes on: give the curve more points, or lower what acts on it",
+            "cable",
+        )
+
+
 def floor_remark(net, stress):
     """Find a floor of the smooth law above 1 % of the largest stress [Pa]."""
     for number in (number for number, law in enumerate(net.laws) if law.smoothed):

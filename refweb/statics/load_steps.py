@@ -148,7 +148,8 @@ def _by_patience(newton, t, x):
     try:
         return newton.solve(t, x, limit=PATIENCE)
     except NotFound as error:
-        data = newton.system.net.line_data
-        push = f"{(data.ea * data.g0).max():.3g} N"
+        net = newton.system.net
+        floors = [law.floor(net.line_data[net.law_index == number]).max() for number, law in enumerate(net.laws)]
+        push = f"{max(floors):.3g} N"
         text = f'{error}, or law = "tension-only": slack lines push with up to {push}'
         raise NotFound(text, error.stats) from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..findings import Finding
-from ..results.state import floor_remark, strain_remark
+from ..results.state import curve_remark, floor_remark, strain_remark
 from ..results.strength import strength_remark
 
 
@@ -125,6 +125,9 @@ def remarks_on(state, stats, utilisation, equilibrium):
     yield from strength_remark(utilisation)
     strain = np.where(net.forming, -np.inf, state.element_strain)
     yield from strain_remark((float(strain.max()), int(net.line[strain.argmax()])))
+    if (scale := net.curve_scale) is not None:
+        shares = state.element_strain * scale
+        yield from curve_remark(net, float(shares.max()), int(shares.argmax()))
     yield from collapse_remark(state)
 
 

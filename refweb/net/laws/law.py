@@ -222,6 +222,8 @@ def evaluate(scalar, strain, lines, columns=()):
         per_point = evaluate(scalar, strain.ravel(), lines[np.repeat(np.arange(len(lines)), strain.shape[1])], columns)
         return per_point.reshape(strain.shape)
     out = np.empty(len(strain))
+    if not len(out):
+        return out
     _over_lines(scalar, record_of(columns, lines.dtype))(strain, lines.matrix, out)
     return out
 

@@ -1,0 +1,245 @@
+"""A law by a curve of points: the curve itself, nets with one, and what is refused."""
+
+import numpy as np
+import pytest
+from nets import some, system
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import minimize
+
+import refweb
+from refweb.net.cable import Cable
+from refweb.net.laws.curve import Curve, Table
+from refweb.net.laws.law import evaluate
+from refweb.net.laws.line_data import LineData
+from refweb.statics.duality_bound import duality_bound
+from refweb.statics.equilibrium import Equilibrium
+from refweb.statics.newton import Newton
+
+NYLON = ((0.0, 0.0), (0.02, 1.1e7), (0.05, 4.1e7), (0.11, 2.0e8), (0.18, 5.1e8))
+"""A rope that is soft at first."""
+SOFTENING = ((0.01, 0.0), (0.013, 6e7), (0.02, 9e7), (0.2, 1.1e8))
+
+
+def lines(curve, count, axial=3.0):
+    """Numbers of lines with a curve."""
+    columns = Table.numbers({"curve": [curve] * count})
+    return LineData.of_law(np.full(count, axial), **columns)
+
+
+def values(curve, strain):
+    """Stress, tangent, curvature and energy of a curve at strains, over the largest slope."""
+    data = lines(curve, len(strain), 1.0)
+    kernels = (Table.stress, Table.tangent, Table.curvature, Table.energy_density)
+    return [evaluate(kernel, strain, data, Table.columns) for kernel in kernels]
+
+
+@pytest.mark.parametrize("points", [NYLON, SOFTENING])
+def test_the_curve_is_that_of_pchip_with_its_slopes_and_integral(points):
+    """Inside of the points, where scipy's slopes at the ends are above 0; 0 below, straight beyond."""
+    curve, (strain, stress) = Curve(points, "Pa"), np.array(points).T
+    scipy_curve = PchipInterpolator(strain, stress)
+    slopes = scipy_curve.derivative()(strain)
+    first, last = int(slopes[0] <= 0.0), len(strain) - 1 - int(slopes[-1] <= 0.0)
+    inside = np.linspace(strain[first], strain[last], 400)[1:-1]
+    inside = inside[np.abs(inside[:, None] - strain).min(axis=1) > 1e-9]  # curvature jumps at points
+    got = values(curve, inside)
+    for number, derivative in enumerate((scipy_curve, scipy_curve.derivative(), scipy_curve.derivative(2))):
+        expected = derivative(inside) / curve.steepest
+        np.testing.assert_allclose(got[number], expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())
+    whole = np.array([scipy_curve.integrate(strain[first], e) for e in inside]) / curve.steepest
+    begin = values(curve, strain[[first]])[3]
+    np.testing.assert_allclose(got[3] - begin, whole, rtol=1e-10, atol=1e-15)
+    below, beyond = np.array([-0.5, 0.0, strain[0]]), strain[-1] + np.array([0.0, 0.1, 3.0])
+    assert not values(curve, below)[0].any() and not values(curve, below)[3].any()
+    end = values(curve, beyond)
+    assert end[0][0] * curve.steepest == pytest.approx(stress[-1], rel=1e-14) and end[1][0] > 0.0
+    np.testing.assert_allclose(end[0], end[0][0] + end[1][0] * (beyond - strain[-1]), rtol=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_random_curves_rise_have_their_largest_slope_and_an_inverse(seed):
+    rng = np.random.default_rng(seed)
+    steps = 10.0 ** rng.uniform(-3.0, 0.0, (2, 7))
+    points = tuple(zip(np.append(0.0, steps[0].cumsum()), np.append(0.0, steps[1].cumsum()), strict=True))
+    curve, last = Curve(points, "Pa"), points[-1][0]
+    strain = np.unique(np.append(np.linspace(1e-6, 1.2, 4001) * last, [e for e, _ in points[1:]]))
+    stress, tangent, _, energy = values(curve, strain)
+    assert (tangent > 0.0).all() and (np.diff(stress) > 0.0).all()
+    assert tangent.max() <= 1.0 + 1e-12
+    assert values(curve, np.linspace(0.0, last, 20001))[1].max() == pytest.approx(1.0, abs=1e-4)
+    np.testing.assert_allclose(
+        [value for _, value in points], values(curve, np.array([e for e, _ in points]))[0] * curve.steepest, rtol=1e-13
+    )
+    middle, width = 0.5 * (strain[1:] + strain[:-1]), np.diff(strain)
+    by_simpson = (stress[1:] + stress[:-1] + 4.0 * values(curve, middle)[0]) * width / 6.0  # exact for cubics
+    np.testing.assert_allclose(np.diff(energy), by_simpson, rtol=1e-6, atol=1e-14 * energy[-1])
+    # The inverse is as good as its rounding over the tangent.
+    inverse = Table.strain_of(3.0 * stress, lines(curve, len(strain)))
+    assert (np.abs(inverse - strain) <= 8.0 * np.finfo(float).eps * (strain + stress / tangent)).all()
+
+
+def cable(points=NYLON, **keys):
+    return Cable(law="table", stress=points, area=1e-4, density=300.0, **keys)
+
+
+def solved(web_cable, web=None, force=(0.3, -0.2, 2.0), **keys):
+    """A square web under a force at its centre."""
+    web = web or refweb.Window(mesh="square", rows=4, columns=4, side=0.2)
+    return refweb.run(refweb.Scene(web=web, cable=web_cable, effects=[refweb.Load(node="centre", force=force)], **keys))
+
+
+@pytest.mark.parametrize("key", ["stress", "tension"])
+def test_a_straight_table_is_the_law_of_tension_alone(key):
+    """To rounding, with the number of steps and the proven errors that it has."""
+    scale = 1.0 if key == "stress" else 1e-4
+    points = [[0.0, 0.0], [0.003, scale * 2.1e5], [0.1, scale * 7e6]]
+    curved = solved(Cable(law="table", area=1e-4, density=300.0, **{key: points}))
+    straight = solved(Cable(law="tension-only", modulus=7e7, area=1e-4, density=300.0))
+    assert curved.solver["nlu"] == straight.solver["nlu"]
+    np.testing.assert_allclose(curved.tension, straight.tension, rtol=0.0, atol=1e-13 * straight.tension.max())
+    for name, result in straight.results.items():
+        assert curved.results[name].value == pytest.approx(result.value, rel=1e-13)
+        assert curved.results[name].error == pytest.approx(result.error, rel=0.1)  # of rounding
+
+
+def test_points_of_the_smooth_law_give_its_results_with_the_order_of_pchip():
+    """Slopes by harmonic means of equal chords are of order 2, and so the curve between them is of order 3."""
+    smooth = refweb.Law("smooth")
+    parameters = dict(modulus=7e7, slackness=2e-3, smoothing=2e-3)
+    keys = dict(area=1e-4, density=300.0, prestrain=4e-3)
+    exact, errors = solved(Cable(law="smooth", **parameters, **keys)).tension, []
+    counts = (20, 40, 80, 160)
+    for count in counts:
+        strain = np.linspace(0.0, 0.02, count + 1)
+        points = np.column_stack([strain, smooth.stress(strain, *parameters.values())])
+        errors.append(np.abs(solved(Cable(law="table", stress=points, **keys)).tension - exact).max())
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(3.0, abs=0.3)
+
+
+class Program:
+    """The potential of a net with a curve for each line, by scipy's PCHIP: convex, its least value is the equilibrium.
+
+    Parameters
+    ----------
+    points, pairs, natural : ndarray
+        Nodes [m], ends of lines, natural lengths [m].
+    curves : list of tuple of ndarray
+        Strains and tensions [N] of each line.
+    load : ndarray
+        Forces on nodes [N].
+    free : ndarray of int
+        Free nodes.
+    """
+
+    def __init__(self, points, pairs, natural, curves, load, free):
+        self.points, self.pairs, self.natural, self.load, self.free = points, pairs, natural, load, free
+        self.laws = []
+        for strain, tension in curves:
+            curve = PchipInterpolator(strain, tension)
+            self.laws.append((strain, tension, curve, curve.derivative(), curve.antiderivative()))
+
+    def law(self, line, e):
+        """Tension, its slope, and energy per natural length of a line at a strain."""
+        strain, tension, curve, slope, energy = self.laws[line]
+        if e <= strain[0]:
+            return 0.0, 0.0, 0.0
+        inside, last = min(e, strain[-1]), float(slope(strain[-1]))
+        more = e - inside
+        value = float(curve(inside)) + last * more
+        return value, float(slope(inside)), float(energy(inside)) + more * (tension[-1] + 0.5 * last * more)
+
+    def lines(self, u):
+        """Vectors, lengths and laws of all lines at displacements of the free nodes."""
+        x = self.points.copy()
+        x[self.free] += u.reshape(-1, 3)
+        vector = x[self.pairs[:, 1]] - x[self.pairs[:, 0]]
+        length = np.linalg.norm(vector, axis=1)
+        return vector, length, np.array([self.law(i, e) for i, e in enumerate(length / self.natural - 1.0)])
+
+    def potential(self, u):
+        _, _, laws = self.lines(u)
+        return (self.natural * laws[:, 2]).sum() - (self.load[self.free] * u.reshape(-1, 3)).sum()
+
+    def gradient(self, u):
+        vector, length, laws = self.lines(u)
+        force, pull = -self.load, (laws[:, 0] / length)[:, None] * vector
+        force = force.copy()
+        np.add.at(force, self.pairs[:, 1], pull)
+        np.add.at(force, self.pairs[:, 0], -pull)
+        return force[self.free].ravel()
+
+    def hessian(self, u):
+        vector, length, laws = self.lines(u)
+        whole = np.zeros((len(self.points), 3, len(self.points), 3))
+        for (i, j), d, size, natural, (pull, slope, _) in zip(
+            self.pairs, vector, length, self.natural, laws, strict=True
+        ):
+            along = np.outer(d, d) / size**2
+            block = slope / natural * along + pull / size * (np.eye(3) - along)
+            for a, b, sign in ((i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)):
+                whole[a, :, b] += sign * block
+        return whole[self.free][:, :, self.free].reshape(3 * len(self.free), -1)
+
+    def tensions(self, start):
+        """Tensions at the least potential [N]: of each line, and how near they are known."""
+        found = minimize(
+            self.potential,
+            start,
+            jac=self.gradient,
+            hess=self.hessian,
+            method="trust-exact",
+            options={"gtol": 1e-11 * np.abs(self.load).max(), "maxiter": 2000},
+        )
+        return self.lines(found.x)[2][:, 0], np.abs(self.gradient(found.x)).max()
+
+
+def rising(rng):
+    """Points of a random curve whose slopes at the ends are above 0 by PCHIP."""
+    while True:
+        steps = 10.0 ** rng.uniform(-1.0, 0.0, (2, rng.integers(2, 6)))
+        strain, tension = np.append(0.0, steps[0].cumsum()), np.append(0.0, steps[1].cumsum())
+        strain = 0.01 * rng.integers(0, 2) * rng.random() + 0.2 * strain / strain[-1]
+        slope = PchipInterpolator(strain, tension).derivative()(strain)
+        if slope.min() > 1e-3 * slope.max():
+            return strain, 50.0 * tension
+
+
+@pytest.mark.parametrize("seed", some(range(50), 5))
+def test_proven_bounds_contain_the_tensions_of_a_convex_program(seed):
+    """Random nets with a curve for each line, of states near and far from the equilibrium."""
+    rng = np.random.default_rng(seed)
+    held, free = 4, int(rng.integers(2, 6))
+    points = np.vstack([[[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0.5]], rng.uniform(0.3, 1.7, (free, 3)) * (1, 1, 0.3)])
+    pairs = [[i, held + int(rng.integers(free))] for i in range(held)]
+    pairs += [[held + i, held + i + 1] for i in range(free - 1)]
+    pairs += [[int(rng.integers(held)), held + i] for i in range(free)]
+    pairs = np.array([list(pair) for pair in dict.fromkeys(map(tuple, pairs))])
+    distance = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
+    natural = distance / (1.0 + rng.uniform(-0.05, 0.1, len(pairs)))
+    load = np.zeros(points.shape)
+    load[held:] = rng.normal(size=(free, 3))
+    curves = [rising(rng) for _ in pairs]
+    names = tuple(f"line{i}" for i in range(len(pairs)))
+    web = refweb.Web(points=points, lines=pairs, natural_length=natural, rim=np.arange(held), groups=names)
+    groups = {name: {"tension": np.column_stack(curve).tolist()} for name, curve in zip(names, curves, strict=True)}
+    loads = [refweb.Load(node=held + i, force=tuple(load[held + i])) for i in range(free)]
+    net_system = system(web, Cable(law="table", tension=NYLON, area=1e-4, density=300.0, groups=groups), loads)
+    state = Newton(net_system).solve(1.0, np.zeros(points.shape))
+    truth, off = Program(points, pairs, natural, curves, load, np.arange(held, held + free)).tensions(
+        state.x[held:].ravel() + 1e-3 * rng.normal(size=3 * free)
+    )
+    assert off < 1e-6
+    bound = duality_bound(net_system, state)
+    scale = truth.max()
+    # Its gradient of 1e-6 N leaves tensions of soft parts unknown by no more than 1e-5 of the largest.
+    assert (np.abs(state.tension - truth) <= bound.tension + 1e-5 * scale).all()
+    assert bound.tension.max() < 1e-4 * scale
+    for far in (1e-3, 1e-2):
+        x = state.x.copy()
+        x[held:] += far * rng.normal(size=(free, 3))
+        force, per_cell = net_system.forces(1.0, x)
+        moved = Equilibrium(1.0, x, per_cell.tension.copy(), force, {})
+        bound = duality_bound(net_system, moved)
+        assert (np.abs(moved.tension - truth) <= bound.tension + 1e-5 * scale).all()
+        energies = [net_system.energy_of(net_system.lines, 1.0, y).sum() for y in (x, state.x)]
+        assert abs(energies[0] - energies[1]) <= bound.strain_energy
