@@ -90,9 +90,10 @@ class Group(Table):
     knot_factor: float | None = real(default=None, above=0, at_most=1, unit="1")
 
     def check(self):
-        """Fill in what the material gives; refuse two keys of natural length, and a force density that is none."""
+        """Fill in what the material gives; refuse two keys of one thing, and a force density that is none."""
         _fill(self)
         _check_lengths(self)
+        law_keys.curve_key(self)
 
     def filled(self):
         """The group with the smooth law's parameters where it has none."""

@@ -69,7 +69,7 @@ def columns_of(path, names):
     """Numbers in the columns of some names of a file, which has no others, shape (rows, names)."""
     problems = Problems()
     columns = _table(path, dict.fromkeys(names, True), None, problems)
-    for name in columns.others:
+    for name in columns.others if all(name in columns.columns for name in names) else ():
         problems.add(f"{path.name}: column {quote(name)} is unknown, {nearest(name, names)}")
     values = [columns.numbers(key, problems) for key in names]
     problems.refuse()

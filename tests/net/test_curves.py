@@ -2,11 +2,16 @@
 
 import numpy as np
 import pytest
-from nets import some, system
+from nets import skew_web, some, system
+from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import minimize
+from test_contract import check_term, largest_frequency, state
 
 import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.effects.elasticity import Elasticity
+from refweb.net import discretisation
 from refweb.net.cable import Cable
 from refweb.net.laws.curve import Curve, Table
 from refweb.net.laws.law import evaluate
@@ -14,6 +19,7 @@ from refweb.net.laws.line_data import LineData
 from refweb.statics.duality_bound import duality_bound
 from refweb.statics.equilibrium import Equilibrium
 from refweb.statics.newton import Newton
+from refweb.system.system import System
 
 NYLON = ((0.0, 0.0), (0.02, 1.1e7), (0.05, 4.1e7), (0.11, 2.0e8), (0.18, 5.1e8))
 """A rope that is soft at first."""
@@ -66,7 +72,10 @@ def test_random_curves_rise_have_their_largest_slope_and_an_inverse(seed):
     stress, tangent, _, energy = values(curve, strain)
     assert (tangent > 0.0).all() and (np.diff(stress) > 0.0).all()
     assert tangent.max() <= 1.0 + 1e-12
-    assert values(curve, np.linspace(0.0, last, 20001))[1].max() == pytest.approx(1.0, abs=1e-4)
+    dense = np.concatenate(
+        [np.linspace(e, after, 2000) for (e, _), (after, _) in zip(points, points[1:], strict=False)]
+    )
+    assert values(curve, dense)[1].max() == pytest.approx(1.0, abs=1e-5)
     np.testing.assert_allclose(
         [value for _, value in points], values(curve, np.array([e for e, _ in points]))[0] * curve.steepest, rtol=1e-13
     )
@@ -243,3 +252,159 @@ def test_proven_bounds_contain_the_tensions_of_a_convex_program(seed):
         assert (np.abs(moved.tension - truth) <= bound.tension + 1e-5 * scale).all()
         energies = [net_system.energy_of(net_system.lines, 1.0, y).sum() for y in (x, state.x)]
         assert abs(energies[0] - energies[1]) <= bound.strain_energy
+
+
+GROUPS = {
+    "one curve": {},
+    "a curve for each group": dict(edge=dict(stress=SOFTENING), tie=dict(tension=[[0.0, 0.0], [1.0, 40.0]])),
+    "beside other laws": dict(
+        edge=dict(law="smooth", modulus=2e8, smoothing=1e-2), tie=dict(law="linear", modulus=1e8)
+    ),
+}
+
+
+@pytest.mark.parametrize("groups", GROUPS)
+@pytest.mark.parametrize("seed", range(2))
+def test_it_keeps_what_every_law_keeps(groups, seed):
+    """Force as gradient, tangents of elasticity and damping by Taylor, as `tests/test_contract.py` asks; the bound."""
+    made = discretisation.build(skew_web(), cable(groups=GROUPS[groups]))
+    free = np.zeros((6, 3), dtype=bool)
+    for effect in (Elasticity(), refweb.Damping(time=0.02)):
+        one = System(made, [effect], free)
+        check_term(one.net, one, one.terms[0], seed)
+    one = System(made, [Elasticity()], free)
+    x = state(made, seed)[0]
+    limit = CentralDifference(one).bound(x, reach=0.0)
+    assert limit <= 2.0 / np.sqrt(largest_frequency(one, x)) * (1.0 + 1e-12)
+
+
+def on_a_rope(method, **keys):
+    """A mass on a rope, let go at a tenth of its length above the point where the rope is as long as it is."""
+    web = refweb.Inline(points=[[0, 0, 0], [0, 0, -1.0]], lines=[[0, 1]], supports=[0])
+    effects = [refweb.Gravity(acceleration=(0, 0, -9.81)), refweb.PointMass(node=1, mass=80.0)]
+    observe = [refweb.Observe(name="place", quantity="displacement", node=1, component="z", reduce="final")]
+    observe += [refweb.Observe(name="tension", quantity="tension", reduce="max")]
+    return refweb.run(
+        refweb.Scene(
+            web=web,
+            cable=cable(NYLON[:3]) if keys.pop("short", False) else cable(),
+            effects=[*effects, refweb.Velocity(node=1, value=(0.0, 0.0, -2.0))],
+            observe=observe,
+            solve=refweb.Dynamic(duration=0.4, method=method, **keys),
+            output=refweb.Output(interval=0.02),
+        )
+    )
+
+
+@pytest.fixture(scope="module")
+def fall():
+    """Displacement at 0.4 s [m] and largest tension [N] of the mass on the rope, by scipy."""
+    curve, slack = PchipInterpolator(*np.array(NYLON).T), NYLON[0][0]
+    mass = 80.0 + 0.5 * 300.0 * 1e-4
+
+    def motion(t, y):
+        pull = 1e-4 * float(curve(-y[0])) if -y[0] > slack else 0.0
+        return [y[1], pull / mass - 9.81]
+
+    def lowest(t, y):
+        return y[1]
+
+    path = solve_ivp(
+        motion, (0.0, 0.4), [0.0, -2.0], method="DOP853", rtol=1e-10, atol=1e-12, max_step=1e-3, events=lowest
+    )
+    longest = -path.y_events[0][0, 0]
+    assert longest < NYLON[-1][0]
+    return path.y[0, -1], 1e-4 * float(curve(longest))
+
+
+@pytest.mark.parametrize("method", ["central-difference", "cvode"])
+def test_in_dynamics(method, fall):
+    """What scipy finds is within ±; what the rope stores is what gravity and the mass have lost."""
+    solution = on_a_rope(method, **{"safety": 0.05} if method == "central-difference" else {})
+    for name, exact in zip(("place", "tension"), fall, strict=True):
+        result = solution.results[name]
+        assert abs(result.value - exact) <= result.error + 1e-9 * abs(exact) and result.error < 2e-2 * abs(exact)
+    assert solution.solver["energy_drift"] < 1e-4
+    assert not any(finding.code == "beyond-curve" for finding in solution.findings)
+
+
+def test_a_result_beyond_the_last_point_gets_a_warning():
+    found = [
+        finding.text for finding in on_a_rope("central-difference", short=True).findings if "curve" in finding.code
+    ]
+    assert len(found) == 1 and "beyond the last point of its curve at 5 %" in found[0]
+    far = solved(cable(NYLON[:2]), force=(0.0, 0.0, 3000.0))
+    (text,) = [finding.text for finding in far.findings if finding.code == "beyond-curve"]
+    assert f"strained by {100.0 * far.strain.max():.4g} %, beyond the last point of its curve at 2 %" in text
+
+
+def test_pretension_and_sag_are_those_of_the_curve():
+    """The natural length is such that the curve has the tension; strains of a curve on which nothing lies are none."""
+    tense = solved(cable(pretension=1500.0), force=(0.0, 0.0, 0.0))
+    np.testing.assert_allclose(tense.tension, 1500.0, rtol=1e-12)
+    strain = Table.strain_of(np.array([1500.0]), lines(Curve(NYLON, "Pa"), 1, 1e-4 * Curve(NYLON, "Pa").steepest))
+    np.testing.assert_allclose(tense.strain, strain[0], rtol=1e-10)
+    assert 1e-4 * float(PchipInterpolator(*np.array(NYLON).T)(strain[0])) == pytest.approx(1500.0, rel=1e-12)
+
+
+def test_a_curve_of_a_file_and_back(tmp_path):
+    """The columns by name, in any order; the scene that is written has the path of the file."""
+    (tmp_path / "rope.csv").write_text("Tension,strain\n0,0\n1100,0.02\n4100,0.05\n")
+    tables = {
+        "web": {"kind": "window", "mesh": "square", "rows": 4, "columns": 4, "side": 0.2},
+        "cable": {"law": "table", "tension": "rope.csv", "area": 1e-4, "density": 300.0},
+        "load": [{"node": "centre", "force": [0.3, -0.2, 2.0]}],
+        "solve": {"kind": "static"},
+    }
+    tables["cable"]["groups"] = {"rim": {"tension": "rope.csv"}}
+    scene = refweb.Scene.from_dict(tables, tmp_path)
+    assert scene.to_dict()["cable"]["groups"]["rim"]["tension"] == str(tmp_path / "rope.csv")
+    listed = solved(Cable(law="table", area=1e-4, density=300.0, tension=[[0, 0], [0.02, 1100], [0.05, 4100]]))
+    np.testing.assert_array_equal(refweb.run(scene).tension, listed.tension)
+    np.testing.assert_array_equal(refweb.run(refweb.Scene.from_dict(scene.to_dict())).tension, listed.tension)
+    (tmp_path / "rope.csv").write_text("strain,load\n0,0\n0.02,1100\n")
+    with pytest.raises(
+        refweb.InputError,
+        match=r"tension = .*: rope.csv: column \"load\" is unknown, .*; rope.csv: column tension is missing",
+    ):
+        scene.build()
+
+
+REFUSED = {
+    r"must rise, but does not from point 2 \(0.05, 4.1e\+07 Pa\) to point 3 \(0.11, 4e\+07 Pa\)": dict(
+        stress=(*NYLON[:3], (0.11, 4e7))
+    ),
+    r"must rise, but does not from point 1 \(0.02, 1.1e\+07 Pa\) to point 2 \(0.02": dict(
+        stress=(*NYLON[:2], (0.02, 4e7))
+    ),
+    r"the first point is \(0.02, 1.1e\+07 Pa\), must have a strain ≥ 0 and a stress of 0": dict(stress=NYLON[1:]),
+    r"the first point is \(-0.01, 0 N\)": dict(tension=[[-0.01, 0.0], [0.1, 5.0]]),
+    "stress has 1 point, a curve has two or more": dict(stress=[[0.0, 0.0]]),
+    r"stress\[0\] = \[1.0\] must be a row of 2 numbers": dict(stress=[[1.0]]),
+    "stress and tension both give the curve": dict(stress=NYLON, tension=NYLON),
+    r'law = "table" needs stress = \[\[strain, Pa\], ...\]': {},
+    'stress has no meaning with law = "linear"': dict(law="linear", modulus=1e7, stress=NYLON),
+    'modulus = 1e\\+07 has no meaning with law = "table"': dict(modulus=1e7, stress=NYLON),
+    'smoothing = 0.01 has no meaning with law = "table"': dict(smoothing=0.01, stress=NYLON),
+    "modulus is missing": dict(stress=NYLON, groups=dict(rim=dict(law="linear"))),
+    "groups.rim:? stress and tension both": dict(stress=NYLON, groups=dict(rim=dict(stress=NYLON, tension=NYLON))),
+    'groups.rim: stress has no meaning with law = "linear"': dict(
+        stress=NYLON, groups=dict(rim=dict(law="linear", modulus=1e7, stress=NYLON))
+    ),
+    'parameters: exponent has no meaning with law = "table"': dict(stress=NYLON, parameters=dict(exponent=2.0)),
+    "there is no file": dict(stress="nowhere.csv"),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_is_refused(message):
+    keys = {"law": "table", "area": 1e-4, "density": 300.0, **REFUSED[message]}
+    with pytest.raises(refweb.InputError, match=message):
+        solved(Cable(**keys))
+
+
+def test_a_material_gives_density_and_strength_alone():
+    rope = Cable(law="table", stress=NYLON, area=1e-4, material="nylon", groups=dict(rim=dict(material="polyester")))
+    assert rope.modulus is None and rope.groups["rim"].modulus is None
+    assert rope.density == 1140.0 and rope.groups["rim"].strength == 1.12e9
+    assert Cable(**rope.to_dict()) == rope
