@@ -4,8 +4,9 @@ A line is a name and the ``"module:name"`` that brings it, or the ``"module"`` t
 called for and not before. Scene files, checks, messages and help know all that is in a table.
 
 Other packages, scripts and notebooks add to the tables of `KINDS` by `register`. An installed package does so by an
-entry point of the groups ``refweb.effects``, ``refweb.shapes``, ``refweb.observables``, ``refweb.integrators`` and
-``refweb.verbs``. Entry points are read when a scene, or the command line, names what no table has, and for help.
+entry point of the groups ``refweb.effects``, ``refweb.shapes``, ``refweb.laws``, ``refweb.observables``,
+``refweb.integrators`` and ``refweb.verbs``. Entry points are read when a scene, or the command line, names what no
+table has, and for help.
 """
 
 from __future__ import annotations
@@ -291,15 +292,15 @@ PACKAGES: dict[str, str] = {}
 
 
 def register(kind: str, name: str, value: Any = None) -> Any:
-    """Make an effect, a shape, an observable, an integrator or a verb known to scenes, checks, messages and help.
+    """Make an addition of a kind known to scenes, checks, messages and help.
 
     Parameters
     ----------
-    kind : {"effect", "shape", "observable", "integrator", "verb"}
+    kind : {"effect", "shape", "law", "observable", "integrator", "verb"}
         Kind of the addition.
     name : str
-        Its name in scenes: of the table of an effect, and of a value of ``shape``, ``quantity`` or ``method``; or on
-        the command line. A class that had the name by `register` is replaced.
+        Its name in scenes: of the table of an effect, and of a value of ``shape``, ``law``, ``quantity`` or ``method``;
+        or on the command line. A class that had the name by `register` is replaced.
     value : class or module, optional
         The class; of a verb a module, or what else has ``add_arguments`` and ``run``. Without it, `register` is a
         decorator.
@@ -317,7 +318,8 @@ def register(kind: str, name: str, value: Any = None) -> Any:
     Notes
     -----
     Names of effects are small letters, digits and ``_``, others may have ``-``. An integrator has ``keys``, those of
-    ``[solve]`` that it takes, the one that trades accuracy for time first, and its ``method`` is its name.
+    ``[solve]`` that it takes, the one that trades accuracy for time first, and its ``method`` is its name. Fields of a
+    law are the ``parameters`` of ``[cable]`` that it takes, and its ``name`` is its name.
 
     Workers of a study are processes of their own, which do not know what a script has registered: an installed package
     with an entry point is known to them.

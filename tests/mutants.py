@@ -43,6 +43,9 @@ MIRRORS = {
     "statics/bars": "studies/test_form.py statics/test_statics.py",
     "system/weak_form": "net/test_elements.py",
     "net/laws": "net/test_laws.py net/test_elements.py",
+    "net/laws/curve": "net/test_curves.py",
+    "net/laws/law": "how_to/test_law.py",
+    "net/law_keys": "net/test_curves.py how_to/test_law.py",
     "net/rigid_body": "effects/test_contact.py test_contract.py effects/test_tumbling.py",
     "net/rotation": "net/test_rotation.py effects/test_tumbling.py effects/test_axles.py",
     "effects/axle": "effects/test_axles.py",
@@ -265,7 +268,7 @@ MUTANTS = [
     Mutant("net/cable", "web.natural_length / (1.0 + strain)", "web.natural_length * (1.0 - strain)"),
     Mutant("net/cable", 'density * values["natural_length"], force)', "density, force)"),
     Mutant("net/sag", "return np.sinh(u) / u", "return np.sinh(u) / u + u * u"),
-    Mutant("statics/bars", "np.where(forming, 0.0, self.natural)", "self.natural"),
+    Mutant("statics/bars", "np.where(forming, 0.0, self.natural * (1.0 + slackness))", "self.natural"),
     Mutant(
         "studies/form",
         "lengths, before = np.where(net.forming, natural, web.natural_length), change",
@@ -282,6 +285,12 @@ MUTANTS = [
         "return lines.ea * (2.0 * smoothing * smoothing / (total",
         "return lines.ea * (smoothing * smoothing / (total",
     ),
+    Mutant("net/laws/curve", "slope[end] = 0.5 * chord[end]", "pass"),
+    Mutant("net/laws/curve", "h * (c[2] / 3.0 + h * c[3] / 4.0)", "h * (c[2] / 3.0 + h * c[3] / 3.0)"),
+    Mutant("net/laws/curve", "self.steepest = float(max(slope.max(), inner", "self.steepest = float(max(0.0, inner"),
+    Mutant("net/laws/law", "if line.law == number:", "if line.law != number:"),
+    Mutant("net/laws/law", "return np.where(endless, np.inf, high)", "return high"),
+    Mutant("net/law_keys", 'object.__setattr__(table, "modulus", None)', "pass"),
     Mutant("effects/elasticity", "d * (along - across) * p[i] * p[j]", "d * along * p[i] * p[j]"),
     Mutant("effects/elasticity", "pulled = (1.0 + e) * stress", "pulled = stress"),
     Mutant(
@@ -445,10 +454,12 @@ MUTANTS = [
     # Statics and its bounds
     Mutant(
         "statics/duality_bound",
-        "2.0 * np.sqrt(strain_energy * gap) + gap",
-        "0.5 * (2.0 * np.sqrt(strain_energy * gap) + gap)",
+        "2.0 * np.sqrt(straight * gap) + gap",
+        "0.5 * (2.0 * np.sqrt(straight * gap) + gap)",
     ),
     Mutant("statics/duality_bound", "_gaps(bars, force, size).sum() + rounding)", "_gaps(bars, force, size).sum())"),
+    Mutant("statics/duality_bound", "* bars.natural[curved] * far - apart[curved]", "* bars.natural[curved] * 0.0"),
+    Mutant("statics/duality_bound", "np.maximum(energies[0] - energies[1], energies[2] - energies[0])", "0.0 * error"),
     Mutant("statics/duality_bound", "np.sqrt(2.0 * bars.stiffness * gap)", "np.sqrt(bars.stiffness * gap)"),
     Mutant(
         "statics/duality_bound", "np.where(bars.tension > 0.0, 0.0, bars.unstressed - bars.length)", "0.0 * bars.length"
@@ -582,8 +593,8 @@ MUTANTS = [
     ),
     Mutant(
         "results/observables/line",
-        "return tension / net.line_data.ea",
-        "return tension / net.line_data.ea / 2.0",
+        "return proven.strain",
+        "return proven.strain / 2.0",
     ),
     Mutant("results/observables/observable", "changes[0] + 3.0 * max(changes[1:])", "changes[0]"),
     Mutant("results/state", "self.element_strain <= self.system.net.slackness", "self.element_strain <= 0.0"),

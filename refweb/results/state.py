@@ -203,7 +203,7 @@ def curve_remark(net, share, element):
         yield Finding(
             "beyond-curve",
             f"line {net.line[element]} is strained by {100.0 * share * last:.4g} %, beyond the last point of its curve "
-            f"at {100.0 * last:.4g} %, where its last slope goes on: give the curve more points, or lower what acts on it",
+            f"at {100.0 * last:.4g} %, where its last slope goes on: give the curve more points, or lower what acts",
             "cable",
         )
 

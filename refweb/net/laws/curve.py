@@ -215,5 +215,5 @@ class Table(TensionLaw):
 
     @classmethod
     def strain_of(cls, tension, lines):
-        """By the inverse of the cubic of its interval."""
+        """Invert the cubic of the interval of each tension."""
         return evaluate(cls.inverse, tension / lines.ea, lines, cls.columns)
