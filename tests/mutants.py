@@ -112,6 +112,8 @@ MIRRORS = {
     "statics/slowest_vibrations": "statics/test_stability.py",
     "statics/snap_through": "statics/test_stability.py",
     "statics/simulation": "statics/test_statics.py results/test_frames.py",
+    "statics/duality_bound": "net/test_curves.py statics/test_reused_factorization.py statics/test_statics.py "
+    "dynamics/test_accuracy.py",
     "statics": "statics/test_reused_factorization.py statics/test_statics.py dynamics/test_accuracy.py",
     "dynamics/accuracy_loop": "dynamics/test_budget.py test_faults.py dynamics/test_accuracy.py",
     "dynamics/budget": "dynamics/test_budget.py",

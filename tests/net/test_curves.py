@@ -5,7 +5,7 @@ import pytest
 from nets import skew_web, some, system
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
-from scipy.optimize import minimize
+from scipy.optimize import brentq, minimize
 from test_contract import check_term, largest_frequency, state
 
 import refweb
@@ -408,3 +408,32 @@ def test_a_material_gives_density_and_strength_alone():
     assert rope.modulus is None and rope.groups["rim"].modulus is None
     assert rope.density == 1140.0 and rope.groups["rim"].strength == 1.12e9
     assert Cable(**rope.to_dict()) == rope
+
+
+@pytest.mark.parametrize("far", [1e-6, 1e-4, 1e-3, 1e-2, -1e-3, -1e-2])
+def test_bounds_along_a_line_are_near_to_what_they_bound(far):
+    """A node on a line between two supports, off its place: no line turns, and the gap is that along the lines.
+
+    Its parts are at most twice the energies by which lines with a tangent as steep as this one's differ.
+    """
+    points, natural = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]], dtype=float), np.array([0.98, 0.95])
+    pairs, load = np.array([[0, 1], [1, 2]]), np.array([[0, 0, 0], [500.0, 0, 0], [0, 0, 0]])
+    web = refweb.Web(points=points, lines=pairs, natural_length=natural, rim=np.array([0, 2]), groups=("a", "b"))
+    inner = SOFTENING[:3] + ((0.2, 3e8),)  # PCHIP's slopes at its ends are above 0
+    rest = system(web, cable(groups={"b": {"stress": inner}}), [refweb.Load(node=1, force=tuple(load[1]))])
+    curves = [np.array(curve).T * [[1.0], [1e-4]] for curve in (NYLON, inner)]
+    program, straight = Program(points, pairs, natural, curves, load, np.array([1])), np.array([1.0, 0.0, 0.0])
+    place = brentq(lambda u: program.gradient(u * straight)[0], -0.02, 0.05, xtol=1e-16)
+    x = np.zeros((3, 3))
+    x[1, 0] = place + far
+    force, per_cell = rest.forces(1.0, x)
+    bound = duality_bound(rest, Equilibrium(1.0, x, per_cell.tension.copy(), force, {}))
+    (_, _, here), (_, _, truth) = (program.lines(u * straight) for u in (place + far, place))
+    assert (np.abs(here[:, 0] - truth[:, 0]) <= bound.tension).all()
+    assert abs(far) <= (bound.strain * natural).min() * (1.0 + 1e-6) or here[:, 0].min() == 0.0
+    above = program.potential((place + far) * straight) - program.potential(place * straight)
+    stored = (natural * (here - truth)[:, 2]).sum()
+    rounding = 1e-14 * (natural * here[:, 2]).sum()
+    assert above <= bound.gap + rounding and abs(stored) <= bound.strain_energy + rounding
+    if abs(far) <= 1e-4:
+        assert bound.gap <= 4.0 * above
