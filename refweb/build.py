@@ -15,7 +15,6 @@ from .effects.elasticity import Elasticity
 from .errors import InputError, refused_at
 from .messages import nearest, quote
 from .net import discretisation
-from .net.tension_laws import CONSTANT_FORCE, NAMES
 from .net.web import Web
 from .registry import EFFECTS, INTEGRATORS, load, name_of
 from .results.columns import taken
@@ -149,13 +148,13 @@ def _check_history(solve, output, observables):
 def _check_forming(net, solve):
     """Refuse laws of form finding for what is no form finding."""
     for element in np.flatnonzero(net.forming)[:1]:
-        law = f'[cable] law = "{list(NAMES)[net.laws[element]]}"'
+        law = f'[cable] law = "{net.laws[net.law_index[element]].name}"'
         if solve.kind != "static":
             raise InputError(
                 f'{law} is for form finding, [solve] kind = "static": run what refweb.form makes of that, which has '
                 "elastic lines"
             )
-        if solve.method == "relaxation" and (net.laws == CONSTANT_FORCE).any():
+        if solve.method == "relaxation" and any(law.name == "constant-force" for law in net.laws):
             law = 'law = "constant-force"'
             raise InputError(
                 f'[solve] method = "relaxation" must be "newton" with {law}: no step is short enough for it'

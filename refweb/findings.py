@@ -8,6 +8,7 @@ NOTE, WARNING, REFUSAL = "note", "warning", "refusal"
 """Severities: what a run has done by itself, what limits its results, and why it has none."""
 CODES = {
     "balance-drift": "Energy or momentum does not follow from what acts.",
+    "beyond-curve": "A strain beyond the last point of the curve of a law.",
     "body-not-felt": "A body and no contact: the web does not feel it.",
     "breaks-in-doubt": "Breaks within ± of each other, or in another order in the step-refinement run.",
     "chaotic": "Differences grow exponentially within the run.",

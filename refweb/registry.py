@@ -4,8 +4,9 @@ A line is a name and the ``"module:name"`` that brings it, or the ``"module"`` t
 called for and not before. Scene files, checks, messages and help know all that is in a table.
 
 Other packages, scripts and notebooks add to the tables of `KINDS` by `register`. An installed package does so by an
-entry point of the groups ``refweb.effects``, ``refweb.shapes``, ``refweb.observables``, ``refweb.integrators`` and
-``refweb.verbs``. Entry points are read when a scene, or the command line, names what no table has, and for help.
+entry point of the groups ``refweb.effects``, ``refweb.shapes``, ``refweb.laws``, ``refweb.observables``,
+``refweb.integrators`` and ``refweb.verbs``. Entry points are read when a scene, or the command line, names what no
+table has, and for help.
 """
 
 from __future__ import annotations
@@ -116,6 +117,15 @@ SHAPES = {
     "terrain": "refweb.net.shapes.terrain:Terrain",
 }
 """Shapes of ``[[body]]``; how to write one says `refweb.net.rigid_body`."""
+LAWS = {
+    "smooth": "refweb.net.laws.smooth:Smooth",
+    "tension-only": "refweb.net.laws.straight:TensionOnly",
+    "linear": "refweb.net.laws.straight:Linear",
+    "force-density": "refweb.net.laws.straight:ForceDensity",
+    "constant-force": "refweb.net.laws.straight:ConstantForce",
+    "table": "refweb.net.laws.curve:Table",
+}
+"""Tension laws of lines; how to write one says `refweb.net.laws`."""
 
 
 class Method(NamedTuple):
@@ -265,11 +275,14 @@ _WORD, _WORDS = "[a-z][a-z0-9_]*", "[a-z][a-z0-9_-]*"
 KINDS = {
     "effect": Kind(EFFECTS, "refweb.tables:Table", _WORD),
     "shape": Kind(SHAPES, "refweb.net.rigid_body:Shape", _WORDS),
+    "law": Kind(LAWS, "refweb.net.laws.law:TensionLaw", _WORDS),
     "observable": Kind(OBSERVABLES, "refweb.results.observables.observable:Observable", _WORDS),
     "integrator": Kind(INTEGRATORS, "refweb.dynamics.integrators.integrator:Integrator", _WORDS),
     "verb": Kind(COMMANDS, "", _WORDS),
 }
 """Kinds that `register` and entry points, of the group ``refweb.`` + kind + ``s``, may add."""
+LINE_COLUMNS = {"natural_length", "ea", "g0", "r0", "reference", "distance", "law", "damping_time", "rupture_energy"}
+"""Numbers of a line that no parameter of a law may be called as, besides ``slackness`` and ``smoothing``."""
 SHIPPED = {kind: frozenset(entry.table) for kind, entry in KINDS.items()}
 """Names of what refweb ships, by kind."""
 RESERVED = {"effect": {"schema", "title", "seed", "web", "solve", *PARTS, *LISTS}, "integrator": {"auto"}}
@@ -279,15 +292,15 @@ PACKAGES: dict[str, str] = {}
 
 
 def register(kind: str, name: str, value: Any = None) -> Any:
-    """Make an effect, a shape, an observable, an integrator or a verb known to scenes, checks, messages and help.
+    """Make an addition of a kind known to scenes, checks, messages and help.
 
     Parameters
     ----------
-    kind : {"effect", "shape", "observable", "integrator", "verb"}
+    kind : {"effect", "shape", "law", "observable", "integrator", "verb"}
         Kind of the addition.
     name : str
-        Its name in scenes: of the table of an effect, and of a value of ``shape``, ``quantity`` or ``method``; or on
-        the command line. A class that had the name by `register` is replaced.
+        Its name in scenes: of the table of an effect, and of a value of ``shape``, ``law``, ``quantity`` or ``method``;
+        or on the command line. A class that had the name by `register` is replaced.
     value : class or module, optional
         The class; of a verb a module, or what else has ``add_arguments`` and ``run``. Without it, `register` is a
         decorator.
@@ -305,7 +318,8 @@ def register(kind: str, name: str, value: Any = None) -> Any:
     Notes
     -----
     Names of effects are small letters, digits and ``_``, others may have ``-``. An integrator has ``keys``, those of
-    ``[solve]`` that it takes, the one that trades accuracy for time first, and its ``method`` is its name.
+    ``[solve]`` that it takes, the one that trades accuracy for time first, and its ``method`` is its name. Fields of a
+    law are the ``parameters`` of ``[cable]`` that it takes, and its ``name`` is its name.
 
     Workers of a study are processes of their own, which do not know what a script has registered: an installed package
     with an entry point is known to them.
@@ -341,7 +355,23 @@ def _entry(kind, name, value):
         raise InputError(f"{quote(_reference(value))} must be a class derived from {base.replace(':', '.')}")
     if not base and not (hasattr(value, "add_arguments") and hasattr(value, "run")):
         raise InputError(f"{quote(str(value))} must be a module with the functions add_arguments and run")
+    if kind == "law":
+        _check_law(name, value)
     return _method(name, value) if kind == "integrator" else value
+
+
+def _check_law(name, law):
+    """Give a class of laws the columns of its parameters; refuse another name of it, and of parameters."""
+    from .errors import InputError
+    from .messages import quote
+
+    if law.name != name:
+        raise InputError(f"name = {quote(law.name)} of the class must be the same name")
+    parameters = [f for f in getattr(law, "__dataclass_fields__", ())]
+    for parameter in parameters:
+        if parameter in LINE_COLUMNS:
+            raise InputError(f"the parameter {quote(parameter)} has a name of refweb's own, call it otherwise")
+    law.columns = (*law.columns, *(parameter for parameter in parameters if parameter not in law.columns))
 
 
 def _method(name, integrator):
@@ -443,7 +473,7 @@ def load_installed(*kinds):
     return messages
 
 
-FILES = {"web": ("path", "lines"), "body": ("file", "heights"), "fold": ("file",)}
+FILES = {"web": ("path", "lines"), "cable": ("stress", "tension"), "body": ("file", "heights"), "fold": ("file",)}
 """Keys of tables of a scene that are paths of files."""
 
 
@@ -453,6 +483,9 @@ def with_files(given, change, tables=tuple(FILES)):
     def placed(table, keys):
         if not isinstance(table, dict):
             return table
+        groups = table.get("groups")
+        if isinstance(groups, dict):
+            table = {**table, "groups": {name: placed(group, keys) for name, group in groups.items()}}
         return {k: change(value) if k in keys and isinstance(value, str) else value for k, value in table.items()}
 
     given, changed = with_fold(given), {}

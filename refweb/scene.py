@@ -210,7 +210,7 @@ class Scene:
         """
         given = with_fold(given)
         if folder is not None:
-            given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body", "fold"])
+            given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body", "fold", "cable"])
         tables = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS]
         if "web" not in given and {"scene", "parameters"} <= given.keys():
             raise InputError(IS_STUDY.format(file or "STUDY"))

@@ -25,6 +25,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
         "Kernels: what compiles them, keeps their machine code on disk and hands records to them by one pointer.",
     ),
     ("the ground floor", "accepted errors findings messages tables kernels memory settings registry", ""),
+    ("net.laws", "*", "Tension laws of lines: stress, tangent and energy over strain; they know nothing of nets."),
     (
         "net",
         "*",

@@ -23,6 +23,9 @@ from refweb.effects import elasticity
 from refweb.effects.base import PrescribedMotion
 from refweb.errors import InputError
 from refweb.net import discretisation
+from refweb.net.laws.law import LINE
+from refweb.net.laws.smooth import Smooth
+from refweb.net.laws.straight import Linear, TensionOnly
 from refweb.system.system import System
 
 EXAMPLES = {
@@ -489,5 +492,5 @@ def test_weight_is_the_whole_mass():
 
 def test_kernels_of_one_factory_have_names_of_their_own():
     """Kernels that differ in what they capture: machine code is found on disk by what they capture."""
-    forces = [elasticity.kernels(law, ((-1.0, 1.0),), (1.0,))[0] for law in range(3)]
+    forces = [elasticity.kernels(law, LINE, ((-1.0, 1.0),), (1.0,))[0] for law in (Smooth, TensionOnly, Linear)]
     assert len({(f.py_func.__module__, f.py_func.__qualname__) for f in forces}) == 3

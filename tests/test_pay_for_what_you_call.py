@@ -21,7 +21,7 @@ from import_graph import loaded_with
 import refweb
 from refweb.dynamics.integrators import central_difference
 from refweb.kernels import Functions, Record
-from refweb.registry import EFFECTS, INTEGRATORS, OBSERVABLES, SHAPES, STATICS, WEBS, load
+from refweb.registry import EFFECTS, INTEGRATORS, LAWS, OBSERVABLES, SHAPES, STATICS, WEBS, load
 from refweb.scene import SHIPPED_SCENES
 
 # Modules
@@ -75,6 +75,7 @@ def roots(given, method):
     yield from (registered(EFFECTS[effect]) for effect in given.keys() & EFFECTS.keys())
     yield from (registered(OBSERVABLES[observe["quantity"]]) for observe in given.get("observe", DEFAULT))
     yield from (registered(SHAPES[shape]) for shape in shapes)
+    yield registered(LAWS[law])
     if given["web"].get("path", "").endswith(".csv"):
         yield "net.csv_files"
     if "fold" in given or "positions" in given["web"]:
@@ -107,11 +108,11 @@ def roots(given, method):
         yield "statics.load_steps"
     if spun:
         yield "statics.critical_speed"
-    elif law == "tension-only" and not (static and free):
+    elif law in ("tension-only", "table") and not (static and free):
         yield "statics.duality_bound"
     if law == "linear":  # bars, which may snap through
         yield "statics.snap_through"
-    if law != "tension-only" or follower or spun or contact is not None or static and free:
+    if law not in ("tension-only", "table") or follower or spun or contact is not None or static and free:
         yield "statics.stability"  # the energy is not convex
     if follower:
         yield "statics.residual_search"
@@ -156,6 +157,8 @@ def called(given):
         outside.append("sksundae")
     if any(body.get("shape") == "mesh" for body in given.get("body", ())):
         outside.append("meshio")
+    if given["cable"]["law"] == "table":
+        outside.append("scipy.interpolate")  # PCHIP
     if web == "cable":
         outside.append("scipy.optimize")  # a root
     if '"corners"' in json.dumps(given) or "effects.fold" in modules:
@@ -178,6 +181,13 @@ SCENES["by cvode"] = brief("square-impact", method="cvode")
 SCENES["by ida"] = brief("square-impact", method="ida")
 SCENES["by relaxation"] = brief("catenary", method="relaxation")
 SCENES["by relaxation"]["cable"] |= {"law": "linear"}
+SCENES["a curve"] = brief("square-load", load_steps=[1.0])
+SCENES["a curve"]["cable"] = {
+    "law": "table",
+    "stress": [[0, 0], [0.01, 5e5], [0.02, 2e6]],
+    "area": 1e-4,
+    "density": 1.0,
+}
 SCENES["a platform"] = {
     "web": {"kind": "inline", "points": [[-1, 0, 2], [1, 0, 2], [-1, 0, 0], [1, 0, 0]], "lines": [[0, 2], [1, 3]]},
     "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-4, "density": 1000.0},

@@ -18,11 +18,19 @@ from refweb.__main__ import main
 from refweb.commands import __doc__ as verbs
 from refweb.dynamics.integrators import __doc__ as integrators
 from refweb.effects import __doc__ as effects
+from refweb.net.laws import __doc__ as laws
 from refweb.net.rigid_body import __doc__ as shapes
 from refweb.results.observables import __doc__ as observables
 from refweb.tables import Table, real, table
 
-PAGES = {"effect": effects, "shape": shapes, "observable": observables, "integrator": integrators, "verb": verbs}
+PAGES = {
+    "effect": effects,
+    "shape": shapes,
+    "law": laws,
+    "observable": observables,
+    "integrator": integrators,
+    "verb": verbs,
+}
 SCENE = {
     "web": {"kind": "window", "mesh": "square", "rows": 4, "columns": 4, "side": 0.2},
     "cable": {"law": "tension-only", "modulus": 7e7, "area": 1e-4, "density": 200.0, "prestrain": 0.05},
@@ -34,7 +42,9 @@ SCENE = {
     "output": {"interval": 1e-3},
     "accuracy": {"error": "none"},
 }
-"""A scene that every kind of plug-in of the pages has a part in."""
+"""A scene that every kind of plug-in of the pages but a law has a part in."""
+OF_PAGES = {**SCENE, "cable": {**SCENE["cable"], "law": "limited", "parameters": {"limit_strain": 0.2}}}
+"""The same with the law of its page."""
 
 
 def modules_and_entries():
@@ -53,7 +63,7 @@ def folder(tmp_path_factory):
     """A folder with a package of all that the pages show, as an installer leaves it, and a scene that uses it."""
     folder = tmp_path_factory.mktemp("target")
     packages.install(folder, *modules_and_entries())
-    (folder / "scene.toml").write_text(tomli_w.dumps(SCENE), encoding="utf-8")
+    (folder / "scene.toml").write_text(tomli_w.dumps(OF_PAGES), encoding="utf-8")
     return folder
 
 
@@ -67,7 +77,7 @@ def process(folder, *arguments, **environment):
 
 
 def test_a_package_is_known_to_the_command_line(folder):
-    """Effect, shape, observable and integrator in one run, the verb; their help; the version of the package."""
+    """Effect, shape, law, observable and integrator in one run, the verb; their help; the version of the package."""
     done = process(folder, "-m", "refweb", "run", "scene.toml", "--out", "out")
     assert done.returncode == 0, done.stderr
     summary = json.loads((folder / "out" / "run.json").read_text(encoding="utf-8"))
@@ -79,7 +89,11 @@ def test_a_package_is_known_to_the_command_line(folder):
     assert done.returncode == 0 and "[[current]]" in done.stdout and done.stderr == ""
     done = process(folder, "-m", "refweb", "--help")
     assert done.returncode == 0 and "mass of a web" in done.stdout
-    for name, words in (("body.wall", "All that lies behind a plane"), ("observe", "Moment of inertia of the nodes")):
+    for name, words in (
+        ("body.wall", "All that lies behind a plane"),
+        ("cable.limited", "which tends to E a"),
+        ("observe", "Moment of inertia of the nodes"),
+    ):
         assert words in process(folder, "-m", "refweb", "help", name).stdout
 
 

@@ -53,6 +53,8 @@ def print_scene(scene, system):
     of_form = {"force-density": (cable.force_density, "N/m"), "constant-force": (cable.pretension, "N")}
     value, unit = of_form.get(law, (None, ""))
     law += f", {value:g} {unit}" if value is not None else ""
+    law += "".join(f", {name} = {number:g}" for name, number in (cable.parameters or {}).items())
+    modulus = f"E = {cable.modulus:g} Pa, " if cable.law != "table" else ""
     present = [name_of(EFFECTS, effect) for effect in scene.effects]
     count = {name: present.count(name) for name in present}
     counted = [f"{name} × {times}" if times > 1 else f"{name}" for name, times in count.items()]
@@ -97,7 +99,7 @@ def print_scene(scene, system):
         [
             ("web", f"{counts}; {len(system.free)} unknowns"),
             ("", sizes),
-            ("cable", f"{law}; E = {cable.modulus:g} Pa, A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
+            ("cable", f"{law}; {modulus}A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
             ("effects", ", ".join(counted) or "none"),
             *((f'body "{body.name}"', text) for body in system.net.bodies for text in body.shape.texts()),
             *_stiffness(scene, system),

@@ -35,7 +35,7 @@ def doubts_on(scene, system):
     ------
     Finding
     """
-    yield from _on_modulus(scene)
+    yield from _on_modulus(scene, system)
     yield from _on_cells(scene, system)
     yield from _on_sections(system)
     if scene.solve.kind == "dynamic":
@@ -47,13 +47,17 @@ def doubts_on(scene, system):
             yield from _on_mouth(scene, system, x)
 
 
-def _on_modulus(scene):
-    """Find a modulus below that of rubber."""
+def _on_modulus(scene, system):
+    """Find a modulus, or the largest slope of a curve, below that of rubber."""
     tables = {"[cable]": scene.cable} | {f"[cable.groups.{name}]": group for name, group in scene.cable.groups.items()}
     for where, table in tables.items():
         if table.modulus is not None and table.modulus < SOFTEST:
             text = f"{where} modulus = {table.modulus:g} Pa is below that of rubber, {SOFTEST:g} Pa: is it in MPa?"
             yield Finding("unit-in-doubt", text, "cable")
+    for curve in system.net.kept:
+        if curve.unit == "Pa" and curve.steepest < SOFTEST:
+            text = f"the slopes of a curve are up to {curve.steepest:g} Pa, below that of rubber, {SOFTEST:g} Pa"
+            yield Finding("unit-in-doubt", f"{text}: is its stress in MPa?", "cable")
 
 
 def _on_cells(scene, system):

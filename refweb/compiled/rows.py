@@ -49,3 +49,25 @@ def record_at(typing, kind, matrix, row, column):
         return builder.bitcast(builder.gep(array.data, [first]), context.get_value_type(signature.return_type))
 
     return kind.dtype(kind, matrix, types.intp, types.intp), build
+
+
+@_intrinsic
+def narrowed(typing, kind, record):
+    """The same record with the fields of another dtype alone, over the same memory, in kernels."""
+
+    def build(context, builder, signature, arguments):
+        return builder.bitcast(arguments[1], context.get_value_type(signature.return_type))
+
+    return kind.dtype(kind, record), build
+
+
+@_intrinsic
+def number_at(typing, address, index):
+    """The number of an index in an array of numbers at an address, which Python keeps, in kernels."""
+
+    def build(context, builder, signature, arguments):
+        address, index = arguments
+        numbers = builder.inttoptr(address, context.get_value_type(types.float64).as_pointer())
+        return builder.load(builder.gep(numbers, [index]))
+
+    return types.float64(types.int64, types.int64), build

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..effects.base import STRAIN, pairs_of
-from ..net.tension_laws import SMOOTH
 from ..results import probes
 from ..results.columns import FIRST, components, dynamic_energies, vectors
 from ..results.observables.balances import weights
@@ -34,7 +33,7 @@ def _probes_of_warnings(system, followed, step_size):
     strain, strains need no further probe. The speed of bodies is followed if the ``step_size`` is given [s].
     """
     net, tension, scales = system.net, system.tension_column, {}
-    if (net.laws == SMOOTH).any():
+    if net.law_is("smoothed").any():
         scales["stress"] = tension, 1.0 / net.area
     if np.isfinite(net.strength).any():
         scales["utilisation"] = tension, 1.0 / (net.area * net.strength)
@@ -43,6 +42,8 @@ def _probes_of_warnings(system, followed, step_size):
     tell = [scale for _, scale in scales.values()]
     if not any(_tells_strain(system, scale) for scale in (*tell, *(p.data[:, 0] for p in followed if _of_tension(p)))):
         scales["strain"] = STRAIN, np.ones(len(net.cells))
+    if net.curve_scale is not None:
+        scales["curve"] = STRAIN, net.curve_scale
     by_name = {
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
         for name, (column, scale) in scales.items()
@@ -85,9 +86,10 @@ def _of_tension(probe):
 def _tells_strain(system, scale):
     """Tell if the largest tension times a scale is always that of the element with the largest strain."""
     net, lines = system.net, [term for term in system.terms if term.over_lines]
-    if net.law is None or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
+    if len(net.laws) > 1 or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
         return False
-    numbers = np.column_stack([scale * net.line_data.ea, net.line_data.slackness, net.line_data.smoothing])
+    columns = [net.line_data[name] for name in ("slackness", "smoothing", "g0", "r0", *net.law.columns)]
+    numbers = np.column_stack([scale * net.line_data.ea, *columns])
     return bool(np.allclose(numbers, numbers[0], rtol=1e-12, atol=0.0))
 
 
@@ -366,9 +368,14 @@ class Watch:
         follows = (_of_tension(p) and _tells_strain(self.system, p.data[:, 0]) for p in self.probes)
         at = next(i for i, yes in enumerate(follows) if yes)
         cell = int(places[at])
-        tension, numbers = values[at] / self.probes[at].data[cell, 0], net.line_data[cell]
-        strain = net.law.strain(tension, numbers.ea, numbers.slackness, numbers.smoothing) if tension > 0.0 else 0.0
-        return float(strain), int(net.line[cell])
+        tension, line = values[[at]] / self.probes[at].data[cell, 0], net.line_data[[cell]]
+        return float(net.law.strain_of(tension, line)[0]) if tension > 0.0 else 0.0, int(net.line[cell])
+
+    def share_of_curve(self, course):
+        """Largest strain over the last one of a curve in all steps [1], and its element; None without a curve."""
+        if (at := self._of_warning("curve")) is None:
+            return None
+        return float(course.extremes.values[at]), int(course.extremes.places[at])
 
     def overlap_of_lines(self, course):
         """(Deepest overlap of lines in all steps [m], its time [s], its cell), None where lines do not touch lines."""

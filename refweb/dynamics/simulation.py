@@ -11,7 +11,7 @@ from ..errors import InputError, IntegrationError, SolverError
 from ..findings import NOTE, Finding
 from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
-from ..results.state import State, floor_remark, strain_remark
+from ..results.state import State, curve_remark, floor_remark, strain_remark
 from ..results.strength import strength_remark
 from .accuracy_loop import CLIMBS, AccuracyState, reach_digits, run_within_drift
 from .budget import Budget, check_budget
@@ -307,7 +307,7 @@ class Simulation:
         self._largest_stress, self._unfilled = watch.largest_stress(course), watch.unfilled(course)
         if (used := watch.utilisation(course)) is not None:
             solution.utilisation, solution.margin = used, watch.margin(course)
-        self._strain = watch.strain(course)
+        self._strain, self._share_of_curve = watch.strain(course), watch.share_of_curve(course)
         if self.overlaps is not None:
             solution.bodies = self.overlaps.plain()
             if (pairs := self.overlaps.pairs) is not None:
@@ -363,6 +363,8 @@ class Simulation:
         if self.system.weakness is None:
             yield from strength_remark(self.solution.utilisation)
         yield from strain_remark(self._strain)
+        if self._share_of_curve is not None:
+            yield from curve_remark(self.system.net, *self._share_of_curve)
         yield from self.system.remarks()
         if self.overlaps is not None:
             yield from self.overlaps.remarks()

@@ -24,37 +24,21 @@ import numpy as np
 from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
-from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real, table
 from .base import LINE_OUT, POWER, Balance, ForceTerm, Tangent, Timing, VelocityForce, column, refuse_flows
-from .line_kernels import gradient, law_of, line_at, pull_together, strain
-
-
-@kernel()
-def viscous(law, e, rate, time, line):
-    """The damping force N [N]."""
-    pull = time * rate * tangent(law, e, line.ea, line.slackness, line.smoothing)
-    smallest = -above_floor(law, e, line.ea, line.slackness, line.smoothing)
-    return max(pull, smallest)
-
-
-@kernel()
-def slopes(law, e, rate, time, line):
-    """(∂N/∂ε [N], ∂N/∂ε̇ [N s])."""
-    slope = tangent(law, e, line.ea, line.slackness, line.smoothing)
-    if time * rate * slope < -above_floor(law, e, line.ea, line.slackness, line.smoothing):
-        return -slope, 0.0
-    return time * rate * curvature(law, e, line.ea, line.slackness, line.smoothing), time * slope
+from .line_kernels import gradient, line_at, pull_together, strain
 
 
 @functools.cache
-def kernels(law, tau, gradients, weights):
+def kernels(law, record, tau, gradients, weights):
     """Force, stiffness, damping and damping bound of one law and reference element.
 
     Parameters
     ----------
-    law : int
-        Number of the law, `refweb.net.tension_laws.MIXED` if each line has its law.
+    law : type or refweb.net.laws.law.Mixed
+        Law of the lines.
+    record : numpy.dtype
+        Numbers of an element that it reads, see `refweb.net.net.Net.law_record`.
     tau : int
         Column of τ in the numbers of the lines.
     gradients : tuple of tuple of float
@@ -62,20 +46,34 @@ def kernels(law, tau, gradients, weights):
     weights : tuple of float
         Quadrature weights.
     """
+    stress, tangent, curvature, above_floor = law.stress, law.tangent, law.curvature, law.above_floor
     points, nodes = len(gradients), len(gradients[0])
     flat = tuple(value for row in gradients for value in row)
+
+    @kernel()
+    def viscous(e, rate, time, line):
+        """The damping force N [N]."""
+        return max(time * rate * tangent(e, line), -above_floor(e, line))
+
+    @kernel()
+    def slopes(e, rate, time, line):
+        """(∂N/∂ε [N], ∂N/∂ε̇ [N s])."""
+        slope = tangent(e, line)
+        if time * rate * slope < -above_floor(e, line):
+            return -slope, 0.0
+        return time * rate * curvature(e, line), time * slope
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
             largest = power = 0.0
-            line, line_law = line_at(data, c), law_of(law, data, c)
+            line = record_at(record, data, c, 0)
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 v0, v1, v2 = gradient(v, cells, c, q, nodes, flat)
                 rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / line.natural_length
-                pull = viscous(line_law, e, rate, data[c, tau], line)
-                tension = pull + prepared_stress(line_law, e, line.ea, line.slackness, line.smoothing, line.g0, line.r0)
+                pull = viscous(e, rate, data[c, tau], line)
+                tension = pull + stress(e, line)
                 if q == 0 or tension > largest:
                     largest = tension
                 power -= weights[q] * line.natural_length * pull * rate
@@ -89,14 +87,14 @@ def kernels(law, tau, gradients, weights):
         if definite:  # nothing of it is
             return
         for c in range(cells.shape[0]):
-            line, line_law, time = line_at(data, c), law_of(law, data, c), data[c, tau]
+            line, time = record_at(record, data, c, 0), data[c, tau]
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p, speed = (p0 * inverse, p1 * inverse, p2 * inverse), (p0 * w[0] + p1 * w[1] + p2 * w[2]) * inverse
                 rate, share = speed / line.natural_length, weights[q] / line.natural_length
-                by_strain, by_rate = slopes(line_law, e, rate, time, line)
-                across = weights[q] * viscous(line_law, e, rate, time, line) * inverse
+                by_strain, by_rate = slopes(e, rate, time, line)
+                across = weights[q] * viscous(e, rate, time, line) * inverse
                 along, turn = share * by_strain - across, share * by_rate * inverse
                 for i in range(3):
                     for j in range(3):
@@ -111,13 +109,13 @@ def kernels(law, tau, gradients, weights):
     def damping(t, x, v, blocks, cells, data, definite):
         blocks[:] = 0.0
         for c in range(cells.shape[0]):
-            line, line_law, time = line_at(data, c), law_of(law, data, c), data[c, tau]
+            line, time = record_at(record, data, c, 0), data[c, tau]
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 rate = (p[0] * w[0] + p[1] * w[1] + p[2] * w[2]) / line.natural_length
-                along = weights[q] / line.natural_length * slopes(line_law, e, rate, time, line)[1]
+                along = weights[q] / line.natural_length * slopes(e, rate, time, line)[1]
                 for a in range(nodes):
                     for b in range(nodes):
                         d = along * flat[q * nodes + a] * flat[q * nodes + b]
@@ -230,7 +228,9 @@ class Damping(Table):
             raise InputError(f"bodies = {self.bodies:g} [1/s]: the scene has no free [[body]], leave it out")
         if self.time:
             element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
-            force, stiffness, damping, bound = kernels(net.law_number, net.line_data.column("damping_time"), *element)
+            force, stiffness, damping, bound = kernels(
+                net.law, net.law_record, net.line_data.column("damping_time"), *element
+            )
             terms.append(
                 ForceTerm(
                     name="damping",

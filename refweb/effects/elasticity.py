@@ -16,27 +16,29 @@ import numpy as np
 
 from ..compiled.rows import record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
 from ..tables import Table, table
 from .base import LINE_OUT, Balance, ForceTerm, Tangent
-from .line_kernels import law_of, line_at, pull_together, strain
+from .line_kernels import line_at, pull_together, strain
 
 
 @functools.cache
-def kernels(law, gradients, weights):
+def kernels(law, record, gradients, weights):
     """Force, energy, stiffness, bound, strain and length kernels of a law and reference element.
 
     The length kernel writes ∂E/∂L of each element [N].
 
     Parameters
     ----------
-    law : int
-        Number of the law, `refweb.net.tension_laws.MIXED` for that of each line.
+    law : type or refweb.net.laws.law.Mixed
+        Law of the lines.
+    record : numpy.dtype
+        Numbers of an element that it reads, see `refweb.net.net.Net.law_record`.
     gradients : tuple of tuple of float
         dN/dξ by quadrature point and node.
     weights : tuple of float
         Quadrature weights.
     """
+    stress, tangent, energy_density = law.stress, law.tangent, law.energy_density
     points, nodes = len(gradients), len(gradients[0])
     flat = tuple(value for row in gradients for value in row)
 
@@ -44,8 +46,7 @@ def kernels(law, gradients, weights):
     def pull_at(x, cells, data, c, q):
         """(dx/dξ, w T/|dx/dξ|, T, ε) at quadrature point q of element c."""
         p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
-        line, line_law = line_at(data, c), law_of(law, data, c)
-        tension = prepared_stress(line_law, e, line.ea, line.slackness, line.smoothing, line.g0, line.r0)
+        tension = stress(e, record_at(record, data, c, 0))
         return p0, p1, p2, weights[q] * tension * inverse, tension, e
 
     @kernel()
@@ -87,21 +88,21 @@ def kernels(law, gradients, weights):
     def energy(t, x, cells, data, out):
         for c in range(cells.shape[0]):
             total = 0.0
-            line, line_law = line_at(data, c), law_of(law, data, c)
+            line = record_at(record, data, c, 0)
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
-                total += weights[q] * energy_density(line_law, e, line.ea, line.slackness, line.smoothing)
+                total += weights[q] * energy_density(e, line)
             out[c] = total * line.natural_length
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
-            line, line_law = line_at(data, c), law_of(law, data, c)
+            line = record_at(record, data, c, 0)
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
-                along = weights[q] * tangent(line_law, e, line.ea, line.slackness, line.smoothing) / line.natural_length
-                tension = stress(line_law, e, line.ea, line.slackness, line.smoothing)
+                along = weights[q] * tangent(e, line) / line.natural_length
+                tension = stress(e, line)
                 across = 0.0 if definite and tension < 0.0 else weights[q] * tension * inverse
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 for a in range(nodes):
@@ -134,11 +135,11 @@ def kernels(law, gradients, weights):
     def length_force(t, x, cells, data, out):
         for c in range(cells.shape[0]):
             total = 0.0
-            line, line_law = line_at(data, c), law_of(law, data, c)
+            line = record_at(record, data, c, 0)
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
-                pulled = (1.0 + e) * stress(line_law, e, line.ea, line.slackness, line.smoothing)
-                total += weights[q] * (energy_density(line_law, e, line.ea, line.slackness, line.smoothing) - pulled)
+                pulled = (1.0 + e) * stress(e, line)
+                total += weights[q] * (energy_density(e, line) - pulled)
             out[c] = total
 
     return force_of_four if points == 1 else force, energy, stiffness, bound, every_strain, length_force
@@ -146,7 +147,7 @@ def kernels(law, gradients, weights):
 
 def of(net):
     """The kernels for the laws and the element of a net."""
-    return kernels(net.law_number, tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist()))
+    return kernels(net.law, net.law_record, tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist()))
 
 
 def strains(net, x):
@@ -163,7 +164,7 @@ def length_force(net):
 
 @table
 class Elasticity(Table):
-    """Tension of every line by the law of its cable, see `refweb.net.tension_laws`."""
+    """Tension of every line by the law of its cable, see `refweb.net.laws`."""
 
     def on(self, net):
         """The term of all lines; ``out`` is tension [N] and strain."""

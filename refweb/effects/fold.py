@@ -117,9 +117,9 @@ class Fold(Table):
 
     def _from_file(self, web):
         """Positions of the nodes in the file."""
-        from ..net.csv_files import places_of
+        from ..net.csv_files import columns_of
 
-        places = places_of(pathlib.Path(str(self.file)))
+        places = columns_of(pathlib.Path(str(self.file)), "xyz")
         if len(places) != len(web.points):
             raise InputError(f"{self.file} has {len(places)} rows, must have one for each of {len(web.points)} nodes")
         return places

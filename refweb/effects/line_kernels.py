@@ -1,8 +1,8 @@
 """Common parts of kernels over line elements: gradients, strain, and forces along the line.
 
 ``gradients`` are dN/dξ of the reference element, by quadrature point and node, as one tuple of numbers. ``data`` of a
-kernel over lines is `refweb.net.line_data.LineData.matrix`: all terms of the compiled loop take matrices. `LINE` gives
-its columns their names.
+kernel over lines is `refweb.net.laws.line_data.LineData.matrix`: all terms of the compiled loop take matrices. `LINE`
+gives its first columns their names, and `refweb.net.net.Net.law_record` those that the laws of a net read.
 """
 
 from __future__ import annotations
@@ -13,11 +13,7 @@ import numpy as np
 
 from ..compiled.rows import record_at
 from ..kernels import kernel
-from ..net.line_data import FIELDS
-from ..net.tension_laws import MIXED
-
-LINE = np.dtype([*FIELDS, ("law", float)])
-"""Numbers of an element; the last is that of its law, where these differ."""
+from ..net.laws.law import LINE
 
 
 @kernel(forceinline=True)
@@ -53,12 +49,6 @@ def direction(x, cells, c, end):
     length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
     inverse = 1.0 / length if length > 0.0 else 0.0
     return (d0 * inverse, d1 * inverse, d2 * inverse), inverse
-
-
-@kernel(forceinline=True)
-def law_of(law, data, c):
-    """Number of the law of cell c, where ``law`` is that of all cells or `MIXED`."""
-    return np.int64(line_at(data, c).law) if law == MIXED else law
 
 
 @kernel(forceinline=True)

@@ -9,10 +9,13 @@ import numpy as np
 
 from ..errors import InputError, refused_at
 from ..messages import quote
+from ..registry import LAWS
 from ..tables import LARGEST, Table, by_group, choice, integer, real, table
+from . import law_keys
 from .groups import givers
+from .law_keys import numbers_by_name, points
 from .materials import FILLED, MATERIALS
-from .tension_laws import CONSTANT_FORCE, FORCE_DENSITY, FORM_FINDING, NAMES, SMOOTH, strains_of
+from .tension_laws import law_of, strains_of
 
 SMOOTH_LAW = {"slackness": 0.0, "smoothing": 1e-5}
 """Parameters of the smooth law where none are given."""
@@ -30,7 +33,7 @@ class Group(Table):
 
     Parameters
     ----------
-    law : {"smooth", "tension-only", "linear", "force-density", "constant-force"}, optional
+    law : {"smooth", "tension-only", "linear", "force-density", "constant-force", "table"}, optional
         Tension law; of the smooth one ε0 = 0 and η = 1e-5 where the cable has another and the group none of its own.
     material : str, optional
         As for `Cable`: modulus, density and strength of the group where it has none of its own.
@@ -47,6 +50,10 @@ class Group(Table):
         Natural length, see `Cable`; one of them takes the place of what the cable gives.
     force_density : float, optional
         Of the law "force-density" [N/m], not 0.
+    stress, tension : list of list of float or str, optional
+        Of the law "table", see `Cable`; one of them takes the place of what the cable gives.
+    parameters : dict of str to float, optional
+        Of a law of another package, see `Cable`; a number takes the place of that of the cable.
     strength : float, optional
         Stress at which a line breaks [Pa], > 0.
     safety_factor, knot_factor : float, optional
@@ -64,7 +71,7 @@ class Group(Table):
         prestrain = 1e-3
     """
 
-    law: str | None = choice(*NAMES, default=None)
+    law: str | None = choice(LAWS, default=None)
     material: str | None = choice(*MATERIALS, default=None)
     modulus: float | None = real(default=None, above=0, unit="Pa")
     area: float | None = real(default=None, above=0, unit="m²")
@@ -75,14 +82,18 @@ class Group(Table):
     pretension: float | None = real(default=None, unit="N")
     sag: float | None = real(default=None, at_least=0, at_most=DEEPEST, unit="1")
     force_density: float | None = real(default=None, unit="N/m")
+    stress: Any = points(unit="Pa")
+    tension: Any = points(unit="N")
+    parameters: dict | None = numbers_by_name()
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float | None = real(default=None, above=0, unit="1")
     knot_factor: float | None = real(default=None, above=0, at_most=1, unit="1")
 
     def check(self):
-        """Fill in what the material gives; refuse two keys of natural length, and a force density that is none."""
+        """Fill in what the material gives; refuse two keys of one thing, and a force density that is none."""
         _fill(self)
         _check_lengths(self)
+        law_keys.curve_key(self)
 
     def filled(self):
         """The group with the smooth law's parameters where it has none."""
@@ -95,8 +106,8 @@ class Cable(Table):
 
     Parameters
     ----------
-    law : {"smooth", "tension-only", "linear", "force-density", "constant-force"}
-        Tension law, see `refweb.net.tension_laws`. Groups may have others: struts beside cables. Lines that can push
+    law : {"smooth", "tension-only", "linear", "force-density", "constant-force", "table"}
+        Tension law, see `refweb.net.laws`. Groups may have others: struts beside cables. Lines that can push
         end the proven bound that statics has where all lines are tension-only. The last two are those of form finding,
         for statics: the tension of a line is ``force_density`` times its length, or ``pretension``, whatever its
         natural length is, and `refweb.form` makes a net of elastic lines of the shape.
@@ -105,7 +116,7 @@ class Cable(Table):
         which ``refweb help materials`` lists with their sources. A braid is softer and weaker than its fibre.
     modulus : float
         Asymptotic modulus E [Pa], > 0; of the laws of form finding that of the lines that `refweb.form` makes. It may
-        be left out beside a material.
+        be left out beside a material, and the law "table" has none.
     area : float
         Cross section A [m²], > 0.
     density : float
@@ -125,6 +136,16 @@ class Cable(Table):
         Of the law "force-density": tension over length of a line, or of its chord where it is in several elements
         [N/m], not 0; negative pushes. Where it is above 0 on all lines, beside lines of the law "tension-only", the
         equilibrium under dead loads is the only one and its errors are proven; where it is negative they are estimates.
+    stress : list of list of float or str, optional
+        Of the law "table": points of a measured curve, [[strain, stress in Pa], ...], or a CSV file with the columns
+        ``strain`` [1] and ``stress`` [Pa]. Both increase from a strain ≥ 0 and a stress of 0 on, and below lines are
+        slack. Between points the curve is smooth and rises (PCHIP); beyond the last point its last slope goes on, and
+        results that lie there get a warning. Its modulus is its largest slope.
+    tension : list of list of float or str, optional
+        The same as tension, [[strain, tension in N], ...], or a file with ``strain`` and ``tension`` [N]: of a rope
+        that is sold without a section, whose area then counts for mass and stress alone.
+    parameters : dict of str to float, optional
+        Numbers that a law of another package asks for, by name.
     strength : float, optional
         Stress at which a line breaks [Pa]; utilisation is reported against it.
     safety_factor : float
@@ -158,9 +179,9 @@ class Cable(Table):
         density = 200.0
     """
 
-    either = ("modulus", "density"), ("material",)
+    either = ("modulus", "density"), ("material",), ("stress", "density"), ("tension", "density")
 
-    law: str = choice(*NAMES, default="smooth")
+    law: str = choice(LAWS, default="smooth")
     material: str | None = choice(*MATERIALS, default=None)
     modulus: Any = real(default=None, above=0, unit="Pa")
     area: float = real(above=0, unit="m²")
@@ -171,6 +192,9 @@ class Cable(Table):
     pretension: float | None = real(default=None, unit="N")
     sag: float | None = real(default=None, at_least=0, at_most=DEEPEST, unit="1")
     force_density: float | None = real(default=None, unit="N/m")
+    stress: Any = points(unit="Pa")
+    tension: Any = points(unit="N")
+    parameters: dict | None = numbers_by_name()
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float = real(default=1.0, above=0, unit="1")
     knot_factor: float = real(default=1.0, above=0, at_most=1, unit="1")
@@ -180,10 +204,14 @@ class Cable(Table):
 
     def check(self):
         """Fill in what the material gives and the smooth law's parameters; refuse what does not fit together."""
+        own_modulus = self.modulus
         _fill(self)
         _check_lengths(self)
+        law_keys.check(self, own_modulus)
+        tables = (self, *self.groups.values())
+        needs = any((table.law or self.law) != "table" and table.modulus is None for table in tables)
         for key, unit in (("modulus", "Pa"), ("density", "kg/m³")):
-            if getattr(self, key) is None:
+            if getattr(self, key) is None and (needs or key != "modulus"):
                 raise InputError(
                     f"{key} is missing: give {key} = ... [{unit}] or a material, see refweb help materials"
                 )
@@ -211,7 +239,7 @@ class Cable(Table):
         Returns
         -------
         dict of str to ndarray
-            ``law`` (its number), ``modulus``, ``area``, ``density``, ``slackness``, ``smoothing``, ``strength``
+            ``law`` (its name), ``modulus``, ``area``, ``density``, ``slackness``, ``smoothing``, ``strength``
             (infinite where none is given), ``safety_factor``, ``knot_factor`` and ``natural_length``, each of shape
             (lines,).
 
@@ -223,11 +251,16 @@ class Cable(Table):
         """
         values = self._values(web)
         _check_laws(values)
+        if "curve" in values:
+            lines = values["law"] == "table"
+            steepest = np.array([curve.steepest for curve in values["curve"][lines]])
+            by_tension = np.array([curve.unit == "N" for curve in values["curve"][lines]])
+            values["modulus"][lines] = steepest / np.where(by_tension, values["area"][lines], 1.0)
         values["natural_length"] = _natural_lengths(web, values)
-        forming, area = np.isin(values["law"], FORM_FINDING), values["area"]
+        forming, area = _forming(values["law"]), values["area"]
         density, force = values.pop("force_density"), values.pop("pretension")
         with np.errstate(over="ignore"):
-            size = np.where(values["law"] == FORCE_DENSITY, density * values["natural_length"], force)
+            size = np.where(values["law"] == "force-density", density * values["natural_length"], force)
             values["modulus"] = np.where(forming, size / area, values["modulus"])
             stiffness = np.abs(values["modulus"]) * area / values["natural_length"]
             mass = values["density"] * values["area"] * values["natural_length"]
@@ -242,36 +275,45 @@ class Cable(Table):
         given, values = givers(web.groups, self.groups, len(web.lines), "[cable.groups]"), {}
         missing = {
             "strength": np.inf,
+            "modulus": np.nan,
             "slackness": 0.0,
             "smoothing": 0.0,
             **dict.fromkeys((*LENGTHS[1:], DENSITY), np.nan),
         }
-        for key in (f.name for f in fields(Group) if f.name != "material"):
-            values[key] = np.full(len(web.lines), _number(self, key, missing))
+        for key in (f.name for f in fields(Group) if f.name not in ("material", "parameters", *law_keys.CURVES)):
+            dtype = object if key == "law" else float
+            values[key] = np.full(len(web.lines), _number(self, key, missing), dtype)
             for number, group in enumerate(self.groups.values()):
                 if key in given and getattr(group, key) is not None:
                     values[key][given[key] == number] = _number(group, key, missing)
         _replace_lengths(values, given)
-        by_group, forming = given.get("law", np.full(len(web.lines), -1)) >= 0, np.isin(values["law"], FORM_FINDING)
+        by_group, forming = given.get("law", np.full(len(web.lines), -1)) >= 0, _forming(values["law"])
         left_out = {  # of what the cable gives to lines of its own law
-            DENSITY: values["law"] != FORCE_DENSITY,
-            "pretension": values["law"] == FORCE_DENSITY,
+            DENSITY: values["law"] != "force-density",
+            "pretension": values["law"] == "force-density",
             "prestrain": forming,
             "sag": forming,
         }
         for key, lines in left_out.items():
             by_key = given.get(key, np.full(len(by_group), -1)) >= 0
             values[key][lines & by_group & ~by_key] = 0.0 if key == "prestrain" else np.nan
-        plain = values["law"] != SMOOTH
+        plain = values["law"] != "smooth"
         for key in SMOOTH_LAW:
             for line in np.flatnonzero(plain & (given.get(key, np.full(len(plain), -1)) >= 0))[:1]:
-                group, law = list(self.groups)[given[key][line]], list(NAMES)[values["law"][line]]
+                group, law = list(self.groups)[given[key][line]], values["law"][line]
                 raise InputError(
                     f"[cable.groups] {quote(group)} gives {key} to line {line}, where it has no meaning with law = "
                     f'"{law}"'
                 )
             values[key][plain] = 0.0
-        return values
+        if (values["law"] == "table").any() or any(key in given for key in law_keys.CURVES):
+            values["curve"] = law_keys.curves_of(self, values["law"], given)
+        return values | law_keys.parameters_of(self, values["law"], given)
+
+
+def _forming(laws):
+    """True for each law by name that is one of form finding, an array."""
+    return np.isin(laws, [name for name in set(laws) if law_of(name).forming])
 
 
 def _fill(table):
@@ -305,31 +347,30 @@ def _replace_lengths(values, given):
 def _check_laws(values):
     """Refuse what the law of a line does not take, and what it does not have."""
     law, density, force = values["law"], values[DENSITY], values["pretension"]
-    forming, needs = np.isin(law, FORM_FINDING), {FORCE_DENSITY: density, CONSTANT_FORCE: force}
+    forming, needs = _forming(law), {"force-density": density, "constant-force": force}
     taken = [
-        (DENSITY, ~np.isnan(density) & (law != FORCE_DENSITY)),
-        ("pretension", ~np.isnan(force) & (law == FORCE_DENSITY)),
+        (DENSITY, ~np.isnan(density) & (law != "force-density")),
+        ("pretension", ~np.isnan(force) & (law == "force-density")),
         ("prestrain", forming & (values["prestrain"] != 0.0)),
         ("sag", forming & ~np.isnan(values["sag"])),
     ]
     for key, wrong in taken:
         for line in np.flatnonzero(wrong)[:1]:
-            name = list(NAMES)[law[line]]
             raise InputError(
-                f'[cable] {key} = {values[key][line]:g} has no meaning with law = "{name}", which line {line} has: '
-                "leave it out"
+                f'[cable] {key} = {values[key][line]:g} has no meaning with law = "{law[line]}", which line {line} has'
+                ": leave it out"
             )
-    for number, key in ((FORCE_DENSITY, DENSITY), (CONSTANT_FORCE, "pretension")):
-        missing = np.isnan(needs[number]) | (needs[number] == 0.0)
-        for line in np.flatnonzero((law == number) & missing)[:1]:
-            unit, name = ("N/m" if key == DENSITY else "N"), list(NAMES)[number]
+    for name, key in (("force-density", DENSITY), ("constant-force", "pretension")):
+        missing = np.isnan(needs[name]) | (needs[name] == 0.0)
+        for line in np.flatnonzero((law == name) & missing)[:1]:
+            unit = "N/m" if key == DENSITY else "N"
             raise InputError(f'[cable] law = "{name}" of line {line} needs {key} = ..., not 0 [{unit}]')
 
 
 def _natural_lengths(web, values):
     """Natural length of each line [m], shape (lines,); takes the keys that say so out of the values."""
     prestrain, sag = values.pop("prestrain"), values.pop("sag")
-    tension, forming = values["pretension"], np.isin(values["law"], FORM_FINDING)
+    tension, forming = values["pretension"], _forming(values["law"])
     tense, hangs = ~np.isnan(tension) & ~forming, ~np.isnan(sag)
     for key, given, value in (
         ("prestrain", prestrain != 0.0, prestrain),
@@ -340,9 +381,8 @@ def _natural_lengths(web, values):
             raise InputError(f"[cable] {key} = {value[line]:g} cannot be used: the web's natural lengths are given")
     strain = prestrain.copy()
     if tense.any():
-        numbers = (values[key] for key in ("modulus", "area", "slackness", "smoothing"))
         with refused_at("[cable] pretension:"):
-            strain += strains_of(values["law"], np.where(tense, tension, 0.0), *numbers)
+            strain += strains_of(values, np.where(tense, tension, 0.0))
     length = web.natural_length / (1.0 + strain)
     if hangs.any():
         from .sag import over_chord
@@ -357,6 +397,6 @@ def _smoothed(table, share):
 
 
 def _number(table, key, missing):
-    """A value of a cable or a group as a number, that of ``missing`` where it has none."""
+    """A value of a cable or a group, that of ``missing`` where it has none."""
     value = getattr(table, key)
-    return NAMES[value] if key == "law" else missing[key] if value is None else value
+    return missing[key] if value is None else value

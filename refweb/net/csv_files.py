@@ -65,15 +65,15 @@ def web_of(points, lines, columns=None, first=0):
     )
 
 
-def places_of(path):
-    """Positions [m] in the columns x, y and z of a file, shape (rows, 3)."""
+def columns_of(path, names):
+    """Numbers in the columns of some names of a file, which has no others, shape (rows, names)."""
     problems = Problems()
-    columns = _table(path, dict.fromkeys("xyz", True), {}, problems)
-    for name in columns.others:
-        problems.add(f"{path.name}: column {quote(name)} is unknown, {nearest(name, 'xyz')}")
-    places = [columns.numbers(key, problems) for key in "xyz"]
+    columns = _table(path, dict.fromkeys(names, True), None, problems)
+    for name in columns.others if all(name in columns.columns for name in names) else ():
+        problems.add(f"{path.name}: column {quote(name)} is unknown, {nearest(name, names)}")
+    values = [columns.numbers(key, problems) for key in names]
     problems.refuse()
-    return np.column_stack([np.asarray(column) for column in places])
+    return np.column_stack([np.asarray(column) for column in values])
 
 
 class Problems:
@@ -165,7 +165,8 @@ def _is_whole(text):
 
 
 def _table(path, known, names, problems):
-    """The `_Columns` of a file; ``names`` are those of columns that have other names in it."""
+    """The `_Columns` of a file; ``names`` are those of columns that have other names in it, None if none may."""
+    may_rename, names = names is not None, names or {}
     if not path.is_file():
         raise InputError(f"there is no file {path}")
     try:
@@ -190,7 +191,7 @@ def _table(path, known, names, problems):
         called = f", called {quote(names[name])} in columns," if name in names else ""
         problems.add(f"{path.name}: column {name}{called} is missing, the first row has {quote(','.join(given))}")
     also = ", and first = 1 that numbers begin at 1" if "i" in missing else ""
-    if any(name not in names for name in missing) and given:
+    if may_rename and any(name not in names for name in missing) and given:
         problems.hint(
             "columns = {" + ", ".join(f'{name} = "..."' for name in missing) + "} says what they are called" + also
         )

@@ -27,9 +27,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .elements import gauss, line_element, lumped_shares, values
-from .line_data import LineData
+from .laws.line_data import LineData, offsets
 from .net import Net
-from .tension_laws import NAMES, Law
+from .tension_laws import law_of
 
 
 def basis(points, lines, natural_length, element=None):
@@ -145,11 +145,9 @@ def _elements(web, element, pieces, length, explicit):
 def _line_data(web, line, pieces, length, values):
     """The `LineData` of elements, from the properties of each."""
     slackness, smoothing = values["slackness"], values["smoothing"]
-    r0 = np.sqrt(slackness**2 + 4.0 * smoothing**2)
-    g0 = 2.0 * smoothing**2 / np.where(r0 > 0.0, r0 + slackness, 1.0)
     reference = web.points[web.lines[:, 1]] - web.points[web.lines[:, 0]]
     size = np.linalg.norm(reference, axis=1)
-    laws = length, values["modulus"] * values["area"], slackness, smoothing, g0, r0
+    laws = length, values["modulus"] * values["area"], slackness, smoothing, *offsets(slackness, smoothing)
     return LineData.of([*laws, reference[line] / pieces, size[line] / pieces])
 
 
@@ -183,7 +181,7 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
         True if no matrix is assembled, so that straight elements do without scikit-fem.
     """
     given, pieces, element = cable.properties(web), cable.subdivide, line_element(cable.order)
-    laws = np.unique(given["law"])
+    laws, law_index = np.unique(given["law"].astype(str), return_inverse=True)
     values = {name: np.repeat(value, pieces) for name, value in given.items()}
     length = values["natural_length"] / pieces
     cut = _elements(web, element, pieces, length, explicit)
@@ -192,7 +190,7 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
     mass, apart = _masses(element, cut.cells, share, len(cut.points), consistent)
     net = Net(
         web=web,
-        law=Law(list(NAMES)[laws[0]]) if len(laws) == 1 else None,
+        laws=tuple(map(law_of, laws.tolist())),
         points=cut.points,
         mass=mass,
         element_mass=share,
@@ -210,5 +208,18 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
         cable_mass=float(mass.sum()),
         consistent_minus_lumped=apart,
         allowed_share=None if (allowed == 1.0).all() else allowed,
+        kept=tuple({curve for curve in given.get("curve", ()) if curve is not None}),
     )
-    return net if net.law else net.with_column("law", values["law"])
+    return _with_laws(net, law_index.repeat(pieces), values)
+
+
+def _with_laws(net, law_index, values):
+    """The net with the columns of its laws, and of the number of its law for each element where there are several."""
+    for number, law in enumerate(net.laws):
+        elements = law_index == number
+        of_law = law.numbers({key: value[elements] for key, value in values.items()})
+        for name, column in of_law.items():
+            if name not in net.line_data.dtype.names:
+                net = net.with_column(name, 0.0)
+            net.line_data[name][elements] = column
+    return net if len(net.laws) == 1 else net.with_column("law", law_index)

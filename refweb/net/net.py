@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .tension_laws import FORM_FINDING, MIXED
+from .laws.law import evaluate, record_of, together
 
 if TYPE_CHECKING:
-    from .line_data import LineData
-    from .tension_laws import Law
+    from .laws.line_data import LineData
     from .web import Web
 
 
@@ -29,8 +28,9 @@ class Net:
     ----------
     web : refweb.net.web.Web
         Nodes and lines as the user numbered them.
-    law : refweb.net.tension_laws.Law or None
-        Tension law of all lines; None where they have several, whose numbers then are ``line_data.law``.
+    laws : tuple of type
+        Tension laws of the lines, classes of `refweb.net.laws.law.TensionLaw`. Where there are several, the number of
+        that of each element stands in ``line_data.law``.
     points : ndarray, shape (rows, 3)
         Reference positions [m]: the web's nodes, those that order and subdivision add, line by line and along each
         line, then bodies.
@@ -42,7 +42,7 @@ class Net:
         Rows that each element couples, in the order of dN/dξ: ends first. Elements of a line follow each other.
     line : ndarray of int32, shape (cells,)
         The web's line that each element belongs to.
-    line_data : refweb.net.line_data.LineData
+    line_data : refweb.net.laws.line_data.LineData
         Numbers of each element.
     factors : tuple
         Factors of reels and heat on natural lengths, which are multiplied: (elements, table of (t, factor)).
@@ -56,6 +56,8 @@ class Net:
         Knot factor over safety factor: the share of the strength that is allowed; None where it is 1 of all.
     point_mass : ndarray, shape (nodes,), optional
         Part of ``mass`` that point masses have added [kg]; None where there are none.
+    kept : tuple of refweb.net.laws.curve.Curve
+        Curves whose addresses stand in ``line_data``: they live as long as the net.
     gradients : ndarray, shape (points, nodes per cell)
         dN/dξ on the reference element [0, 1].
     weights : ndarray, shape (points,)
@@ -81,7 +83,7 @@ class Net:
     """
 
     web: Web
-    law: Law | None
+    laws: tuple
     points: np.ndarray
     mass: np.ndarray
     element_mass: np.ndarray
@@ -105,6 +107,7 @@ class Net:
     end: float = math.inf
     allowed_share: np.ndarray | None = None
     point_mass: np.ndarray | None = None
+    kept: tuple = ()
 
     @property
     def allowed(self):
@@ -112,19 +115,41 @@ class Net:
         return self.strength if self.allowed_share is None else self.strength * self.allowed_share
 
     @property
-    def law_number(self):
-        """Number of the law in compiled kernels, `refweb.net.tension_laws.MIXED` where there are several."""
-        return MIXED if self.law is None else self.law.number
+    def law(self):
+        """The law of all lines for compiled kernels: the one law, or a `refweb.net.laws.law.Mixed`."""
+        return together(self.laws, self.line_data.dtype)
+
+    @property
+    def law_record(self):
+        """Dtype by which kernels of the law read the numbers of an element."""
+        return record_of(self.law.columns, self.line_data.dtype)
 
     @cached_property
-    def laws(self):
-        """Number of the law of each element, shape (cells,)."""
-        return np.full(len(self.cells), self.law.number) if self.law else self.line_data.law.astype(np.int64)
+    def law_index(self):
+        """Number of the law of each element in ``laws``, shape (cells,)."""
+        several = len(self.laws) > 1
+        return self.line_data.law.astype(np.int64) if several else np.zeros(len(self.cells), dtype=np.int64)
+
+    def law_is(self, attribute):
+        """True for each element whose law has an attribute of `refweb.net.laws.law.TensionLaw`, shape (cells,)."""
+        return np.array([getattr(law, attribute) for law in self.laws])[self.law_index]
 
     @cached_property
     def forming(self):
         """True for each element with a law of form finding, shape (cells,)."""
-        return np.isin(self.laws, FORM_FINDING)
+        return self.law_is("forming")
+
+    @property
+    def curve_scale(self):
+        """Inverse of the last strain of the curve of each element [1], 0 without a curve; None where there is none."""
+        if "last_strain" not in self.line_data.dtype.names:
+            return None
+        last = self.line_data.last_strain
+        return np.where(last > 0.0, 1.0 / np.where(last > 0.0, last, 1.0), 0.0)
+
+    def evaluated(self, which, strain):
+        """A kernel of the laws by name, ``"stress"`` for one, at a strain of each element, or of each of its points."""
+        return evaluate(getattr(self.law, which), strain, self.line_data, self.law.columns)
 
     @property
     def axial(self):

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from ..messages import nearest
-from ..registry import EFFECTS, INTEGRATORS, LISTS, OBSERVABLES, PARTS, SHAPES, SOLVES, STUDY, WEBS, load
+from ..registry import EFFECTS, INTEGRATORS, LAWS, LISTS, OBSERVABLES, PARTS, SHAPES, SOLVES, STUDY, WEBS, load
 from ..settings import Head
-from ..tables import key_of
+from ..tables import Table, key_of
 from .docstrings import example, parameters, prose, refusals, summary
 from .schema import accepted
 
@@ -231,6 +231,13 @@ def _part(name):
     yield from _inner(name, kind)
 
 
+def _cable(name):
+    yield from _part(name)
+    for law, reference in LAWS.items():
+        if issubclass(kind := load(reference), Table):
+            yield _page(f"cable.{law}", f'[cable] law = "{law}", parameters', kind)
+
+
 def _body(name):
     kind = load(EFFECTS[name])
     yield _page(name, header_of(name), kind, without=["form"])
@@ -260,4 +267,12 @@ def _solve(name):
     yield _page("solve.dynamic", '[solve] kind = "dynamic"', load(SOLVES["dynamic"]), **more)
 
 
-_PAGES = {"scene": _scene, "web": _web, "body": _body, "observe": _observe, "solve": _solve, "study": _study}
+_PAGES = {
+    "scene": _scene,
+    "web": _web,
+    "cable": _cable,
+    "body": _body,
+    "observe": _observe,
+    "solve": _solve,
+    "study": _study,
+}

@@ -24,7 +24,6 @@ import math
 import numpy as np
 
 from ..findings import Finding
-from ..net.tension_laws import SMOOTH
 from .solution import Result
 from .strength import ALIKE, UTILISATION, of_observable
 from .units import readable
@@ -84,7 +83,7 @@ def reasons_of(scene, system, solution):
         reasons["contact_stiffness"] = "no contact in the scene"
     elif not any(touching):
         reasons["contact_stiffness"] = "nothing touches"
-    if not (system.net.laws == SMOOTH).any() and (static or not any(map(rubs, scene.effects))):
+    if not system.net.law_is("smoothed").any() and (static or not any(map(rubs, scene.effects))):
         reasons["smoothing"] = "neither the cable law nor friction has any"
     return reasons
 

@@ -9,7 +9,6 @@ import numpy as np
 from ..compiled.rows import records_of
 from ..effects.base import TOUCH
 from ..findings import Finding
-from ..net.tension_laws import LINEAR, SMOOTH, Law
 from .columns import static_energies
 
 
@@ -102,7 +101,7 @@ class State:
         net = self.system.net
         fixed = self.system.supported.all(axis=1)
         fixed[net.web.bare] = True  # by a link
-        fixed[net.cells[(net.laws == LINEAR) | ~self.element_slack].ravel()] = True
+        fixed[net.cells[net.law_is("bar") | ~self.element_slack].ravel()] = True
         return np.flatnonzero(~fixed[: net.nodes])
 
     @cached_property
@@ -197,11 +196,23 @@ def strain_remark(strain):
         )
 
 
+def curve_remark(net, share, element):
+    """Find a strain beyond the last point of the curve of an element, by the largest ``share`` of that strain."""
+    if share > 1.0:
+        last = net.line_data.last_strain[element]
+        yield Finding(
+            "beyond-curve",
+            f"line {net.line[element]} is strained by {100.0 * share * last:.4g} %, beyond the last point of its curve "
+            f"at {100.0 * last:.4g} %, where its last slope goes on: give the curve more points, or lower what acts",
+            "cable",
+        )
+
+
 def floor_remark(net, stress):
     """Find a floor of the smooth law above 1 % of the largest stress [Pa]."""
-    if (smooth := net.laws == SMOOTH).any():
-        lines = net.line_data[smooth]
-        floor = float((Law("smooth").floor(lines.ea, lines.slackness, lines.smoothing) / net.area[smooth]).max())
+    for number in (number for number, law in enumerate(net.laws) if law.smoothed):
+        smooth = net.law_index == number
+        floor = float((net.laws[number].floor(net.line_data[smooth]) / net.area[smooth]).max())
         if floor > 0.01 * stress:
             yield Finding(
                 "law-floor",

@@ -6,12 +6,14 @@ import numpy as np
 
 from ..effects.elasticity import strains
 from ..kernels import kernel
+from ..net.laws.law import evaluate
 
 
 class Bars:
     """State of the bars of a net at a displacement: arrays over them.
 
-    Their law is that of tension alone or, with no length in place of the natural one, that of a force density.
+    Their laws are convex: that of tension alone, with no length in place of the natural one that of a force density,
+    and curved ones, which kernels evaluate.
 
     Parameters
     ----------
@@ -23,32 +25,64 @@ class Bars:
     Attributes
     ----------
     natural, unstressed, stiffness : ndarray, shape (bars,)
-        Natural length [m], length up to which the bar is slack [m], and EA over the natural length [N/m].
-    length, tension : ndarray, shape (bars,)
-        Length [m] and tension [N].
+        Natural length [m], length up to which the bar is slack [m], and EA over the natural length [N/m], the largest
+        stiffness.
+    length, tension, tangent : ndarray, shape (bars,)
+        Length [m], tension [N] and, where it is taut, its slope over length [N/m].
+    curved : ndarray of int
+        Bars whose law is a curve.
     direction : ndarray, shape (bars, 3)
         Unit vectors, 0 of a bar without length.
     """
 
     def __init__(self, net, x):
         axial = net.per_bar(net.line_data.ea)
-        self.natural = net.bar_lengths
+        self._net, self.natural = net, net.bar_lengths
         self.stiffness = axial / self.natural
         vector = net.bar_vectors(x)
         self.length = np.linalg.norm(vector, axis=1)
-        self._strain = strains(net, x).ravel()
+        strain, slackness = strains(net, x).ravel(), net.per_bar(net.slackness)
         forming = net.per_bar(net.forming)
-        self.unstressed = np.where(forming, 0.0, self.natural)
-        self.tension = axial * np.maximum(self._strain + forming, 0.0)
-        self._stretch = np.where(forming, self.length, self.natural * self._strain)
-        self._strain[forming] = 0.0  # neither slack nor taut
+        self.unstressed = np.where(forming, 0.0, self.natural * (1.0 + slackness))
+        self.tension = axial * np.maximum(strain + forming, 0.0)
+        self._stretch = np.where(forming, self.length, self.natural * strain)
+        self._strain = np.where(forming, 0.0, strain - slackness)  # neither slack nor taut
         self.direction = vector / np.where(self.length > 0, self.length, 1.0)[:, None]
-        self._net = net
+        self.tangent = self.stiffness
+        self.curved = np.flatnonzero(net.per_bar(~(net.law_is("cone") | net.forming)))
+        if len(self.curved):
+            self._lines, curved = net.line_data[net.per_bar(np.arange(len(net.cells)))[self.curved]], self.curved
+            self.strain, self.tangent = strain[curved], self.tangent.copy()
+            self.tension[curved] = self.evaluated("stress", self.strain)
+            self.tangent[curved] = self.evaluated("tangent", self.strain) / self.natural[curved]
+
+    @property
+    def energy(self):
+        """Strain energy of each bar [J], shape (bars,)."""
+        energy = 0.5 * self.tension**2 / self.stiffness
+        if len(self.curved):
+            energy[self.curved] = self.natural[self.curved] * self.evaluated("energy_density", self.strain)
+        return energy
+
+    def evaluated(self, which, strain):
+        """A kernel of the laws by name at strains of the curved bars."""
+        return evaluate(getattr(self._net.law, which), strain, self._lines, self._net.law.columns)
+
+    def strain_of(self, tension):
+        """Strains of the curved bars at tensions [N]; of no tension that up to which they are slack."""
+        strain, index = self._lines.slackness.copy(), self._net.per_bar(self._net.law_index)[self.curved]
+        for number, law in enumerate(self._net.laws):
+            lines = (index == number) & (tension > 0.0)
+            strain[lines] = law.strain_of(tension[lines], self._lines[lines])
+        return strain
 
     def ahead(self, change):
         """Tensions to first order in a change of the displacement, of shape (rows, 3) [m]; none is negative [N]."""
         along = ((self._net.bars @ change) * self.direction).sum(axis=1)
-        return np.maximum(self.stiffness * (self._stretch + along), 0.0)
+        tension = np.maximum(self.stiffness * (self._stretch + along), 0.0)
+        if len(self.curved):
+            tension[self.curved] = self.evaluated("stress", self.strain + (along / self.natural)[self.curved])
+        return tension
 
     def lent(self, share):
         """Fictitious stiffness of slack bars [N/m], by a smooth law: η is ``share`` of the mean strain of taut bars."""

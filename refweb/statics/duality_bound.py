@@ -10,7 +10,13 @@ It is evaluated without cancellation, with T = k (l − L)₊: (T − |s|)²/2k 
 lines, plus (|s| l − s·d) for the direction. The stress energy of the element forces is quadratic, and its gradient is
 Lipschitz with k. Hence Σ |T t − s*|²/2k ≤ Π − Π* ≤ gap, which bounds every tension: |T − T*| ≤ √(2 k gap).
 
-A force density q > 0 is the same with k = q and L = 0. Of curved elements every quadrature point is such a line, a bar
+A force density q > 0 is the same with k = q and L = 0. Of a law whose tension rises along a curve, with slopes of at
+most k, l_s is the length at the tension |s|. The part of a line along itself is then
+
+    W(l) + W*(|s|) − |s| l = (T − |s|)(l − l_s) − (W(l_s) + W*(T) − T l_s) ≤ (T − |s|)(l − l_s) − (T − |s|)²/2k,
+
+and this bound takes the place of the first two terms. The energy of these lines is bounded by that at the ends of the
+range of each tension. Of curved elements every quadrature point is such a line, a bar
 of natural length w L whose vector is w dx/dξ.
 
 The computed forces are corrected until they balance the loads: s += D B p, where B p are changes of the vectors of the
@@ -48,6 +54,8 @@ class DualityBound:
         Π(x) − D(s), with its rounding [J]; the exact potential lies within [Π − gap, Π].
     tension : ndarray, shape (cells,)
         Bound on the error of each element's tension [N].
+    strain : ndarray, shape (cells,)
+        Bound on the error of each element's strain [1], where it is taut.
     strain_energy : float
         Bound on the error of the strain energy [J].
     sharp : bool
@@ -56,6 +64,7 @@ class DualityBound:
 
     gap: float
     tension: np.ndarray
+    strain: np.ndarray
     strain_energy: float
     sharp: bool = False
 
@@ -104,7 +113,8 @@ class _Balance:
         self._resultant = -self._of_bars.T.tocsc().astype(np.longdouble)
         self._force = bars.tension[:, None] * bars.direction
         self._reach = 2.0 * np.linalg.norm(x, axis=1).max()
-        per_bar = 0.5 * bars.tension**2 / bars.stiffness + bars.tension * bars.length * np.finfo(float).eps
+        self._energy = bars.energy
+        per_bar = self._energy + bars.tension * bars.length * np.finfo(float).eps
         self._rounding = np.finfo(float).eps * (per_bar.sum() + np.abs(outer * x).sum())
         # Sums of forces leave at least this of them.
         self._least_gap = self._rounding + np.finfo(np.longdouble).eps * bars.tension.sum() * self._reach
@@ -124,7 +134,7 @@ class _Balance:
         """Solver and weights for the present tangent, with the factorization of it or of a similar one."""
         system, bars = self._system, self._bars
         across = bars.tension / np.where(bars.length > 0.0, bars.length, 1.0)
-        along = np.where(bars.tension > 0.0, bars.stiffness - across, 0.0)[:, None] * bars.direction
+        along = np.where(bars.tension > 0.0, bars.tangent - across, 0.0)[:, None] * bars.direction
         across = (across + factor.shift / bars.natural)[:, None]
         down = self._of_bars.T.tocsr()
 
@@ -159,10 +169,14 @@ class _Balance:
         size = np.sqrt((force**2).sum(axis=1))
         rounding = self._rounding + np.abs(unbalanced).sum() * self._reach
         gap = float(_gaps(bars, force, size).sum() + rounding)
-        strain_energy = float(0.5 * (bars.tension**2 / bars.stiffness).sum())
-        tension = np.sqrt(2.0 * bars.stiffness * gap).reshape(-1, len(self._system.net.weights)).max(axis=1)
-        sharp = bool(gap <= SHARP * self._least_gap)
-        return DualityBound(gap, tension, 2.0 * np.sqrt(strain_energy * gap) + gap, sharp)
+        tension = np.sqrt(2.0 * bars.stiffness * gap)
+        strain, energy_of_curved = tension / (bars.stiffness * bars.natural), 0.0
+        if len(bars.curved):
+            strain[bars.curved], energy_of_curved = _of_curved(bars, tension[bars.curved])
+        straight = float(np.delete(self._energy, bars.curved).sum())
+        strain_energy = 2.0 * np.sqrt(straight * gap) + gap + energy_of_curved
+        tension, strain = (value.reshape(-1, len(self._system.net.weights)).max(axis=1) for value in (tension, strain))
+        return DualityBound(gap, tension, strain, strain_energy, bool(gap <= SHARP * self._least_gap))
 
     def _rows(self, p):
         """Displacement of all rows, shape (rows, 3), from that of the unknowns."""
@@ -184,4 +198,20 @@ def _gaps(bars, force, size):
     turned = (across**2).sum(axis=1) / np.where(size + along > 0, size + along, 1.0)
     turned = np.where(along > 0, turned, size - along) * bars.length
     slack = np.where(bars.tension > 0.0, 0.0, bars.unstressed - bars.length)
-    return (bars.tension - size) ** 2 / (2 * bars.stiffness) + size * np.maximum(slack, 0.0) + turned
+    apart = (bars.tension - size) ** 2 / (2 * bars.stiffness)
+    stretched = apart + size * np.maximum(slack, 0.0)
+    if len(curved := bars.curved):
+        strain = bars.strain_of(size[curved].astype(float))
+        far = np.abs(strain - bars.strain) + 4.0 * np.finfo(float).eps * (1.0 + strain)
+        stretched[curved] = np.abs(bars.tension - size)[curved] * bars.natural[curved] * far - apart[curved]
+    return stretched + turned
+
+
+def _of_curved(bars, error):
+    """Bounds on the errors of strains [1] of bars with a curved law, and of their energy [J], by those of tension."""
+    tension = bars.tension[bars.curved]
+    ends = [bars.strain_of(np.maximum(tension + change, 0.0)) for change in (-error, error)]
+    strain = np.maximum(*(np.abs(end - bars.strain) for end in ends))
+    energies = [bars.evaluated("energy_density", end) for end in (bars.strain, *ends)]
+    energy = np.maximum(energies[0] - energies[1], energies[2] - energies[0])
+    return strain, float((bars.natural[bars.curved] * np.maximum(energy, 0.0)).sum())

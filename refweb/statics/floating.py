@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from ..effects.elasticity import strains
+from .bars import Bars
 
 SAMPLES = 3
 """Number of random moves without stiffness that represent all such moves."""
@@ -125,7 +125,7 @@ def between_slack_lines(system, equilibrium):
     A line counts as taut where its tension exceeds its proven error at each quadrature point.
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
-    tension = net.line_data.ea[:, None] * strains(net, x)
+    tension = Bars(net, x).tension.reshape(len(net.cells), -1)
     taut = (tension > equilibrium.duality_bound.tension[:, None]).all(axis=1) | net.forming
     pairs = np.vstack([net.cells[:, [0, k]] for k in range(1, net.cells.shape[1])])
     joined = np.tile(taut, net.cells.shape[1] - 1)
@@ -138,7 +138,7 @@ def between_slack_lines(system, equilibrium):
         return None
     position = net.points + x
     apart = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1)
-    reach = np.tile(net.natural_length, net.cells.shape[1] - 1)
+    reach = np.tile(net.natural_length * (1.0 + net.slackness), net.cells.shape[1] - 1)
     longest = np.where(joined, apart, np.maximum(apart, reach * (1.0 if net.cells.shape[1] == 2 else 2.0)))
     moves = np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, count, 3))[:, part] * free
     parts = Parts(part, fixed, position, pairs, longest, len(net.weights) == 1)

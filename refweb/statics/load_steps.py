@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..net.tension_laws import FORCE_DENSITY, LINEAR, TENSION_ONLY
 from ..system.static_system import at_rest
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, with_reason
 from .newton import Newton
@@ -67,7 +66,7 @@ def solve(system, load_steps, progress=None):
             from .stability import ask
 
             ask(full_system, system, state, newton.factor if newton.follows else None)
-            if state.stability.sign == 1 and system.dead and (system.net.laws == FORCE_DENSITY).all():
+            if state.stability.sign == 1 and system.dead and (system.net.forming & system.net.law_is("convex")).all():
                 state.stats["above_lowest"] = 0.0  # a quadratic potential has one minimum
         state.deviations = newton.deviations(state)
         states = [*states[-1:], state]
@@ -101,9 +100,9 @@ def _start(system, t, states):
 
 def _equilibrium(newton, t, x, warm):
     """Equilibrium from the last state, or by another method."""
-    laws, spent = newton.system.net.laws, dict(nsteps=0, nfev=0, njev=0, nlu=0)
-    path = newton.system.dead and bool((laws < LINEAR).all())
-    pulling = bool((laws == TENSION_ONLY).all())
+    net, spent = newton.system.net, dict(nsteps=0, nfev=0, njev=0, nlu=0)
+    path = newton.system.dead and not (net.law_is("bar") | net.forming).any()
+    pulling = not net.law_is("pushes").any()
     convex = pulling and not newton.turns
     try:
         state = newton.solve(t, x, warm=warm, limit=WITH_A_WAY_AROUND if path else MOST)
@@ -149,7 +148,8 @@ def _by_patience(newton, t, x):
     try:
         return newton.solve(t, x, limit=PATIENCE)
     except NotFound as error:
-        data = newton.system.net.line_data
-        push = f"{(data.ea * data.g0).max():.3g} N"
+        net = newton.system.net
+        floors = [law.floor(net.line_data[net.law_index == number]).max() for number, law in enumerate(net.laws)]
+        push = f"{max(floors):.3g} N"
         text = f'{error}, or law = "tension-only": slack lines push with up to {push}'
         raise NotFound(text, error.stats) from None

@@ -18,7 +18,8 @@ import numpy as np
 
 from ..effects.elasticity import strains
 from ..errors import SolverError
-from ..net.tension_laws import LINEAR, Law
+from ..net.laws.law import evaluate
+from ..net.laws.smooth import Smooth
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent
 
 NOTHING = 1e-9
@@ -46,7 +47,7 @@ def lowest(newton, state):
     system = newton.system
     pushes = bool((state.tension < 0.0).any())
     state.stats["above_lowest"] = None if pushes else 0.0
-    if not pushes or (system.net.laws >= LINEAR).any():
+    if not pushes or not system.net.law_is("cone").all():
         return state
     try:
         plain = _without_smoothing(newton, state)
@@ -103,16 +104,15 @@ def _above(system, state, forces):
     net = system.at(state.step).net
     lines = net.line_data
     axial, slackness, smoothing, g0 = map(net.per_bar, (lines.ea, lines.slackness, lines.smoothing, lines.g0))
-    law = Law("smooth")  # which without smoothing is that of lines that only pull
     size = np.linalg.norm(forces, axis=1)
     g = size / axial + g0  # = (s + √(s² + 4η²))/2 at s = ε − ε0, so that s = g − η²/g
     dual_energy = np.where(size > 0.0, slackness + g - smoothing**2 / np.where(g > 0.0, g, 1.0), 0.0)
-    stored = axial * (
-        law.energy_density(strains(net, state.x).ravel(), 1.0, slackness, smoothing)
-        - law.energy_density(dual_energy, 1.0, slackness, smoothing)
+    bars = lines[net.per_bar(np.arange(len(lines)))]
+    energy, energy_of_forces = (  # without smoothing the law is that of lines that only pull
+        evaluate(Smooth.energy_density, strain, bars) for strain in (strains(net, state.x).ravel(), dual_energy)
     )
     along = (forces * net.bar_vectors(state.x)).sum(axis=1)
-    above = float((net.bar_lengths * (stored + size * (1.0 + dual_energy)) - along).sum())
+    above = float((net.bar_lengths * (energy - energy_of_forces + size * (1.0 + dual_energy)) - along).sum())
     return float(max(above, 0.0)) + 2.0 * np.finfo(float).eps * float(np.abs(along).sum())
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..findings import Finding
-from ..net.tension_laws import CONSTANT_FORCE, FORCE_DENSITY, LINEAR, NAMES, TENSION_ONLY
-from ..results.state import floor_remark, strain_remark
+from ..results.state import curve_remark, floor_remark, strain_remark
 from ..results.strength import strength_remark
 
 
@@ -75,7 +74,7 @@ def on_stability(state, equilibrium, subject="the equilibrium"):
         yield Finding("stability-in-doubt", f"whether {subject} is stable is not decided: {stability.why}")
     pushing = "bars" if _bars_push(state) else "slack lines"
     if equilibrium.may_turn_over:
-        pull = (state.element_tension[state.system.net.laws == LINEAR] >= 0.0).all()
+        pull = (state.element_tension[state.system.net.law_is("bar")] >= 0.0).all()
         lowest = equilibrium.stats.get("above_lowest") == 0.0
         which = "none of them lower" if lowest else "and lower ones, which ± does not know"
         yield Finding(
@@ -126,13 +125,16 @@ def remarks_on(state, stats, utilisation, equilibrium):
     yield from strength_remark(utilisation)
     strain = np.where(net.forming, -np.inf, state.element_strain)
     yield from strain_remark((float(strain.max()), int(net.line[strain.argmax()])))
+    if (scale := net.curve_scale) is not None:
+        shares = state.element_strain * scale
+        yield from curve_remark(net, float(shares.max()), int(shares.argmax()))
     yield from collapse_remark(state)
 
 
 def _not_proven(state):
     """A finding where one line, or a free body, keeps the errors of dead loads from being proven."""
     net = state.system.net
-    proven = (net.laws == TENSION_ONLY) | ((net.laws == FORCE_DENSITY) & (net.line_data.ea > 0.0))
+    proven = net.law_is("convex") & ~(net.forming & (net.line_data.ea <= 0.0))
     if state.system.resting and proven.all():
         name = state.system.resting[0].name
         text = f'body "{name}" is free: ± are estimates, as the proven bound asks for a web without free bodies'
@@ -140,19 +142,19 @@ def _not_proven(state):
     if not state.system.dead or proven.all() or not (proven.any() or net.forming.any()):
         return
     first = proven.argmin()
-    law, how = list(NAMES)[net.laws[first]], "can push"
-    if net.laws[first] == CONSTANT_FORCE:
+    law, how = net.laws[net.law_index[first]], "can push"
+    if law.name == "constant-force":
         how = "has a force that does not depend on its length"
     yield Finding(
         "not-proven",
-        f'line {net.line[first]} {how} (law = "{law}"): ± are estimates, as the proven bound asks for law = '
+        f'line {net.line[first]} {how} (law = "{law.name}"): ± are estimates, as the proven bound asks for law = '
         '"tension-only", or a force density above 0, on all lines',
     )
 
 
 def _bars_push(state):
     """Tell if a line of the linear law pushes, or all lines have that law."""
-    bars = state.system.net.laws >= LINEAR
+    bars = state.system.net.law_is("bar") | state.system.net.forming
     return bool((bars & (state.element_tension < 0.0)).any() or bars.all())
 
 
@@ -163,7 +165,7 @@ def collapse_remark(state):
     while all strains are below 1. The size is the diagonal of the box around the web.
     """
     system, net = state.system, state.system.net
-    if (net.laws == LINEAR).all() or net.forming.any():
+    if net.law_is("bar").all() or net.forming.any():
         return
     moved, points = np.linalg.norm(state.x[: net.nodes], axis=1), net.points[: net.nodes]
     driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(int)

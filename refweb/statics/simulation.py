@@ -9,7 +9,6 @@ import numpy as np
 
 from ..errors import SolverError
 from ..findings import Finding
-from ..net.tension_laws import SMOOTH
 from ..registry import STATICS, load
 from ..results.columns import FIRST, static_energies
 from ..results.observables.line import StressShare
@@ -92,7 +91,7 @@ class Simulation:
     def _smoothing(self):
         """The `refweb.statics.smoothing_error.Smoothing` of the scene, None if it is not needed."""
         scene = self.scene
-        smooth = (self.system.net.laws == SMOOTH).any()
+        smooth = self.system.net.law_is("smoothed").any()
         if not smooth or scene.solve.method != "newton" or scene.accuracy.error == "none":
             return None
         from .smoothing_error import Smoothing

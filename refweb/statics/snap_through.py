@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..net.tension_laws import LINEAR
 from ..system.factorization import Factor
 
 SHORTER = 1e-9
@@ -29,7 +28,7 @@ def may_turn_over(rest, equilibrium):
         The equilibrium.
     """
     net = rest.at(equilibrium.step).net
-    bars = net.laws == LINEAR
+    bars = net.law_is("bar")
     if (bars & (equilibrium.tension < 0.0)).any() or rest.unsupported_parts or rest.resting:
         return True
     values = rest.at(equilibrium.step).across_lines(np.ones(len(net.cells)))

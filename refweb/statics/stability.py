@@ -41,7 +41,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..net.tension_laws import LINEAR, TENSION_ONLY
 from ..system.factorization import Factor, Lu, negative_pivots
 from .equilibrium import Stability
 
@@ -82,7 +81,7 @@ def ask(system, rest, state, solver=None):
         state.stability = by_pivot(sign)
     _ask_of_kinks(system, rest, state)
     state.stats["smallest_pivot"] = state.stability.sign
-    if (rest.net.laws == LINEAR).any():
+    if rest.net.law_is("bar").any():
         from .snap_through import may_turn_over
 
         state.may_turn_over = may_turn_over(rest, state)
@@ -93,7 +92,8 @@ def _ask_of_kinks(system, rest, state):
     rest = rest.at(state.step)
     net, numbers = rest.net, rest.net.line_data.copy()
     strain = np.linalg.norm(net.bar_vectors(state.x), axis=1) / net.bar_lengths - 1.0
-    kinked = (net.laws == TENSION_ONLY) & (abs(strain).reshape(len(net.laws), -1).min(axis=1) <= KINK)
+    kinks = abs(strain - net.per_bar(net.slackness)).reshape(len(net.cells), -1).min(axis=1)
+    kinked = ~(net.law_is("smoothed") | net.law_is("bar") | net.forming) & (kinks <= KINK)
     if state.stability.sign not in (0, 1) or not kinked.any():
         return
     numbers.natural_length[kinked] *= 1.0 + 4.0 * KINK

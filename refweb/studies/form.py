@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError, SolverError, in_file
 from ..net.inline import Inline
-from ..net.tension_laws import FORM_FINDING, NAMES, strains_of
+from ..net.tension_laws import law_of, strains_of
 from ..registry import EFFECTS, STATICS, load, name_of
 from ..scene import Scene
 from ..statics.equilibrium import LIMIT, force_scale, residual
@@ -96,7 +96,7 @@ def _material(cable):
 def _elastic(table, cable):
     """A cable or a group as `_material` has it."""
     law, changes = table.law or cable.law, {"prestrain": 0.0 if table is cable else None, "sag": None}
-    if NAMES[law] in FORM_FINDING:
+    if law_of(law).forming:
         force = table.force_density if law == "force-density" else table.pretension
         if table.law is not None or force is not None:
             changes["law"] = "linear" if force is not None and force < 0.0 else "tension-only"
@@ -144,8 +144,7 @@ def _formed(scene, web, material, keeps):
 def _natural_lengths(web, points, tension, made):
     """Natural length of each line that has its tension at these points [m]; of one without any its length."""
     length = np.linalg.norm(points[web.lines[:, 1]] - points[web.lines[:, 0]], axis=1)
-    keys = ("modulus", "area", "slackness", "smoothing")
-    return length / (1.0 + strains_of(made["law"], tension, *(made[key] for key in keys)))
+    return length / (1.0 + strains_of(made, tension))
 
 
 def _with_numbers(table, web):

@@ -29,7 +29,6 @@ import numpy as np
 from ..dynamics.budget import Spent, budget_of, steps_with_twin
 from ..dynamics.twin_error import largest_mean
 from ..errors import InputError, SolverError
-from ..net.tension_laws import SMOOTH
 from ..registry import EFFECTS, INTEGRATORS, name_of
 from ..results.error_budget import ALLOWED, SMOOTHED, SMOOTHING_SHARE, first_touch, reasons_of, rubs
 from ..results.files import write_atomically, write_text
@@ -291,7 +290,7 @@ def variants(scene, system, solution, single):
             stiffer = plain.with_stiffness({name: times * value for name, value in given.items()}).replace(chosen=())
             price = single * (times**0.5 if explicit else 1.5)
             yield Variant("contact_stiffness", text, stiffer, price, STIFFNESS[0] if n else None)
-    if not static and (system.net.laws == SMOOTH).any():
+    if not static and system.net.law_is("smoothed").any():
         smoother = plain.replace(cable=scene.cable.with_smoothing(SMOOTHING_SHARE))
         yield Variant("smoothing", SMOOTHER, smoother, single)
     if not static and (effects := slower_slip(scene)) is not None:

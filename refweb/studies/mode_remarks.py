@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..findings import Finding
-from ..net.tension_laws import LINEAR
 from ..results.state import floor_remark
 from ..statics.remarks import remark_on_open
 from ..system.static_system import waiting
@@ -25,7 +24,7 @@ def remarks_on(computed, state, equilibrium):
         text = f"{computed.zero} directions have no stiffness: they have no frequency and are not listed"
         yield Finding("no-stiffness", text)
     yield from remark_on_open(state, equilibrium)
-    kinked = (net.laws != LINEAR) & (net.line_data.smoothing == 0.0)
+    kinked = ~net.law_is("bar") & (net.line_data.smoothing == 0.0)
     if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
         text = f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
         yield Finding("kink", text)

@@ -167,7 +167,7 @@ def trials_of(scene):
     if scene.solve.kind == "static":
         cable = scene.cable
         differs = [group.smoothing is not None or group.law is not None for group in cable.groups.values()]
-        if cable.law == "linear" or any(differs):
+        if cable.law not in ("smooth", "tension-only") or any(differs):
             del trials["newton-smooth"]
         elif cable.law == "smooth":
             trials["newton-smooth"] = [t for t in trials["newton-smooth"] if t.value != cable.smoothing]

@@ -23,7 +23,6 @@ from ..effects.elasticity import length_force
 from ..findings import Finding
 from ..net.rigid_body import row_names, with_rotations
 from ..net.rotation import turn_by
-from ..net.tension_laws import FORCE_DENSITY, TENSION_ONLY
 from .forces import Forces, PerCell
 from .start import initial_velocity, laid
 
@@ -326,7 +325,7 @@ class System:
         return view
 
     def with_line_data(self, numbers):
-        """The same system with other numbers of its lines, a `refweb.net.line_data.LineData`."""
+        """The same system with other numbers of its lines, a `refweb.net.laws.line_data.LineData`."""
         changed = copy.copy(self)
         changed.net = replace(self.net, line_data=numbers)
         changed._at_time = None
@@ -474,8 +473,9 @@ class System:
     @property
     def convex(self):
         """True if the potential is convex and the loads are dead: `refweb.statics.duality_bound` then bounds errors."""
-        laws, ea = self.net.laws, self.net.line_data.ea
-        return bool(((laws == TENSION_ONLY) | ((laws == FORCE_DENSITY) & (ea > 0.0))).all()) and self.dead
+        net = self.net
+        negative = net.forming & (net.line_data.ea <= 0.0)
+        return bool((net.law_is("convex") & ~negative).all()) and self.dead
 
     @property
     def contact(self):

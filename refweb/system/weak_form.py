@@ -14,6 +14,7 @@ from skfem.helpers import dot
 
 from ..net.discretisation import basis
 from ..net.elements import line_element
+from ..net.tension_laws import Law
 
 
 def tangent_of(law):
@@ -54,6 +55,6 @@ def tangent_matrix(net, x):
     component[lines.element_dofs.T] = (3 * net.cells[:, :, None] + np.arange(3)).reshape(len(net.cells), -1)
     numbers = {name: net.line_data[name][:, None] for name in ("ea", "slackness", "smoothing")}
     position = lines.interpolate((net.points + x).ravel()[component])
-    matrix = tangent_of(net.law).assemble(lines, x=position, **numbers).tocoo()
+    matrix = tangent_of(Law(net.law.name)).assemble(lines, x=position, **numbers).tocoo()
     size = 3 * len(net.points)
     return coo_array((matrix.data, (component[matrix.row], component[matrix.col])), shape=(size, size)).tocsr()

@@ -164,7 +164,7 @@ def test_other_laws(law):
     assert all(abs(slope(error, safeties) - 2.0) < 0.1 for error in np.transpose(errors))
     exact = by_formula(0.3, law, 1e-3, 0.04, **smooth)
     if law == "smooth":
-        np.testing.assert_allclose(exact[2], -system.net.law.floor(*system.net.line_data.matrix[0, 1:4]), rtol=1e-14)
+        np.testing.assert_allclose(exact[2], -system.net.law.floor(system.net.line_data)[0], rtol=1e-14)
     for solver in (Cvode(system, rtol=1e-9), Ida(system, rtol=1e-9), CentralDifference(system, safety=0.001)):
         run = solver.start(v=APART)
         solver.advance(run, np.linspace(0.0, 0.04, 5)[1:])
@@ -177,7 +177,7 @@ def test_never_pushes_more_than_its_law(law):
     """Total tensions over random states and velocities: at or above the floor, without damping where that is slack."""
     held, net = np.zeros((6, 3), dtype=bool), skew_net(law)
     plain, damped = (System(net, [Elasticity(), *more], held) for more in ([], [refweb.Damping(time=0.1)]))
-    floor, smallest, at_floor = net.law.floor(*net.line_data.matrix[:, 1:4].T), np.inf, 0
+    floor, smallest, at_floor = net.law.floor(net.line_data), np.inf, 0
     for seed in range(20):
         rng = np.random.default_rng(seed)
         x, v = 0.1 * rng.standard_normal((6, 3)), rng.standard_normal((6, 3))

@@ -4,7 +4,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from refweb.net.tension_laws import LINEAR, SMOOTH, TENSION_ONLY, Law, above_floor, curvature
+from refweb.net.laws.law import evaluate
+from refweb.net.laws.line_data import LineData
+from refweb.net.laws.smooth import Smooth
+from refweb.net.laws.straight import Linear, TensionOnly
+from refweb.net.tension_laws import Law
 
 mpmath.mp.dps = 60
 STRAINS = np.concatenate([s * np.logspace(-15, 0, 31) for s in (1, -1)] + [[0.0]])
@@ -55,17 +59,19 @@ def test_floor_is_the_limit_under_compression():
 @pytest.mark.parametrize("slackness", SLACKNESSES)
 def test_curvature_and_height_above_the_floor(slackness, smoothing):
     """d²σ/dε² = E (1 − s²/r²)/2r and σ + αE = E (s + r)/2, both without cancellation."""
-    n = mpmath.mpf(smoothing)
-    for strain in STRAINS[::3]:
+    n, strains = mpmath.mpf(smoothing), STRAINS[::3]
+    lines = LineData.of_law(np.full(len(strains), 3.0), slackness, smoothing)
+    curvature, above_floor = (evaluate(kernel, strains, lines) for kernel in (Smooth.curvature, Smooth.above_floor))
+    for i, strain in enumerate(strains):
         s = mpmath.mpf(float(strain)) - mpmath.mpf(slackness)
         r = mpmath.sqrt(s * s + 4 * n * n)
         second = (1 - s * s / (r * r)) / (2 * r) if r else 0
-        assert abs(curvature(SMOOTH, strain, 3.0, slackness, smoothing) - 3 * second) <= 1e-14 * 3 * second
+        assert abs(curvature[i] - 3 * second) <= 1e-14 * 3 * second
         height = 3 * (s + r) / 2
-        assert abs(above_floor(SMOOTH, strain, 3.0, slackness, smoothing) - height) <= 1e-14 * height
-        assert curvature(TENSION_ONLY, strain, 3.0, 0.0, 0.0) == curvature(LINEAR, strain, 3.0, 0.0, 0.0) == 0.0
-        assert above_floor(TENSION_ONLY, strain, 3.0, 0.0, 0.0) == max(3.0 * strain, 0.0)
-        assert above_floor(LINEAR, strain, 3.0, 0.0, 0.0) == np.inf
+        assert abs(above_floor[i] - height) <= 1e-14 * height
+    for law, above in ((TensionOnly, np.maximum(3.0 * strains, 0.0)), (Linear, np.inf)):
+        assert (evaluate(law.curvature, strains, lines) == 0.0).all()
+        assert (evaluate(law.above_floor, strains, lines) == above).all()
 
 
 def test_tension_only_is_the_limit_of_the_smooth_law_and_linear_is_two_sided():

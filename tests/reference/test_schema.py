@@ -9,9 +9,8 @@ from jsonschema import Draft4Validator
 
 import refweb
 from refweb.__main__ import main
-from refweb.net.tension_laws import NAMES
 from refweb.reference.schema import accepted, schema
-from refweb.registry import EFFECTS, INTEGRATORS, LISTS, PARTS, SHAPES, SOLVES, WEBS, load
+from refweb.registry import EFFECTS, INTEGRATORS, LAWS, LISTS, PARTS, SHAPES, SOLVES, WEBS, load
 from refweb.scene import SHIPPED_SCENES
 from refweb.settings import Head
 from refweb.tables import Table
@@ -215,7 +214,7 @@ def test_editors_are_told_what_keys_mean():
             texts = own, own.get("items", {})
             assert any("description" in one or "oneOf" in one for one in texts) or key == "kind", key
     cable = SCHEMA["properties"]["cable"]["properties"]
-    assert cable["law"]["enum"] == [*NAMES] and cable["law"]["default"] == "smooth"
+    assert cable["law"]["enum"] == [*LAWS] and cable["law"]["default"] == "smooth"
     assert "Cross section" in cable["area"]["description"] and "[m²]" in cable["area"]["description"]
     assert cable["area"]["minimum"] == 0 and cable["area"]["exclusiveMinimum"]
 

@@ -103,7 +103,14 @@ def test_help_prints_a_guide(path, capsys):
 
 
 def test_pages_link_to_pages():
-    made = {"how-to/effect.md", "how-to/shape.md", "how-to/observable.md", "how-to/integrator.md", "how-to/verb.md"}
+    made = {
+        "how-to/effect.md",
+        "how-to/shape.md",
+        "how-to/law.md",
+        "how-to/observable.md",
+        "how-to/integrator.md",
+        "how-to/verb.md",
+    }
     for path in PAGES:
         for target in re.findall(r"\]\(([\w/.-]+\.md)\)", path.read_text(encoding="utf-8")):
             assert target in made or (SITE / "pages" / target).is_file(), target

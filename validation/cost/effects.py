@@ -66,6 +66,9 @@ TABLE = {
     "output": {"interval": 1e-2, "frames": 1},
     "accuracy": {"error": "none"},
 }
+CURVED = {key: value for key, value in PLAIN["cable"].items() if key != "modulus"}
+CURVED |= {"law": "table", "stress": [[1e-3 * n, 7e4 * n] for n in range(20)]}
+"""The cable of the web as a curve of 20 points, which is straight: the web moves in the same way."""
 NEVER = "self contact that never touches"
 LIMITS = {("square web, thrown", NEVER): 1.5, ("a net folded in two, radius 1 mm", "self contact"): 5.0}
 """Largest ratios to the same without."""
@@ -89,6 +92,7 @@ EFFECTS = {
     "rupture": {"rupture": {"strength": 1e12}},
     "pressure": {"pressure": [{"lines": "all", "normal": [0.0, 0.0, 1.0], "value": 0.1}]},
     "thrust": {"thrust": [{"node": 0, "line": 0, "force": 1.0}]},
+    'law = "table"': {"cable": CURVED},
     "damping, time": {"damping": {"time": 1e-5}},
     "damping, rate": {"damping": {"rate": 1.0}},
     "bending": {"bending": {"stiffness": 1e-3}},

@@ -234,7 +234,7 @@ def compiled(folder, name):
         return None
     source, library = pathlib.Path(folder) / f"{name}.c", pathlib.Path(folder) / f"{name}.so"
     source.write_text(LEAN if name == "lean" else SOURCE)
-    names = {"REFERENCE": 6, "LENGTH": 0, "AXIAL": 1, "AWAY": AWAY}  # see `refweb.net.line_data.FIELDS`
+    names = {"REFERENCE": 6, "LENGTH": 0, "AXIAL": 1, "AWAY": AWAY}  # see `refweb.net.laws.line_data.FIELDS`
     names |= {name: column_of(SPHERE, field) for name, field in (("RADIUS", "radius"), ("PENALTY", "stiffness"))}
     flags = [f"-D{name}={value}" for name, value in names.items()]
     command = [compiler, *FLAGS[name], "-shared", "-fPIC", *flags, "-o", library, source, "-lm"]

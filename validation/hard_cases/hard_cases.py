@@ -164,6 +164,15 @@ STATICS = {
     "slackness ε0, 1 N": {
         e: static(pull(1.0), law="smooth", smoothing=1e-6, slackness=e) for e in (0.0, 1e-6, 1e-3, 1e-2, 0.1)
     },
+    "curves of points": {
+        name: static(pull(10.0), law="table", modulus=None, stress=points, prestrain=prestrain)
+        for name, points, prestrain in (
+            ("soft at first", ((0.0, 0.0), (0.02, 1e4), (0.05, 4e5), (0.2, 1e7)), 0.0),
+            ("soft at first, slack", ((0.0, 0.0), (0.02, 1e4), (0.05, 4e5), (0.2, 1e7)), -0.02),
+            ("stiff at first, slack", ((0.01, 0.0), (0.011, 1e5), (0.1, 2e5), (0.3, 1e6)), -0.02),
+            ("steps of 1 : 1e4", ((0.0, 0.0), (0.01, 1e2), (0.011, 1e5), (0.1, 1.001e5), (0.2, 1e7)), 0.0),
+        )
+    },
     "modulus [Pa], 1 N": {e: static(pull(1.0), modulus=e) for e in (1.0, 1e3, 1e6, 1e9, 1e12)},
     "density [kg/m³] under gravity": {
         d: static(HANGING, pull(1e-3), density=d) for d in (0.0, 1e-6, 1e-3, 200.0, 1e4)

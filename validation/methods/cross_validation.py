@@ -60,6 +60,8 @@ SMALL = {
 BOX = {"name": "box", "shape": "box", "size": [0.3, 0.2, 0.15], "rounding": 0.03, "mass": 0.3}
 BOX |= {"angular_velocity": [3.0, -2.0, 1.0], "velocity": [0.0, 0.0, -1.0]}
 ANGLE = {"name": "angle", "quantity": "orientation", "body": "box"}
+CURVE = [[0.002, 0.0], [0.015, 4e3], [0.03, 2e4], [0.1, 1e5]]
+"""A rope that is soft at first."""
 TIED = "a box tied to its middle"
 EFFECTS = {
     "[orbit]": {"orbit": {"mean_motion": 2.0}},
@@ -88,6 +90,10 @@ EFFECTS = {
         "velocity": [{"node": "all", "value": [0.0, 0.0, 0.0]}],
         "load": [{"node": 3, "force": [1.0, 0.0, 2.0]}],
         "observe": [*SMALL["observe"][:1], {"name": "turned", "quantity": "axle_angle", "body": "box"}],
+    },
+    'law = "table"': {
+        "cable": {"law": "table", "stress": CURVE, "area": 1e-5, "density": 1000.0, "prestrain": 0.01},
+        "damping": {"time": 1e-4},
     },
     "a box that tumbles into it": {
         "body": [BOX | {"position": [0.1, 0.03, 0.15]}],

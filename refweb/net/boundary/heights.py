@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
 from ...errors import InputError
-from ..csv_files import places_of as places_in
+from ..csv_files import columns_of
 from .closed import joined
 from .surface_file import read
 
@@ -23,7 +23,7 @@ def places_of(path):
         For a file without a surface, and for one that has two heights at a place.
     """
     if path.suffix.lower() == ".csv":
-        points = places_in(path)
+        points = columns_of(path, "xyz")
         triangles = _between(points)
     else:
         points, triangles = joined(*read(path))

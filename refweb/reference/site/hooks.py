@@ -27,6 +27,7 @@ FIRST = """[Quick start](start.md) · [A net of your own](own-net.md) · [How fa
 HOW_TO = {
     "effect": ("An effect", "refweb.effects"),
     "shape": ("A body shape", "refweb.net.rigid_body"),
+    "law": ("A tension law", "refweb.net.laws"),
     "observable": ("An observable", "refweb.results.observables"),
     "integrator": ("An integrator", "refweb.dynamics.integrators"),
     "verb": ("A verb of the command line", "refweb.commands"),
@@ -44,6 +45,7 @@ PLUG_INS = (
     "refweb.compiled.kernel:kernel",
     "refweb.net.net:Net",
     "refweb.net.rigid_body:Shape",
+    "refweb.net.laws.law:TensionLaw",
     "refweb.results.observables.observable:Observable",
     "refweb.results.probes:Probe",
     "refweb.dynamics.integrators.step_observer:StepObserver",

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...effects.base import STRAIN
 from ...errors import InputError
-from ...net.tension_laws import TENSION_ONLY
+from ...net.tension_laws import law_of
 from .observable import ANY, NOT_NEGATIVE, SELECTIONS, Observable, Value
 
 
@@ -29,8 +29,8 @@ class Line(Observable):
         """Value of each element in a state, shape (cells,)."""
         raise NotImplementedError
 
-    def bound(self, tension, net):
-        """Error of each element by a proven error of its tension [N], shape (cells,)."""
+    def bound(self, proven, net):
+        """Error of each element by a `refweb.statics.duality_bound.DualityBound`, shape (cells,)."""
         raise NotImplementedError
 
     def on(self, system):
@@ -87,7 +87,7 @@ class Line(Observable):
         """
         if self.observe.select == "abs":
             return NOT_NEGATIVE
-        pulls = system.net.laws[self.elements(system.net)] == TENSION_ONLY
+        pulls = ~system.net.law_is("pushes")[self.elements(system.net)]
         alone = sum(term.over_lines for term in system.terms) == 1
         certain = pulls.all() if self.observe.select == "min" else pulls.any()
         return NOT_NEGATIVE if self.pull and certain and alone else ANY
@@ -99,7 +99,8 @@ class Line(Observable):
         cable = tables.get("cable", {})
         laws = {table["law"] for table in (cable, *cable.get("groups", {}).values()) if "law" in table}
         damped = tables.get("damping", {}).get("time", 0.0) > 0.0
-        return NOT_NEGATIVE if self.pull and laws == {"tension-only"} and not damped else ANY
+        pushes = damped or not laws or any(law_of(law).pushes for law in laws)
+        return NOT_NEGATIVE if self.pull and not pushes else ANY
 
     def column(self, system):
         """Column of tension in the output of lines."""
@@ -114,7 +115,7 @@ class Line(Observable):
         if equilibrium.duality_bound is None:
             return super().error(state, equilibrium)
         net = state.system.net
-        bound = self.bound(equilibrium.duality_bound.tension, net)[self.elements(net)]
+        bound = self.bound(equilibrium.duality_bound, net)[self.elements(net)]
         return float(bound.max()) + self.of_held_lines(state)
 
     def proven(self, equilibrium):
@@ -131,9 +132,9 @@ class Tension(Line):
         """Tension [N], shape (cells,)."""
         return state.element_tension
 
-    def bound(self, tension, net):
+    def bound(self, proven, net):
         """The error bound of tension itself [N], shape (cells,)."""
-        return tension
+        return proven.tension
 
 
 class Stress(Line):
@@ -149,9 +150,9 @@ class Stress(Line):
         """Inverse of the area [1/m²], shape (cells,)."""
         return 1.0 / net.area
 
-    def bound(self, tension, net):
+    def bound(self, proven, net):
         """Error bound of tension over the area [Pa], shape (cells,)."""
-        return tension / net.area
+        return proven.tension / net.area
 
 
 class StressShare(Line):
@@ -177,9 +178,9 @@ class StressShare(Line):
         """Inverse of the tension at the limit [1/N], 0 without a limit, shape (cells,)."""
         return 1.0 / (net.area * getattr(net, self._over))
 
-    def bound(self, tension, net):
+    def bound(self, proven, net):
         """Error bound of tension over the tension at the limit [1], shape (cells,)."""
-        return tension * self.scale(net)
+        return proven.tension * self.scale(net)
 
 
 class Strain(Line):
@@ -195,9 +196,9 @@ class Strain(Line):
         """Strain [1], shape (cells,)."""
         return state.element_strain
 
-    def bound(self, tension, net):
-        """Error bound of tension over EA [1], shape (cells,)."""
-        return tension / net.line_data.ea
+    def bound(self, proven, net):
+        """Error bound of strain itself [1], shape (cells,)."""
+        return proven.strain
 
     def error(self, state, equilibrium):
         """± of the value; None if the line may be slack within its bound, since its strain is then not unique."""

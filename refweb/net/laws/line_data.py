@@ -19,6 +19,12 @@ FIELDS = [
 """Columns of every net; kernels know them by `refweb.effects.line_kernels`."""
 
 
+def offsets(slackness, smoothing):
+    """(g0, r0) of the smooth law."""
+    r0 = np.sqrt(slackness**2 + 4.0 * smoothing**2)
+    return 2.0 * smoothing**2 / np.where(r0 > 0.0, r0 + slackness, 1.0), r0
+
+
 class LineData(np.recarray):
     """Numbers of each element, an array of shape (elements,) whose fields are arrays, which may be written.
 
@@ -27,13 +33,13 @@ class LineData(np.recarray):
     natural_length, ea : ndarray, shape (elements,)
         Natural length [m] and EA [N].
     slackness, smoothing, g0, r0 : ndarray, shape (elements,)
-        ε0, η and their (g0, r0) of `refweb.net.tension_laws`.
+        ε0, η and their (g0, r0) of the smooth law, see `refweb.net.laws`.
     reference : ndarray, shape (elements, 3)
         dX/dξ [m], constant because lines of a web are straight.
     distance : ndarray, shape (elements,)
         Its magnitude [m].
     law, damping_time, rupture_energy : ndarray, shape (elements,)
-        Number of the law, where lines have several, and what effects add by `with_column`.
+        Number of the law, where lines have several, and what laws and effects add by `with_column`.
     """
 
     natural_length: np.ndarray
@@ -53,6 +59,24 @@ class LineData(np.recarray):
         """Make those of columns in the order of the fields, by default `FIELDS`."""
         matrix = np.ascontiguousarray(np.column_stack(columns), dtype=float)
         return matrix.view(np.dtype(fields or FIELDS)).reshape(len(matrix)).view(cls)
+
+    @classmethod
+    def of_law(cls, ea, slackness=0.0, smoothing=0.0, **columns):
+        """Make those of lines of length 1 with all that laws read; arrays that broadcast."""
+        ea, slackness, smoothing = (np.ravel(value) for value in np.broadcast_arrays(ea, slackness, smoothing))
+        numbers = [np.ones(len(ea)), ea, slackness, smoothing, *offsets(slackness, smoothing)]
+        lines = cls.of([*numbers, np.zeros((len(ea), 4))])
+        return lines.with_law(columns)
+
+    def with_law(self, columns):
+        """The same with numbers of a law by column: those of `FIELDS` are replaced, others are added."""
+        lines = self
+        for name, values in columns.items():
+            if name in self.dtype.names:
+                lines[name] = values
+            else:
+                lines = lines.with_column(name, values)
+        return lines
 
     @property
     def matrix(self):

@@ -1,0 +1,147 @@
+"""Keys of ``[cable]`` and its groups that some laws alone have: points of a curve, and parameters of other packages."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Any
+
+import numpy as np
+
+from ..accepted import accepts, any_of, by_name
+from ..errors import InputError, refused_at
+from ..messages import quote, short
+from ..tables import Table, checked, field, real, rows, text
+from .tension_laws import law_of
+
+CURVES = {"stress": "Pa", "tension": "N"}
+"""Keys of a curve over strain, and their units."""
+
+
+def points(*, unit) -> Any:
+    """Points of a curve over strain: a list of rows of two numbers, or the path of a CSV file; None by default."""
+    listed, path = (kind.metadata["read"] for kind in (rows(2), text()))
+
+    @accepts(any_of(listed.accepts, path.accepts))
+    def read(name, value):
+        return path(name, value) if isinstance(value, str) else listed(name, value)
+
+    return field(read, default=None, unit=unit)
+
+
+def numbers_by_name() -> Any:
+    """Numbers by name, a table; None by default."""
+    number = real()
+
+    @accepts(by_name({"type": "number"}))
+    def read(name, value):
+        if not isinstance(value, dict):
+            raise InputError(f"{name} = {quote(value)} must be a table of numbers, {name} = {{NAME = 1.0}}")
+        return {key: checked(f"{name}.{short(key)}", given, number) for key, given in value.items()}
+
+    return field(read, default=None)
+
+
+def curve_key(table):
+    """Key of the curve of a cable or a group, None where it has none; refuses two."""
+    keys = [key for key in CURVES if getattr(table, key) is not None]
+    if len(keys) > 1:
+        raise InputError("stress and tension both give the curve of the law: leave one of them out")
+    return keys[0] if keys else None
+
+
+def check(cable, own_modulus):
+    """Refuse keys of a cable or its groups that their law does not have, and a law "table" without a curve.
+
+    ``own_modulus`` is the modulus of the cable that no material gives.
+    """
+    tables = {"": cable, **{f"groups.{short(name)}: ": group for name, group in cable.groups.items()}}
+    inherits = any((group.law or cable.law) != "table" and group.modulus is None for group in cable.groups.values())
+    for where, table in tables.items():
+        law, key = table.law or cable.law, curve_key(table)
+        if key and law != "table":
+            raise InputError(f'{where}{key} has no meaning with law = "{law}": leave it out, or give law = "table"')
+        if law != "table":
+            continue
+        if not (key or (cable.law == "table" and curve_key(cable))):
+            raise InputError(f'{where}law = "table" needs stress = [[strain, Pa], ...] or tension = [[strain, N], ...]')
+        modulus = own_modulus if table is cable else None if table.material else table.modulus
+        if modulus is not None and not (table is cable and inherits):
+            raise InputError(
+                f'{where}modulus = {modulus:g} has no meaning with law = "table", whose curve gives it: leave it out'
+            )
+        if table is not cable or not inherits:
+            object.__setattr__(table, "modulus", None)
+
+
+def curves_of(cable, laws, given):
+    """The `refweb.net.laws.curve.Curve` of each line of the law "table", None of others, an array of objects.
+
+    Parameters
+    ----------
+    cable : refweb.net.cable.Cable
+        The cable.
+    laws : ndarray of object, shape (lines,)
+        Name of the law of each line.
+    given : dict of str to ndarray
+        Number of the group that gives each key of a line, see `refweb.net.groups.givers`.
+    """
+    curves, tables = np.full(len(laws), None), [cable, *cable.groups.values()]
+    names = ["", *(f".groups.{short(name)}" for name in cable.groups)]
+    none = np.full(len(laws), -1)
+    owner = 1 + np.maximum(*(given.get(key, none) for key in CURVES))
+    for number, (name, table) in enumerate(zip(names, tables, strict=True)):
+        key, lines = curve_key(table), np.flatnonzero(owner == number)
+        if key is None or not len(lines):
+            continue
+        for line in lines[laws[lines] != "table"][:1] if number else ():
+            raise InputError(f'[cable{name}] {key} has no meaning with law = "{laws[line]}" of line {line}')
+        with refused_at(f"[cable{name}]"):
+            curve = _curve(getattr(table, key), key)
+        for line in lines[laws[lines] == "table"]:
+            curves[line] = curve
+    for line in np.flatnonzero((laws == "table") & (curves == None))[:1]:  # noqa: E711
+        raise InputError(f'[cable] law = "table" of line {line} needs stress = [[strain, Pa], ...] or tension = ...')
+    return curves
+
+
+def _curve(given, key):
+    """The curve of points, or of a file of them."""
+    from .laws.curve import curve_of
+
+    if not isinstance(given, str):
+        return curve_of(given, CURVES[key])
+    from .csv_files import columns_of
+
+    path = pathlib.Path(given)
+    with refused_at(f"{key} = {quote(given)}:"):
+        try:
+            columns = columns_of(path, ("strain", key))
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror or error}") from None
+        return curve_of(tuple(map(tuple, columns.tolist())), CURVES[key])
+
+
+def parameters_of(cable, laws, given):
+    """Numbers of lines by the columns of laws of other packages, a dict of arrays of shape (lines,).
+
+    Raises
+    ------
+    InputError
+        For a parameter that the law of a line does not have, needs, or takes no such value of.
+    """
+    columns, owner = {}, given.get("parameters", np.full(len(laws), -1))
+    for law, number in dict.fromkeys(zip(laws, owner, strict=True)):
+        kind, lines = law_of(law), (laws == law) & (owner == number)
+        name, group = list(cable.groups.items())[number] if number >= 0 else ("", None)
+        where = f"[cable.groups.{short(name)}]" if group else "[cable]"
+        values = dict(cable.parameters or {}) if law == cable.law else {}
+        values |= group.parameters if group else {}
+        with refused_at(f"{where} parameters:"):
+            if not issubclass(kind, Table):
+                for key in values:
+                    raise InputError(f'{short(key)} has no meaning with law = "{law}", which has no parameters')
+                continue
+            made = kind(**values)
+        for key, value in vars(made).items():
+            columns.setdefault(key, np.zeros(len(laws)))[lines] = value
+    return columns
