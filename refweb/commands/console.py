@@ -44,6 +44,12 @@ def _box(title, rows):
     _console().print(Panel(grid, title=Text(title), title_align="left", expand=False))
 
 
+def _curve(curve):
+    """A curve of a law in words."""
+    ends = f"strains from {curve.first:g} to {curve.last:g}"
+    return f"{len(curve.points)} points, {ends}, slopes up to {curve.steepest:.4g} {curve.unit}"
+
+
 def print_scene(scene, system):
     """Print what is simulated: sizes, cable, effects present, solver."""
     cable, solve = scene.cable, scene.solve
@@ -100,6 +106,7 @@ def print_scene(scene, system):
             ("web", f"{counts}; {len(system.free)} unknowns"),
             ("", sizes),
             ("cable", f"{law}; {modulus}A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
+            *(("curve", _curve(curve)) for curve in system.net.kept),
             ("effects", ", ".join(counted) or "none"),
             *((f'body "{body.name}"', text) for body in system.net.bodies for text in body.shape.texts()),
             *_stiffness(scene, system),

@@ -107,10 +107,11 @@ class Cable(Table):
     Parameters
     ----------
     law : {"smooth", "tension-only", "linear", "force-density", "constant-force", "table"}
-        Tension law, see `refweb.net.laws`. Groups may have others: struts beside cables. Lines that can push
-        end the proven bound that statics has where all lines are tension-only. The last two are those of form finding,
-        for statics: the tension of a line is ``force_density`` times its length, or ``pretension``, whatever its
-        natural length is, and `refweb.form` makes a net of elastic lines of the shape.
+        Tension law, see `refweb.net.laws`. Groups may have others: struts beside cables. Lines that can push end the
+        proven bound that statics has where all lines are tension-only or have a curve, the law "table". The laws
+        "force-density" and "constant-force" are those of form finding, for statics: the tension of a line is
+        ``force_density`` times its length, or ``pretension``, whatever its natural length is, and `refweb.form` makes a
+        net of elastic lines of the shape.
     material : str, optional
         Gives the modulus, the density and the strength where these keys are absent: typical values of a fibre or rope,
         which ``refweb help materials`` lists with their sources. A braid is softer and weaker than its fibre.

@@ -208,7 +208,7 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
         cable_mass=float(mass.sum()),
         consistent_minus_lumped=apart,
         allowed_share=None if (allowed == 1.0).all() else allowed,
-        kept=tuple({curve for curve in given.get("curve", ()) if curve is not None}),
+        kept=tuple(dict.fromkeys(curve for curve in given.get("curve", ()) if curve is not None)),
     )
     return _with_laws(net, law_index.repeat(pieces), values)
 

@@ -43,7 +43,7 @@ class Law:
     Raises
     ------
     InputError
-        For an unknown name.
+        For an unknown name, and a law with numbers of its own, such as a curve.
 
     Notes
     -----
@@ -53,7 +53,8 @@ class Law:
     name: str = "smooth"
 
     def __post_init__(self):
-        law_of(self.name)
+        if law_of(self.name).columns:
+            raise InputError(f'law = "{self.name}" has numbers of its own: evaluate it by a net of lines')
 
     def _evaluate(self, which, *numbers):
         strain, *numbers = np.broadcast_arrays(*numbers)

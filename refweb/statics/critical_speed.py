@@ -8,7 +8,8 @@ least Ω at which the sum of both is not positive definite,
 
 is a sharp limit. In an orbit, Ω² C is replaced by the masses times the matrix G of `refweb.effects.orbit`. The total
 potential has a least value below the limit, and none above it. No law here has dσ/dε > E or T/l > EA/L, so that no
-tangent of the lines exceeds A. Therefore no equilibrium is stable at or above the limit.
+tangent of the lines exceeds A. Therefore no equilibrium is stable at or above the limit. Of a curve E is the largest
+slope, and the limit is sharp only where that is the last one.
 
 Counts of negative pivots (Sylvester's law of inertia) compare A with Ω²C. Translations of a part that no support holds
 across the axis are an exception, since A does not resist them. In the inertial frame such a part moves in a straight

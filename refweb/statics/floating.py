@@ -1,9 +1,10 @@
 """Open positions of an equilibrium: the parts that float, their directions, and their range.
 
-For the tension-only law under dead loads, the tensions of taut lines and their directions are unique. Two equilibria
-then differ by translations of *parts*. A part is connected by lines whose tension is proven to be above 0. A part that
-no support holds along an axis floats along it, as far as its slack lines allow, |d| ≤ L. For other laws or forces, the
-null space of the tangent is open. Tensions, reactions and energies do not change as parts float.
+For lines that only pull, by the tension-only law or a curve that rises, the tensions of taut lines and their directions
+are unique under dead loads. Two equilibria then differ by translations of *parts*. A part is connected by lines whose
+tension is proven to be above 0. A part that no support holds along an axis floats along it, as far as its slack lines
+allow, |d| ≤ L. For other laws or forces, the null space of the tangent is open. Tensions, reactions and energies do not
+change as parts float.
 """
 
 from __future__ import annotations

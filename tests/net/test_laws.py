@@ -88,6 +88,8 @@ def test_tension_only_is_the_limit_of_the_smooth_law_and_linear_is_two_sided():
 def test_unknown_law_names_the_nearest():
     with pytest.raises(ValueError, match='did you mean "smooth"'):
         Law("smoth")
+    with pytest.raises(ValueError, match="has numbers of its own"):
+        Law("table")
 
 
 @pytest.mark.parametrize("name", ["smooth", "tension-only", "linear"])
