@@ -15,7 +15,7 @@ from . import law_keys
 from .groups import givers
 from .law_keys import numbers_by_name, points
 from .materials import FILLED, MATERIALS
-from .tension_laws import law_of, strains_of
+from .tension_laws import law_of, names_in, strains_of
 
 SMOOTH_LAW = {"slackness": 0.0, "smoothing": 1e-5}
 """Parameters of the smooth law where none are given."""
@@ -274,6 +274,7 @@ class Cable(Table):
     def _values(self, web):
         """Values that the cable and its groups give to each line, by key."""
         given, values = givers(web.groups, self.groups, len(web.lines), "[cable.groups]"), {}
+        widest = np.array([self.law, *(group.law or "" for group in self.groups.values())]).dtype
         missing = {
             "strength": np.inf,
             "modulus": np.nan,
@@ -282,8 +283,7 @@ class Cable(Table):
             **dict.fromkeys((*LENGTHS[1:], DENSITY), np.nan),
         }
         for key in (f.name for f in fields(Group) if f.name not in ("material", "parameters", *law_keys.CURVES)):
-            dtype = object if key == "law" else float
-            values[key] = np.full(len(web.lines), _number(self, key, missing), dtype)
+            values[key] = np.full(len(web.lines), _number(self, key, missing), widest if key == "law" else float)
             for number, group in enumerate(self.groups.values()):
                 if key in given and getattr(group, key) is not None:
                     values[key][given[key] == number] = _number(group, key, missing)
@@ -314,7 +314,8 @@ class Cable(Table):
 
 def _forming(laws):
     """True for each law by name that is one of form finding, an array."""
-    return np.isin(laws, [name for name in set(laws) if law_of(name).forming])
+    forming = [name for name in names_in(laws) if law_of(name).forming]
+    return np.isin(laws, forming) if forming else np.zeros(len(laws), dtype=bool)
 
 
 def _fill(table):

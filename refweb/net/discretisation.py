@@ -29,7 +29,7 @@ import numpy as np
 from .elements import gauss, line_element, lumped_shares, values
 from .laws.line_data import LineData, offsets
 from .net import Net
-from .tension_laws import law_of
+from .tension_laws import law_of, names_in
 
 
 def basis(points, lines, natural_length, element=None):
@@ -181,7 +181,7 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
         True if no matrix is assembled, so that straight elements do without scikit-fem.
     """
     given, pieces, element = cable.properties(web), cable.subdivide, line_element(cable.order)
-    laws, law_index = np.unique(given["law"].astype(str), return_inverse=True)
+    laws = names_in(given["law"])
     values = {name: np.repeat(value, pieces) for name, value in given.items()}
     length = values["natural_length"] / pieces
     cut = _elements(web, element, pieces, length, explicit)
@@ -190,7 +190,7 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
     mass, apart = _masses(element, cut.cells, share, len(cut.points), consistent)
     net = Net(
         web=web,
-        laws=tuple(map(law_of, laws.tolist())),
+        laws=tuple(map(law_of, laws)),
         points=cut.points,
         mass=mass,
         element_mass=share,
@@ -210,13 +210,15 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
         allowed_share=None if (allowed == 1.0).all() else allowed,
         kept=tuple(dict.fromkeys(curve for curve in given.get("curve", ()) if curve is not None)),
     )
-    return _with_laws(net, law_index.repeat(pieces), values)
+    return _with_laws(net, values)
 
 
-def _with_laws(net, law_index, values):
+def _with_laws(net, values):
     """The net with the columns of its laws, and of the number of its law for each element where there are several."""
+    law_index = np.zeros(len(net.cells))
     for number, law in enumerate(net.laws):
-        elements = law_index == number
+        elements = values["law"] == law.name
+        law_index[elements] = number
         of_law = law.numbers({key: value[elements] for key, value in values.items()})
         for name, column in of_law.items():
             if name not in net.line_data.dtype.names:

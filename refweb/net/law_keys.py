@@ -11,7 +11,7 @@ from ..accepted import accepts, any_of, by_name
 from ..errors import InputError, refused_at
 from ..messages import quote, short
 from ..tables import Table, checked, field, real, rows, text
-from .tension_laws import law_of
+from .tension_laws import law_of, names_in
 
 CURVES = {"stress": "Pa", "tension": "N"}
 """Keys of a curve over strain, and their units."""
@@ -62,7 +62,7 @@ def check(cable, own_modulus):
             raise InputError(f'{where}{key} has no meaning with law = "{law}": leave it out, or give law = "table"')
         if law != "table":
             continue
-        if not (key or (cable.law == "table" and curve_key(cable))):
+        if not any(map(curve_key, tables.values())):
             raise InputError(f'{where}law = "table" needs stress = [[strain, Pa], ...] or tension = [[strain, N], ...]')
         modulus = own_modulus if table is cable else None if table.material else table.modulus
         if modulus is not None and not (table is cable and inherits):
@@ -80,7 +80,7 @@ def curves_of(cable, laws, given):
     ----------
     cable : refweb.net.cable.Cable
         The cable.
-    laws : ndarray of object, shape (lines,)
+    laws : ndarray of str, shape (lines,)
         Name of the law of each line.
     given : dict of str to ndarray
         Number of the group that gives each key of a line, see `refweb.net.groups.givers`.
@@ -88,7 +88,10 @@ def curves_of(cable, laws, given):
     curves, tables = np.full(len(laws), None), [cable, *cable.groups.values()]
     names = ["", *(f".groups.{short(name)}" for name in cable.groups)]
     none = np.full(len(laws), -1)
-    owner = 1 + np.maximum(*(given.get(key, none) for key in CURVES))
+    by_stress, by_tension = (given.get(key, none) for key in CURVES)
+    for line in np.flatnonzero((by_stress >= 0) & (by_tension >= 0))[:1]:
+        raise InputError(f"[cable.groups] line {line} has both stress and tension: give it one of them")
+    owner = 1 + np.maximum(by_stress, by_tension)
     for number, (name, table) in enumerate(zip(names, tables, strict=True)):
         key, lines = curve_key(table), np.flatnonzero(owner == number)
         if key is None or not len(lines):
@@ -130,18 +133,17 @@ def parameters_of(cable, laws, given):
         For a parameter that the law of a line does not have, needs, or takes no such value of.
     """
     columns, owner = {}, given.get("parameters", np.full(len(laws), -1))
-    for law, number in dict.fromkeys(zip(laws, owner, strict=True)):
-        kind, lines = law_of(law), (laws == law) & (owner == number)
-        name, group = list(cable.groups.items())[number] if number >= 0 else ("", None)
-        where = f"[cable.groups.{short(name)}]" if group else "[cable]"
-        values = dict(cable.parameters or {}) if law == cable.law else {}
-        values |= group.parameters if group else {}
-        with refused_at(f"{where} parameters:"):
-            if not issubclass(kind, Table):
-                for key in values:
+    tables = [("[cable]", cable), *((f"[cable.groups.{short(key)}]", group) for key, group in cable.groups.items())]
+    for law in names_in(laws):
+        kind, of_law = law_of(law), laws == law
+        for number in np.unique(owner[of_law]) if "parameters" in given else (-1,):
+            where, table = tables[number + 1]
+            values = dict(cable.parameters or {}) if law == cable.law else {}
+            values |= table.parameters if number >= 0 else {}
+            with refused_at(f"{where} parameters:"):
+                if issubclass(kind, Table):
+                    for key, value in vars(kind(**values)).items():
+                        columns.setdefault(key, np.zeros(len(laws)))[of_law & (owner == number)] = value
+                for key in values if not issubclass(kind, Table) else ():
                     raise InputError(f'{short(key)} has no meaning with law = "{law}", which has no parameters')
-                continue
-            made = kind(**values)
-        for key, value in vars(made).items():
-            columns.setdefault(key, np.zeros(len(laws)))[lines] = value
     return columns

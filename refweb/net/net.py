@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .laws.law import evaluate, record_of, together
+from .laws.law import record_of, together
 
 if TYPE_CHECKING:
     from .laws.line_data import LineData
@@ -146,10 +146,6 @@ class Net:
             return None
         last = self.line_data.last_strain
         return np.where(last > 0.0, 1.0 / np.where(last > 0.0, last, 1.0), 0.0)
-
-    def evaluated(self, which, strain):
-        """A kernel of the laws by name, ``"stress"`` for one, at a strain of each element, or of each of its points."""
-        return evaluate(getattr(self.law, which), strain, self.line_data, self.law.columns)
 
     @property
     def axial(self):

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..messages import nearest
 from ..registry import LAWS, known, load, possible
-from .laws.law import evaluate, unknown_strain
+from .laws.law import evaluate
 from .laws.line_data import LineData
 
 
@@ -28,6 +28,15 @@ def law_of(name) -> Any:
     if not known(LAWS, name):
         raise InputError(f'law = "{name}" is unknown, {nearest(name, possible(LAWS))}')
     return load(LAWS[name])
+
+
+def names_in(laws):
+    """Names among those of the laws of some lines, an array of texts, each once and sorted."""
+    names, left = [], np.ones(len(laws), dtype=bool)
+    while left.any():
+        names.append(str(laws[left.argmax()]))
+        left &= laws != names[-1]
+    return sorted(names)
 
 
 @dataclass(frozen=True)
@@ -102,7 +111,7 @@ def strains_of(values, tension):
         a tension that is too large for the law.
     """
     strain = np.zeros(len(tension))
-    for name in dict.fromkeys(values["law"]):
+    for name in names_in(values["law"]):
         law, lines = law_of(name), (values["law"] == name) & (tension != 0.0)
         if not lines.any():
             continue
@@ -114,7 +123,9 @@ def strains_of(values, tension):
         axial, numbers = own_values["modulus"] * own_values["area"], law_numbers(law, own_values)
         strain[lines] = law.strain_of(tension[lines], LineData.of_law(axial, **numbers))
         for line in np.flatnonzero(lines & ~np.isfinite(strain))[:1]:
-            raise unknown_strain(name, tension[line], line)
+            raise InputError(
+                f'line {line} cannot have a tension of {tension[line]:g} N: law = "{name}" has none so large'
+            )
     for line in np.flatnonzero(strain <= -1.0)[:1]:
         raise InputError(f"line {line} pushes with {-tension[line]:g} N, more than its EA: give it a larger area")
     return strain

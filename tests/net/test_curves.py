@@ -437,3 +437,16 @@ def test_bounds_along_a_line_are_near_to_what_they_bound(far):
     assert above <= bound.gap + rounding and abs(stored) <= bound.strain_energy + rounding
     if abs(far) <= 1e-4:
         assert bound.gap <= 4.0 * above
+
+
+def test_groups_alone_may_give_curves_but_one_to_each_line():
+    pairs, points = np.array([[0, 1], [1, 2]]), np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]], dtype=float)
+    web = refweb.Web(points=points, lines=pairs, rim=np.array([0]), groups={"a": [0], "b": [1], "both": [0, 1]})
+    keys, tension = dict(law="table", area=1e-4, density=300.0), {"tension": [[0.0, 0.0], [1.0, 40.0]]}
+    made = Cable(**keys, groups={"a": {"stress": NYLON}, "b": tension}).properties(web)
+    steepest = Curve(NYLON, "Pa").steepest
+    np.testing.assert_allclose(made["modulus"], [steepest, 40.0 / 1e-4], rtol=1e-15)
+    with pytest.raises(refweb.InputError, match='law = "table" of line 1 needs stress'):
+        Cable(**keys, groups={"a": tension}).properties(web)
+    with pytest.raises(refweb.InputError, match="line 1 has both stress and tension"):
+        cable(groups={"both": {"stress": SOFTENING}, "b": tension}).properties(web)

@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...compiled.rows import narrowed, record_at
-from ...errors import InputError
 from ...kernels import Matrix, Vector, kernel
 from .line_data import FIELDS
 
@@ -204,30 +203,20 @@ def _over_lines(scalar, record):
 
 
 def evaluate(scalar, strain, lines, columns=()):
-    """A scalar kernel at the strain of each line, an array of shape (lines,), or (lines, points) as the strain.
+    """A scalar kernel at the strain of each line, shape (lines,).
 
     Parameters
     ----------
     scalar : refweb.compiled.kernel.Kernel
         One of a law.
-    strain : ndarray
+    strain : ndarray, shape (lines,)
         Strain of each line [1].
     lines : refweb.net.laws.line_data.LineData
         Numbers of the lines.
     columns : tuple of str
         Those of the law.
     """
-    strain = np.ascontiguousarray(strain, dtype=float)
-    if strain.ndim == 2:
-        per_point = evaluate(scalar, strain.ravel(), lines[np.repeat(np.arange(len(lines)), strain.shape[1])], columns)
-        return per_point.reshape(strain.shape)
-    out = np.empty(len(strain))
-    if not len(out):
-        return out
-    _over_lines(scalar, record_of(columns, lines.dtype))(strain, lines.matrix, out)
+    strain, out = np.ascontiguousarray(strain, dtype=float), np.empty(len(lines))
+    if len(lines):
+        _over_lines(scalar, record_of(columns, lines.dtype))(strain, lines.matrix, out)
     return out
-
-
-def unknown_strain(name, tension, line):
-    """The error where no strain of a law has a tension."""
-    return InputError(f'line {line} cannot have a tension of {tension:g} N: law = "{name}" has none so large')
