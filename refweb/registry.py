@@ -281,8 +281,12 @@ KINDS = {
     "verb": Kind(COMMANDS, "", _WORDS),
 }
 """Kinds that `register` and entry points, of the group ``refweb.`` + kind + ``s``, may add."""
-LINE_COLUMNS = {"natural_length", "ea", "g0", "r0", "reference", "distance", "law", "damping_time", "rupture_energy"}
-"""Numbers of a line that no parameter of a law may be called as, besides ``slackness`` and ``smoothing``."""
+LINE_COLUMNS = (
+    *("natural_length", "ea", "slackness", "smoothing", "g0", "r0", "reference", "distance"),
+    *("law", "damping_time", "rupture_energy", "curve", "modulus", "area", "density", "strength", "safety_factor"),
+    "knot_factor",
+)
+"""Numbers of a line, as which no parameter of a law may be called."""
 SHIPPED = {kind: frozenset(entry.table) for kind, entry in KINDS.items()}
 """Names of what refweb ships, by kind."""
 RESERVED = {"effect": {"schema", "title", "seed", "web", "solve", *PARTS, *LISTS}, "integrator": {"auto"}}
@@ -367,7 +371,7 @@ def _check_law(name, law):
 
     if law.name != name:
         raise InputError(f"name = {quote(law.name)} of the class must be the same name")
-    parameters = [f for f in getattr(law, "__dataclass_fields__", ())]
+    parameters = [*getattr(law, "__dataclass_fields__", ())]
     for parameter in parameters:
         if parameter in LINE_COLUMNS:
             raise InputError(f"the parameter {quote(parameter)} has a name of refweb's own, call it otherwise")

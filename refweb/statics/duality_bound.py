@@ -209,6 +209,8 @@ def _gaps(bars, force, size):
 
 def _of_curved(bars, error):
     """Bounds on the errors of strains [1] of bars with a curved law, and of their energy [J], by those of tension."""
+    if not np.isfinite(error).all():
+        return np.full(len(error), np.inf), np.inf
     tension = bars.tension[bars.curved]
     ends = [bars.strain_of(np.maximum(tension + change, 0.0)) for change in (-error, error)]
     strain = np.maximum(*(np.abs(end - bars.strain) for end in ends))

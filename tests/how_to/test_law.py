@@ -19,7 +19,10 @@ from refweb.net.cable import Cable
 from refweb.statics.duality_bound import duality_bound
 from refweb.statics.newton import Newton
 from refweb.system.system import System
+from refweb.tables import Table, real, table
 
+RESERVED = {"slackness": real(default=0.0), "__annotations__": {"slackness": float}}
+"""A parameter with a name of refweb's own."""
 AXIAL, LIMIT = 7e3, 0.01
 """EA [N] and the strain a of the page."""
 
@@ -166,3 +169,6 @@ def test_laws_that_are_none_are_refused():
         refweb.register("law", "linear", law(name="linear"))
     with pytest.raises(refweb.InputError, match="must be a class derived from refweb.net.laws.law.TensionLaw"):
         refweb.register("law", "one", dict)
+    reserved = table(type("One", (refweb.net.laws.law.TensionLaw, Table), {"name": "one", **RESERVED}))
+    with pytest.raises(refweb.InputError, match='the parameter "slackness" has a name of refweb\'s own'):
+        refweb.register("law", "one", reserved)

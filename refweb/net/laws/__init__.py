@@ -72,11 +72,12 @@ numbers that a scene gives as ``parameters``, and groups may have others::
     density = 200.0
     parameters = { limit_strain = 0.01 }
 
-``line`` has the numbers of a line by name: ``line.ea``, its modulus times its area, ``line.slackness``, 0 unless the
-law has a field of this name, and the fields of the class. Kernels return tensions [N], in proportion to ``line.ea``: a
-line that breaks has 0 there. Two rules keep explicit steps stable and proofs right: tension does not fall where strain
-rises, and its slope is at most ``line.ea``, so that ``modulus`` is the steepest slope. At a kink the tangent is that of
-the taut side. Formulas that subtract nearly equal numbers lose digits: nets often have strains of 1e-9.
+``line`` has the numbers of a line by name: ``line.ea``, its modulus times its area, the fields of the class, and
+``line.slackness``, the strain up to which it is slack, 0 unless ``numbers`` of the class gives another. Kernels return
+tensions [N], in proportion to ``line.ea``: a line that breaks has 0 there. Two rules keep explicit steps stable and
+proofs right: tension does not fall where strain rises, and its slope is at most ``line.ea``, so that ``modulus`` is the
+steepest slope. At a kink the tangent is that of the taut side. Formulas that subtract nearly equal numbers lose digits:
+nets often have strains of 1e-9.
 
 ``convex = True`` says that tension is 0 up to a strain ≥ 0 and rises from there on. Errors of statics are then proven,
 with the strain at a tension that ``strain_of`` finds by bisection, or by a formula where the class has one. A law of
