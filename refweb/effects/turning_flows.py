@@ -14,7 +14,7 @@ from ..compiled.rows import matrix_of, record_at, width_of
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from .base import Balance, ForceTerm, Tangent, Timing, VelocityForce, column
 from .time_tables import flattened, interpolate
-from .turning_axes import turned
+from .vectors import cross
 
 FLOW = np.dtype(
     [("pull", float, (3, 3)), ("speed", float, (3,)), ("mass", float), ("largest", float), ("point", float, (3,))]
@@ -83,7 +83,7 @@ def bound(reach, speed, x, mass, rates, cells, data):
 def coriolis(t, x, v, f, cells, data, out):
     for c in range(cells.shape[0]):
         m, w, row = 2.0 * added_mass(t, data, c), record_at(FLOW, data, c, 0).speed, cells[c, 0]
-        q = turned(w[0], w[1], w[2], v[row, 0], v[row, 1], v[row, 2])
+        q = cross((w[0], w[1], w[2]), (v[row, 0], v[row, 1], v[row, 2]))
         for i in range(3):
             f[row, i] -= m * q[i]
 
