@@ -99,21 +99,22 @@ def test_a_mass_that_is_whirled_by_central_differences(factor, drum):
         assert abs(slope - 2.0) < 0.2  # steps of 0.2 of the bound leave the next term
 
 
-@pytest.mark.parametrize("solver", nets.some([Cvode, Ida], 2))
+@pytest.mark.ordinary("drum that moves-Cvode")
+@pytest.mark.parametrize("solver", [Cvode, Ida])
 @pytest.mark.parametrize("drum", DRIVES)
 def test_a_mass_that_is_whirled_by_sundials(solver, drum):
     """Errors go with rtol to the power 2/3, by 21 over two decades, of which a third is asked for; balances close."""
     drive, errors = DRIVES[drum], []
     system = whirled(OUT_AND_IN, WEIGHT, drive=drive)
     truth = by_scipy(OUT_AND_IN, drive, np.array(WEIGHT.acceleration))
-    for rtol in (1e-5, 1e-7):
+    for rtol in (1e-4, 1e-6):
         one = solver(system, rtol=rtol)
         run = one.start()
         one.advance(run, np.linspace(0.1, 1.0, 10))
         errors.append([*far(run, system, truth), run.drift, run.ledger.drifts[0]])
     coarse, fine = np.array(errors)
     assert (coarse > 7.0 * fine).all()
-    assert fine[0] < 1e-4 and fine[1] < 2e-3 and fine[2] < 1e-3 and fine[3] < 1e-4 and fine[4] < 1e-5
+    assert fine[0] < 5e-4 and fine[1] < 1e-2 and fine[2] < 5e-3 and fine[3] < 5e-4 and fine[4] < 5e-5
 
 
 def test_a_tether_keeps_its_angular_momentum():
@@ -267,8 +268,8 @@ def whirl(**changes):
 def test_methods_agree():
     """Within the sum of their ±, which are small."""
     found = []
-    for solve in ({"safety": 0.1}, {"method": "cvode", "rtol": 1e-6}):
-        found.append(refweb.run(refweb.Scene.from_dict(whirl(solve={"kind": "dynamic", "duration": 1.0, **solve}))))
+    for solve in ({"safety": 0.2}, {"method": "cvode", "rtol": 1e-5}):
+        found.append(refweb.run(refweb.Scene.from_dict(whirl(solve={"kind": "dynamic", "duration": 0.5, **solve}))))
         assert not found[-1].warnings
     for name, one in found[0].results.items():
         other = found[1].results[name]
