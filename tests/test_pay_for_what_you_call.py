@@ -87,7 +87,11 @@ def roots(given, method):
         yield "system.resting_bodies"
     if "throw" in given:
         yield "results.throw"
-    if any(shape in ("cylinder", "box") and not body.get("fixed") for shape, body in zip(shapes, bodies, strict=True)):
+    if any("axle" in body for body in bodies):
+        yield "effects.axle"
+    if any(reel.get("mass") == "follows" for reel in given.get("reel", ())):
+        yield "system.material_flow"
+    if any(shape in ("cylinder", "box") and "mass" in body for shape, body in zip(shapes, bodies, strict=True)):
         yield from ("net.solid", *(["effects.turning_bodies"] if spun else []))
     if "mesh" in shapes:
         yield from ("effects.contact.nonconvex_contacts", *(f"net.boundary.{name}" for name in MESH))
@@ -124,7 +128,9 @@ def contact_roots(contact, shapes, static):
     """The same of contact."""
     keys = contact.keys() | {key for own in contact.get("bodies", {}).values() for key in own}
     yield from (
-        ("statics.body_penetration",) if static else ("effects.contact.penetration", "results.observables.overlap")
+        ("statics.body_penetration", "system.contact_forces")
+        if static
+        else ("effects.contact.penetration", "results.observables.overlap")
     )
     if keys & {"damping", "friction"}:
         yield "effects.contact.line_body_friction"

@@ -5,6 +5,9 @@ alone, with the velocity v_d of its node, so that each node of mass m has
 
     m v' = F + m' (v_d − v),    the momentum m' v_d and the energy m' (v_d·v − ½ v²) that come in.
 
+In axes that rotate with Ω, velocities are relative, and v_d becomes v_d − Ω × (r − r_d), with the places r of node and
+drum: material that rests on the drum moves against the axes elsewhere.
+
 The velocity at which material slides along the line is left out: its momentum flux is of the size ρA L'². The
 momentum of all, and the angular momentum about a drum at rest, are kept.
 
@@ -63,6 +66,10 @@ class FollowedMass(Record):
         factor of 1 is worth [kg], and the table over time.
     mass, inverse : ndarray, shape (rows,) and (rows, 3)
         Mass of all rows [kg], and its inverse, 0 where a support holds: those of the loop.
+    speed : ndarray, shape (3,)
+        Ω of the axes [rad/s].
+    points : ndarray, shape (rows, 3)
+        Reference positions [m].
     """
 
     rows: Integers
@@ -72,12 +79,15 @@ class FollowedMass(Record):
     tables: VectorTable
     mass: Vector
     inverse: Matrix
+    speed: Vector
+    points: Matrix
 
     @classmethod
     def none(cls):
         """Make the record of masses that stay."""
         no_tables = Arrays(INDICES, []), Arrays(VECTOR, []), Arrays(VECTOR, [])
-        return cls(np.zeros(0, dtype=np.int64), np.zeros(0), *no_tables, np.zeros(0), np.zeros((0, 3)))
+        nothing = np.zeros(0), np.zeros((0, 3)), np.zeros(3), np.zeros((0, 3))
+        return cls(np.zeros(0, dtype=np.int64), np.zeros(0), *no_tables, *nothing)
 
     @classmethod
     def of(cls, system, mass, inverse):
@@ -93,6 +103,8 @@ class FollowedMass(Record):
             tables=Arrays(VECTOR, [np.array(flattened(flow.table)) for flow in flows]),
             mass=mass,
             inverse=inverse,
+            speed=system.material_flow.speed,
+            points=np.array(system.net.points, order="C"),
         )
 
 
@@ -117,6 +129,17 @@ def set_masses(t: float, followed: FollowedMass) -> None:
                 inverse[r, k] = 1.0 / mass[r]
 
 
+@kernel()
+def incoming(back, x, v, r, d, followed, velocity):
+    """Write the velocity of material from the drum at row d where row r has been a time ``back`` ago."""
+    w, a = followed.speed, followed.points
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        along_i = a[r, i] - a[d, i] + x[r, i] - x[d, i] - back * (v[r, i] - v[d, i])
+        along_j = a[r, j] - a[d, j] + x[r, j] - x[d, j] - back * (v[r, j] - v[d, j])
+        velocity[k] = v[d, k] - (w[i] * along_j - w[j] * along_i)
+
+
 @kernel(apart=("follows",))
 def exchange_masses(
     t: float, h: float, x: Matrix, v: Matrix, followed: FollowedMass, work: Vector, pushed: Vector
@@ -126,15 +149,16 @@ def exchange_masses(
     Its work, and its impulse on what is free, are added to the last place of ``work`` and to ``pushed``.
     """
     rows, mass, inverse = followed.rows, followed.mass, followed.inverse
-    brought, before = np.zeros((rows.size, 3)), np.empty(rows.size)
+    brought, before, velocity = np.zeros((rows.size, 3)), np.empty(rows.size), np.empty(3)
     for n in range(rows.size):
         before[n] = mass[rows[n]]
     for i in range(len(followed.tables)):
         table, cells, shares = followed.tables[i], followed.cells[i], followed.shares[i]
         change = interpolate(t, table, 0, 2, 1)[0] - interpolate(t - h, table, 0, 2, 1)[0]
         for c in range(cells.shape[0]):
+            incoming(0.5 * h, x, v, cells[c, 0], cells[c, 2], followed, velocity)
             for k in range(3):
-                brought[cells[c, 1], k] += shares[c] * change * v[cells[c, 2], k]
+                brought[cells[c, 1], k] += shares[c] * change * velocity[k]
     set_masses(t, followed)
     for n in range(rows.size):
         r = rows[n]

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..compiled.rows import matrix_of, record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from .base import ForceTerm, Tangent, Timing, VelocityForce, column, refuse_flows
+from .base import ForceTerm, Tangent, Timing, VelocityForce, column
 
 
 def position_of(nodes):
@@ -163,7 +163,6 @@ def force_terms(net, frame, pull, **arguments):
     **arguments
         ``name`` and ``balance`` of the terms.
     """
-    refuse_flows(net, f"[{arguments['name']}]")
     heavy = net.heavy
     turning = [body for body in net.bodies if body.spin is not None and not body.shape.planar]
     spins = np.array([body.spin for body in turning if body.turn is None], int)
@@ -179,6 +178,10 @@ def force_terms(net, frame, pull, **arguments):
         from . import turning_bodies
 
         terms += turning_bodies.force_terms(net, frame.angular_velocity, pull, arguments)
+    if net.flows:
+        from . import turning_flows
+
+        terms += turning_flows.force_terms(net, frame, pull, arguments["name"])
     return terms
 
 

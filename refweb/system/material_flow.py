@@ -21,6 +21,8 @@ class MaterialFlow:
     ----------
     flows : list of refweb.effects.mass_flow.MassFlow
         Flows without rows on bodies, with the drum of each row.
+    speed : ndarray, shape (3,)
+        Ω of rotating axes [rad/s].
 
     Raises
     ------
@@ -36,6 +38,8 @@ class MaterialFlow:
             drums = _drums(system, flow)
             moves = ~np.isin(flow.rows, on_bodies)
             self.flows.append(flow._replace(rows=flow.rows[moves], mass=flow.mass[moves], drums=drums[moves]))
+        frames = [term.frame.angular_velocity for term in system.rotating]
+        self.speed = np.array(frames[0] if frames else (0.0, 0.0, 0.0), dtype=float)
         self._rows = np.concatenate([flow.rows for flow in self.flows])
         self._drums = np.concatenate([flow.drums for flow in self.flows])
         self._free = ~system.supported[self._rows]
@@ -65,21 +69,26 @@ class MaterialFlow:
         """Rate of the mass of each row [kg/s], behind a corner of its table; shape (rows,)."""
         return np.bincount(self._rows, self._rates(t), len(self._net.mass))
 
-    def force(self, t, v):
+    def _incoming(self, x, v):
+        """Velocity of material that comes to each row of each flow [m/s], shape (cells, 3)."""
+        places = self._net.points + x
+        return v[self._drums] - np.cross(self.speed, places[self._rows] - places[self._drums])
+
+    def force(self, t, x, v):
         """Force on each row [N], m' (v_d − v), shape (rows, 3)."""
         force = np.zeros_like(v)
-        np.add.at(force, self._rows, self._rates(t)[:, None] * (v[self._drums] - v[self._rows]))
+        np.add.at(force, self._rows, self._rates(t)[:, None] * (self._incoming(x, v) - v[self._rows]))
         return force
 
-    def brought(self, v):
+    def brought(self, x, v):
         """Energy [J/kg] and momentum along x, y and z [m/s] that come in with the mass of each row, shape (4, cells).
 
         Where motion is prescribed, energy is what the row then has.
         """
-        speed, drum = v[self._rows], v[self._drums]
-        energy = np.where(self._free, drum * speed - 0.5 * speed**2, 0.0).sum(axis=1)
+        speed, incoming = v[self._rows], self._incoming(x, v)
+        energy = np.where(self._free, incoming * speed - 0.5 * speed**2, 0.0).sum(axis=1)
         energy[self._driven] = 0.5 * (speed[self._driven] ** 2).sum(axis=1)
-        return np.vstack([energy, np.where(self._free, drum, 0.0).T])
+        return np.vstack([energy, np.where(self._free, incoming, 0.0).T])
 
 
 def _drums(system, flow):

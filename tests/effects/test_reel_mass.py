@@ -4,6 +4,7 @@ import nets
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
@@ -98,21 +99,22 @@ def test_a_mass_that_is_whirled_by_central_differences(factor, drum):
         assert abs(slope - 2.0) < 0.2  # steps of 0.2 of the bound leave the next term
 
 
-@pytest.mark.parametrize("solver", nets.some([Cvode, Ida], 2))
+@pytest.mark.ordinary("drum that moves-Cvode")
+@pytest.mark.parametrize("solver", [Cvode, Ida])
 @pytest.mark.parametrize("drum", DRIVES)
 def test_a_mass_that_is_whirled_by_sundials(solver, drum):
     """Errors go with rtol to the power 2/3, by 21 over two decades, of which a third is asked for; balances close."""
     drive, errors = DRIVES[drum], []
     system = whirled(OUT_AND_IN, WEIGHT, drive=drive)
     truth = by_scipy(OUT_AND_IN, drive, np.array(WEIGHT.acceleration))
-    for rtol in (1e-5, 1e-7):
+    for rtol in (1e-4, 1e-6):
         one = solver(system, rtol=rtol)
         run = one.start()
         one.advance(run, np.linspace(0.1, 1.0, 10))
         errors.append([*far(run, system, truth), run.drift, run.ledger.drifts[0]])
     coarse, fine = np.array(errors)
     assert (coarse > 7.0 * fine).all()
-    assert fine[0] < 1e-4 and fine[1] < 2e-3 and fine[2] < 1e-3 and fine[3] < 1e-4 and fine[4] < 1e-5
+    assert fine[0] < 5e-4 and fine[1] < 1e-2 and fine[2] < 5e-3 and fine[3] < 5e-4 and fine[4] < 5e-5
 
 
 def test_a_tether_keeps_its_angular_momentum():
@@ -129,6 +131,68 @@ def test_a_tether_keeps_its_angular_momentum():
     lumped[-1] += MASS
     np.testing.assert_allclose(rows, lumped @ np.linspace(0.25, 1.0, 4) ** 2 * FAST, rtol=1e-13)
     np.testing.assert_allclose(mass.sum(), MASS + 0.6 * DENSE, rtol=1e-14)
+
+
+@pytest.mark.parametrize("solver", nets.some([CentralDifference, Cvode, Ida], 2))
+def test_it_is_the_same_in_axes_that_turn(solver):
+    """A tether of two elements seen from axes that turn by Ω about its drum, skew to its plane: places, work, momentum.
+
+    In turning axes the inertia forces do work; what is compared there is that the balance closes.
+    """
+    omega, end, errors = np.array([0.3, -0.4, 1.2]), 0.6, []
+    still = whirled(OUT_AND_IN, pieces=2)
+    turning = whirled(OUT_AND_IN, refweb.Frame(angular_velocity=omega), pieces=2)
+    back = Rotation.from_rotvec(-end * omega)
+    for accuracy in (dict(safety=0.1), dict(safety=0.05)) if solver is CentralDifference else (dict(rtol=1e-5),):
+        places = []
+        for system in (still, turning):
+            one = solver(system, **accuracy)
+            v = system.initial_velocity()
+            if system is turning:
+                v -= np.cross(omega, system.net.points)
+            run = one.start(v=v)
+            one.advance(run, [0.2, 0.4, end])
+            places.append(system.net.points + run.x)
+            assert run.drift < 1e-3 and run.ledger.drifts[0] < 1e-4
+        errors.append(np.abs(back.apply(places[0]) - places[1]).max())
+    if solver is CentralDifference:
+        assert errors[1] < 0.3 * errors[0]  # of order 2
+    assert errors[-1] < 3e-3  # of 40 without the velocity of the axes
+
+
+def test_what_a_reel_adds_in_turning_axes():
+    """At a factor of 1.2, between corners: force by the energy, tangents by the force, whose velocity does no work."""
+    axes = [[1.0, 2.0, 0.0], [-2.0, 1.0, 0.5]]
+    system = whirled(OUT_AND_IN, refweb.Orbit(mean_motion=0.7, axes=axes), pieces=2)
+    of_place, of_velocity = (term for term in system.terms if term.balance.column == "work")
+    rng, t, h = np.random.default_rng(3), 0.4 * 2.0 / 3.0, 1e-6
+    x, v, step = (rng.normal(size=(system.rows, 3)) for _ in range(3))
+    blocks = np.empty((len(of_place.cells), 3, 3))
+
+    def times(block):
+        return sum_of([block[c] @ step[row] for c, (row,) in enumerate(of_place.cells)])
+
+    def sum_of(rows):
+        total = np.zeros_like(x)
+        np.add.at(total, of_place.cells[:, 0], rows)
+        return total
+
+    energies = [system.energy_of(of_place, t, x + side * h * step).sum() for side in (1.0, -1.0)]
+    force = system.force_of(of_place, t, x, v)
+    assert (energies[1] - energies[0]) / (2.0 * h) == pytest.approx((force * step).sum(), rel=1e-7)
+    of_place.tangent.stiffness(t, x, v, blocks, of_place.cells, of_place.data, False)
+    change = system.force_of(of_place, t, x + step, v) - force  # both forces are linear
+    np.testing.assert_allclose(times(blocks), -change, rtol=0, atol=1e-13 * np.abs(force).max())
+    turned = system.force_of(of_velocity, t, x, v)
+    of_velocity.velocity.damping(t, x, v, blocks, of_velocity.cells, of_velocity.data, False)
+    change = system.force_of(of_velocity, t, x, v + step) - turned
+    np.testing.assert_allclose(times(blocks), -change, rtol=0, atol=1e-13 * np.abs(turned).max())
+    assert abs((turned * v).sum()) < 1e-14 * np.abs(turned * v).sum()
+    # What the built masses feel, times what the factor adds of each line's mass.
+    steady = next(term for term in system.terms if term.balance.column == "orbit_energy")
+    built, added = system.net.mass, system.material_flow.masses(t) - system.net.mass
+    expected = system.force_of(steady, t, x, v) * (added / built)[:, None]
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-13 * np.abs(force).max())
 
 
 @pytest.mark.parametrize("method", ["newton", "relaxation"])
@@ -204,8 +268,8 @@ def whirl(**changes):
 def test_methods_agree():
     """Within the sum of their ±, which are small."""
     found = []
-    for solve in ({"safety": 0.1}, {"method": "cvode", "rtol": 1e-6}):
-        found.append(refweb.run(refweb.Scene.from_dict(whirl(solve={"kind": "dynamic", "duration": 1.0, **solve}))))
+    for solve in ({"safety": 0.2}, {"method": "cvode", "rtol": 1e-5}):
+        found.append(refweb.run(refweb.Scene.from_dict(whirl(solve={"kind": "dynamic", "duration": 0.5, **solve}))))
         assert not found[-1].warnings
     for name, one in found[0].results.items():
         other = found[1].results[name]
@@ -246,7 +310,6 @@ def test_shipped_tether():
         ({"solve": {"kind": "dynamic", "duration": 1.0, "method": "cvode", "mass": "consistent"}}, '"lumped"'),
         ({"solve": {"kind": "dynamic", "duration": 1.0, "method": "explicit"}}, r"takes no .*\[\[reel\]\]|takes no"),
         ({"damping": {"rate": 1.0}}, r"\[damping\] rate = 1 takes masses that stay"),
-        ({"orbit": {"mean_motion": 1.0}, "gravity": None}, r"\[orbit\].* takes masses that stay"),
         (
             {"observe": [{"name": "h", "quantity": "total_angular_momentum"}]},
             'quantity = "total_angular_momentum" takes masses that stay',

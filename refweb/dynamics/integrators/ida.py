@@ -286,7 +286,7 @@ class Ida(Sundials):
         system = self.system.at(t) if self.system.net.flows else self.system
         force = self.system.force(t, *rows)
         if system is not self.system:
-            force += self.system.material_flow.force(t, rows[1])
+            force += self.system.material_flow.force(t, *rows)
         slope = multipliers = np.zeros(0)
         if self._links:
             slope, multipliers = self._links.start(*rows, force)

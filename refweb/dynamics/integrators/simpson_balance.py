@@ -173,7 +173,7 @@ class SimpsonBalance:
         if system.net.flows:
             material = system.material_flow
             lengths = np.append(lengths, material.shares(sample.time))
-            force = np.hstack([np.vstack([force, np.zeros((3, force.size))]), material.brought(sample.v)])
+            force = np.hstack([np.vstack([force, np.zeros((3, force.size))]), material.brought(sample.x, sample.v)])
         return Rates(flow, lengths, force)
 
     def piece(self, course, end, at):

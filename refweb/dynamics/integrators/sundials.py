@@ -72,7 +72,7 @@ class Sundials(StepObserver):
         if self.system.net.flows:
             flow, free = self.system.material_flow, self.system.free
             self._set_masses(np.repeat(flow.masses(t), 3)[free])
-            force = force + flow.force(t, v).ravel()[free]
+            force = force + flow.force(t, x, v).ravel()[free]
         return force
 
     def tangents(self, t, x, v):
