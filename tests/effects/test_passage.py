@@ -11,6 +11,7 @@ import refweb
 from refweb.dynamics.integrators.passages import turned_by
 from refweb.effects.contact.line_body_ccd import MIDDLE, SHOWN, limits_of
 from refweb.effects.contact.overlap import CORE
+from refweb.kernels import ALL_DUE
 from refweb.results.summary_text import on_run
 from validation.hard_cases.overlaps import random_hit, through
 from validation.hard_cases.topology import knot_determinant, passed
@@ -101,7 +102,7 @@ def test_drifts_that_come_to_the_middle_are_seen(shape):
         x, v, f = at(system, ends), still.copy(), still.copy()
         v[:2], f[:2] = way / 0.1 - 2.0 * way, 4.0 * way  # (v + ½ f) · 0.1 is the way
         v[:3], f[:3] = v[:3] + rng.standard_normal(3), f[:3] + 10.0 * rng.standard_normal(3)  # of line and body alike
-        found = term.contact.passing(0.0, 0.0, 0.5, 0.1, x, v, f, inverse, term.cells, term.data, met)
+        found = term.contact.passing(0.0, 0.0, 0.5, 0.1, x, v, f, inverse, term.cells, term.data, ALL_DUE, met)
         share, deep = np.linspace(0.0, 1.0, 201)[:, None], -np.inf
         for part in np.linspace(0.0, 1.0, 41):
             first, last = ends + part * way

@@ -21,7 +21,8 @@ import numpy as np
 from ...compiled.kernel import prepare
 from ...errors import EnergyDriftError, InputError, IntegrationError, SolverError
 from ...kernels import CONTACT, CONTACTS, PART, PARTS, Arrays
-from .ccd import look_anew
+from .ccd import reset_checks
+from .crossings import THROUGH
 from .dense_output import LOOKS
 from .energy_balance import DRIFT, least_energy, own_energies, refuse_open
 from .events import event_rows
@@ -114,7 +115,7 @@ class CentralDifference(Integrator):
         """Compile what the run calls, see `refweb.dynamics.integrators.integrator.Integrator`."""
         if not self._prepared:
             model, observed = self._model, self._observed
-            called = [advance_rows, begin, open_balance, safe_step, look_anew]
+            called = [advance_rows, begin, open_balance, safe_step, reset_checks]
             called += [*model.all_kernels(), *observed.all_kernels()]
             prepare(called, features(self._scheme, model, observed, self._events))
             self._prepared = True
@@ -245,8 +246,8 @@ class CentralDifference(Integrator):
         running = self._running(course)
         records = self._scheme, self._model, self._observed, running, Workspace.of(self._model, running)
         clock = running.clock
-        if len(self._model.guard.terms) or len(self._model.walls.terms):
-            look_anew.call(self._model.guard)
+        if len(self._model.ccd.checks):
+            reset_checks.call(self._model.ccd)
         if self._taken != (id(course), course.nsteps):
             forget(self._model, course.nsteps > 0)
         try:
@@ -333,14 +334,15 @@ class CentralDifference(Integrator):
 
     def _refuse_passing(self, course, now):
         """Refuse lines that would pass through lines or bodies in any step that is not far below the critical one."""
-        if self._model.walls.met[3] == 0:
+        met = self._model.ccd.met
+        if met[4] == THROUGH:
             from ...effects.contact.penetration import would_pass
 
-            reason = would_pass(self.system, self._model.walls.met)
+            reason = would_pass(self.system, met)
         else:
             from ...effects.self_contact.penetration import would_pass
 
-            reason = would_pass(self.system, course.v, self._model.guard.met)
+            reason = would_pass(self.system, course.v, met[:4])
         at = now["time"] + now["begun"] * now["step"]
         raise SolverError(
             f"at t = {at:.6g} s, in a step of {now['cut']:.3g} s where {now['stable']:.3g} is stable, {reason}"

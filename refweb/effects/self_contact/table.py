@@ -130,7 +130,7 @@ class SelfContact(Table):
             common = dict(cells=cells, data=data, elements=CellElements(np.arange(len(cells)), without(BROKEN)))
             search = ContactForce(finder=near_pairs)
         beside = line_line_ccd.neighbours(net, data[:, APART:], 2.0 * self.radius)
-        kernels = line_line_ccd.meets, line_line_ccd.watch, line_line_ccd.soon
+        kernels = line_line_ccd.meets, line_line_ccd.soon
         follows = Crossing(*kernels, 2.0 * self.radius, self.stiffness_on(net), *beside)
         push = ForceTerm(
             name="self_contact",
