@@ -311,7 +311,7 @@ def test_search_finds_all_pairs(flat, skin):
     web = Web(points=points, lines=rows, natural_length=lengths, rim=np.array([0]))
     net = discretisation.build(web, refweb.Cable(law="linear", modulus=1e5, area=1e-6, density=1e3))
     touch = refweb.SelfContact(radius=1e-4)
-    cells, data = touch._elements(net, np.zeros((len(rows), 0)))
+    cells, data = touch.elements_of(net, np.zeros((len(rows), 0)))
     x = 0.3 * rng.standard_normal((60, 3))
     place = (points + x)[rows]
     near = search.REACH * 2e-4 + skin
@@ -768,7 +768,7 @@ def test_a_look_leaves_no_more_open_than_lines_are_apart():
         course = solver.start()
         solver.advance(course, [time])
         ends = (system.net.points + course.x)[system.net.cells]
-        left[n], apart[n] = solver._model.ccd.paths[0]["free"], distance(*ends)
+        left[n], apart[n] = solver.model.ccd.paths[0]["free"], distance(*ends)
     assert (left <= apart).all() and (left > 0.0).all() and apart.min() < 9e-3 and course.nsteps > 500
 
 
