@@ -171,7 +171,8 @@ def brief(name, **solve):
     given = tomllib.loads((SHIPPED_SCENES / f"{name}.toml").read_text(encoding="utf-8"))
     if given["solve"]["kind"] == "dynamic":
         averages = (one.get("average", 0.0) for one in given.get("observe", ()))
-        solve = {"duration": max(2.0 * given["output"]["interval"], *averages), **solve}
+        interval = given.get("output", {}).get("interval", 0.01 * given["solve"]["duration"])
+        solve = {"duration": max(2.0 * interval, *averages), **solve}
     given["solve"] |= solve
     return given
 
