@@ -21,13 +21,10 @@ all its digits, which it loses when positions are the unknowns.
                    is 1/m, 0 where a support holds
 `NEAR`             ``(skin, x, cells, data, chosen)``: writes the numbers of all cells that may touch when they come
                    nearer by ``skin`` [m] to ``chosen``; their number
-`MEETS`            ``(margin, path, kick, drift, x, v, f, inverse, cells, data, met)``: whether lines of any cell come
-                   nearer than ``margin`` [m] in a drift behind a kick, in which rows come nearer by ``path`` [m] at
-                   most, with ``inverse`` as in `LAW`; its rows are written to ``met``
-`CCD_NEIGHBOURS`   ``(margin, path, kick, drift, x, v, f, inverse, cells, data, due, chosen, met)``: the same of cells
-                   that are looked at when their turn comes: ``due`` has the way of all drifts after which that is,
-                   behind them that way itself, what it may come to with those that are ``chosen``, the last of which
-                   is their number, and how far the turn of the next is at least
+`MEETS`            ``(margin, path, kick, drift, x, v, f, inverse, cells, data, due, met)``: whether lines of any cell
+                   come nearer than ``margin`` [m] in a drift behind a kick, in which rows come nearer by ``path`` [m]
+                   at most, with ``inverse`` as in `LAW`; its rows are written to ``met``. Where ``due`` has any, only
+                   the cells that are due are looked at, see `DUE`
 `TIME_TO_CONTACT`  ``(x, v, cells, data)``: time in which no cell comes much nearer [s]
 =================  ===================================================================================================
 
@@ -122,9 +119,14 @@ CONTACTS, PARTS = types.Array(from_dtype(CONTACT), 1, "C"), types.Array(from_dty
 MEMORIES = types.Array(from_dtype(MEMORY), 2, "C")
 DETECT = types.int64(MATRIX, INDICES, MATRIX, CONTACTS, PARTS, types.int64)
 LAW = types.float64(_f, types.int64, types.int64, MATRIX, MATRIX, CONTACTS, PARTS)
-_drift = (_f, _f, _f, _f, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, MATRIX)
-MEETS = types.boolean(*_drift, INTEGERS)
-CCD_NEIGHBOURS = types.boolean(*_drift, VECTOR, INTEGERS, INTEGERS)
+DUE = np.dtype([("path", float), ("chosen", np.int64)])
+"""A cell that is checked only when it is due: the approach in all drifts after which that is [m]. The list also has the
+numbers of the cells that are due soon. Behind all cells stand three more: the approach so far, with how many are due
+soon; that up to which these suffice; that at which the next is due, at least."""
+DUE_LIST = types.Array(from_dtype(DUE), 1, "C")
+ALL_DUE = np.zeros(0, dtype=DUE)
+"""List with which all cells are checked."""
+MEETS = types.boolean(_f, _f, _f, _f, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, MATRIX, DUE_LIST, INTEGERS)
 TIME_TO_CONTACT = types.float64(MATRIX, MATRIX, INDICES, MATRIX)
 NEAR = types.int64(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), INTEGERS)
 
@@ -138,6 +140,7 @@ IndexTable = Annotated[Arrays, INDICES]
 MatrixTable = Annotated[Arrays, MATRIX]
 VectorTable = Annotated[Arrays, VECTOR]
 IntegerTable = Annotated[Arrays, INTEGERS]
+DueTable = Annotated[Arrays, DUE_LIST]
 ContactTable = Annotated[Arrays, CONTACTS]
 PartTable = Annotated[Arrays, PARTS]
 MemoryTable = Annotated[Arrays, MEMORIES]
@@ -148,7 +151,6 @@ BoundTable = Annotated[Functions, BOUND]
 DetectTable = Annotated[Functions, DETECT]
 LawTable = Annotated[Functions, LAW]
 MeetsTable = Annotated[Functions, MEETS]
-WatchTable = Annotated[Functions, CCD_NEIGHBOURS]
 ImpulseTable = EnergyTable
 """Annotations of tables of kernels in records."""
 

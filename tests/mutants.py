@@ -66,6 +66,7 @@ MIRRORS = {
     "effects/contact/line_body_ccd": "effects/test_passage.py",
     "dynamics/integrators/passages": "effects/test_passage.py effects/test_between_bodies.py",
     "dynamics/integrators/ccd": "effects/test_passage.py effects/test_self_contact.py",
+    "effects/self_contact/line_line_ccd": "effects/test_self_contact.py",
     "effects/self_contact/line_line_penalty": "effects/test_self_contact.py",
     "effects/self_contact/line_line_friction": "effects/test_self_contact.py",
     "effects/contact/line_body_friction": "effects/test_contact_losses.py effects/test_contact.py",
@@ -388,18 +389,16 @@ MUTANTS = [
         "return 0.5 * abs(drift) * math.sqrt(fastest)",
     ),
     Mutant("effects/contact/line_body_ccd", "met[3] = 0 if below", "met[3] = 1 if below"),
-    Mutant(
-        "dynamics/integrators/ccd", "if then != TOLD and walls.met[3] == 0:", "if walls.met[3] == 0 and then == TOLD:"
-    ),
-    Mutant("dynamics/integrators/ccd", "    left[0] -= path\n", ""),
+    Mutant("dynamics/integrators/ccd", "kind == THROUGH and met[3] == 0)", "kind == THROUGH and met[3] == 1)"),
+    Mutant("dynamics/integrators/ccd", "    paths.free -= path\n", ""),
     Mutant("effects/self_contact/line_line_friction", "(1.0 - a, a, b - 1.0, -b)", "(1.0 - a, a, -b, b - 1.0)"),
     Mutant("effects/self_contact/line_line_penalty", "if square > (REACH * of.touch) ** 2", "if square > of.touch**2"),
-    Mutant("dynamics/integrators/ccd", "min(left, margin, due[DUE] - due[PAST])", "min(left, margin)"),
-    Mutant("dynamics/integrators/ccd", "due[PAST] += guard.left[1]", "due[PAST] += 0.0"),
+    Mutant("dynamics/integrators/ccd", "due[NEXT].path - paths.past - path)", "due[NEXT].path - paths.past)"),
+    Mutant("dynamics/integrators/ccd", "due[PAST].path = paths.past", "due[PAST].path = 0.0"),
     Mutant("dynamics/integrators/ccd", "CALM * skin.last < left", "CALM * skin.last < 20.0 * left"),
-    Mutant(
-        "dynamics/integrators/ccd", "return comes_through(time, 0.5 * h, h, FORESEEN, model, running)", "return False"
-    ),
+    Mutant("effects/self_contact/line_line_ccd", "due[count].path + start", "due[count].path + 2.0 * start"),
+    Mutant("effects/self_contact/line_line_ccd", "following = min(following, due[c].path)", "following = math.inf"),
+    Mutant("dynamics/integrators/ccd", "collides(time, 0.5 * h, h, FORESEE, model, running)", "False"),
     Mutant("dynamics/integrators/passages", "if not (depth + nearer <", "if not (depth <"),
     Mutant("dynamics/integrators/passages", "or nearer < self._apart(pair, x)", "or 0.0 < self._apart(pair, x)"),
     Mutant("dynamics/integrators/passages", "+ _nearer(pair, bend)", ""),

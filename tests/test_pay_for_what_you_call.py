@@ -177,7 +177,8 @@ def brief(name, **solve):
     given = tomllib.loads((SHIPPED_SCENES / f"{name}.toml").read_text(encoding="utf-8"))
     if given["solve"]["kind"] == "dynamic":
         averages = (one.get("average", 0.0) for one in given.get("observe", ()))
-        solve = {"duration": max(2.0 * given.get("output", {}).get("interval", 0.01), *averages), **solve}
+        interval = given.get("output", {}).get("interval", 0.01 * given["solve"]["duration"])
+        solve = {"duration": max(2.0 * interval, *averages), **solve}
     given["solve"] |= solve
     return given
 
@@ -286,13 +287,13 @@ TABLES = {
 }
 SOLVED = ("detection", "law")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
-LISTED += ("motion", "work of lengths", "impulse", "near", "meets", "watch", "passing", "probe")
+LISTED += ("motion", "work of lengths", "impulse", "near", "collisions", "probe")
 TERM = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: TERM for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
 KERNELS |= {name: {**TERM, "impulse": 1} for name in ("gravity", "load")}
 KERNELS |= {name: {**TERM, "near": 1} for name in ("contact", "self_contact")}
-KERNELS["self_contact"] |= {"meets": 1, "watch": 1}
-KERNELS["contact"] |= {"passing": 1}
+KERNELS["self_contact"] |= {"collisions": 2}  # with lines, and with neighbours along the net
+KERNELS["contact"] |= {"collisions": 1}
 KERNELS["attach"] = {"motion": 1}  # to a body that is fixed
 KERNELS |= {"damping": {**TERM, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis
@@ -465,7 +466,7 @@ MANY = 70
 ABSENT = (
     "inner_stages", "turn_on", "carry_nodes", "move_supports", "set_lengths", "set_masses", "exchange_masses",
     "viscous_kick", "rubbing_kick",
-    "take_pairs", "passes_lines", "set_push", "average", "note_events", "look_at_books", "book_powers",
+    "take_pairs", "stays_free", "set_push", "average", "note_events", "look_at_books", "book_powers",
     "add_half_steps", "turning",
 )  # fmt: skip
 """Kernels of the loop that a plain impact has no use for: stages, bodies that turn or carry, motion, reels, damping,

@@ -126,6 +126,8 @@ class Watch:
 
     Attributes
     ----------
+    observables : list
+        Observables of the scene.
     probes : list of refweb.results.probes.Probe
         Probes of observables, of warnings and of events, in this order.
     sums : list of refweb.dynamics.integrators.integrator.Sum
@@ -137,10 +139,10 @@ class Watch:
     """
 
     def __init__(self, scene, system):
-        self.system, self._observables = system, scene.observables
-        self._probed = [o for o in self._observables if not o.observable.booked]
+        self.system, self.observables = system, scene.observables
+        self._probed = [o for o in self.observables if not o.observable.booked]
         awaited = {event.observe for event in scene.event}
-        booked = [o for o in self._observables if o.observable.booked]
+        booked = [o for o in self.observables if o.observable.booked]
         self._followed = [o for o in booked if o.reduce != "final" or o.name in awaited]
         self.probes = [o.probe(system) for o in self._probed]
         self._warned = _probes_of_warnings(system, self.probes, scene.solve.step_size)
@@ -151,7 +153,7 @@ class Watch:
         if system.weakness is not None and used is not None:
             self.events.append(Event(used, 1.0, True, stop=True))
         energies, of_momentum = dynamic_energies(system), vectors(system)
-        self.columns = [FIRST["dynamic"], *(f"{o.name} [{o.unit}]" for o in self._observables)]
+        self.columns = [FIRST["dynamic"], *(f"{o.name} [{o.unit}]" for o in self.observables)]
         self.columns += [f"{name} [J]" for name in energies]
         self.columns += [f"{name} [N s]" for name in components(of_momentum)]
         self._vectors = len(of_momentum)
@@ -182,7 +184,7 @@ class Watch:
         unit = History.empty(0, len(self.probes), self.system.terms)
         unit = History(unit.names, np.eye(len(unit.names)), unit.probed)
         columns = [unit.time]
-        for o in self._observables:
+        for o in self.observables:
             if o in self._probed:
                 columns.append(unit.probes[:, self._probed.index(o)])
             else:
@@ -204,7 +206,7 @@ class Watch:
         These are time, observables in their order, and energy less work [J]. The latter is constant, so that its error
         is known in each run.
         """
-        observed = table[:, : 1 + len(self._observables)]
+        observed = table[:, : 1 + len(self.observables)]
         return np.column_stack([observed, (table[:, self._booked] * self._signs).sum(axis=1)])
 
     def results(self, course, last):
@@ -212,7 +214,7 @@ class Watch:
         results, extremes, unfilled = {}, course.extremes, self.unfilled(course)
         neglected = self._neglected(course)
         state = self.state(course)
-        for i, o in enumerate(self._observables):
+        for i, o in enumerate(self.observables):
             value, when, where = float(last[1 + i]), course.time, None
             slot = self._slot(o)
             if slot is not None and o.reduce != "final":
@@ -233,11 +235,11 @@ class Watch:
 
         Without such a result it is the value of the first one in the last row of ``tables``.
         """
-        for o in self._observables:
+        for o in self.observables:
             slot = self._slot(o)
             if slot is not None and o.reduce != "final" and np.isfinite(value := course.extremes.values[slot]):
                 return [f"{'largest' if o.reduce == 'max' else 'smallest'} {o.name} {readable(value, None, o.unit)}"]
-        first = self._observables[0]
+        first = self.observables[0]
         return [f"{first.name} {readable(tables[-1][-1, 1], None, first.unit)}"] if tables else []
 
     def state(self, course):
@@ -284,8 +286,8 @@ class Watch:
         motions of a web at rest. A closer agreement of run and step refinement is chance.
         """
         absolute = absolute or {}
-        limits = {o.name: SPREAD * absolute.get(o.unit, 0.0) for o in self._observables}
-        for o in self._observables:
+        limits = {o.name: SPREAD * absolute.get(o.unit, 0.0) for o in self.observables}
+        for o in self.observables:
             if o.reduce != "final":
                 limits[o.name] = max(limits[o.name], _correction(course.extremes, self._slot(o), relative))
             elif o.average is not None:
@@ -299,7 +301,7 @@ class Watch:
         and differences of their velocities change sign in less time.
         """
         rows = {body.name: body.row for body in self.system.net.bodies}
-        placed = {o.name: o for o in self._observables if o.body is not None and o.unit == "m"}
+        placed = {o.name: o for o in self.observables if o.body is not None and o.unit == "m"}
         distances = {}
         for name, o in placed.items():
             named = (o.body,) if isinstance(o.body, str) else o.body

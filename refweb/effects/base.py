@@ -71,9 +71,8 @@ class Crossing(NamedTuple):
 
     Attributes
     ----------
-    meets, watch, soon : kernel
-        Check if lines of a cell meet in a drift; the same for neighbours; time in which no lines can meet. Signatures
-        are in `refweb.kernels`.
+    meets, soon : kernel
+        Check if lines of a cell meet in a drift; time in which no lines can meet. Signatures are in `refweb.kernels`.
     touch : float
         Distance at which lines touch [m].
     stiffness : float
@@ -83,7 +82,6 @@ class Crossing(NamedTuple):
     """
 
     meets: Callable
-    watch: Callable
     soon: Callable
     touch: float
     stiffness: float

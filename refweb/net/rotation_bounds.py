@@ -87,7 +87,7 @@ def hardest_push(x: Matrix, f: Matrix, inverse: Matrix, turns: RigidRotations) -
     return hardest
 
 
-@kernel(apart=("turning", "guarded"))
+@kernel(apart=("turning", "body_ccd"))
 def beside_places(
     kick: float, drift: float, x: Matrix, v: Matrix, f: Matrix, inverse: Matrix, turns: RigidRotations
 ) -> float:

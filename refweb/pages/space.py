@@ -233,7 +233,7 @@ def _bodies(frames, arrays):
         middle = body.points.mean(axis=0)
         arrays[f"points of body {i}"] = (body.points - middle).astype(np.float32)
         arrays[f"triangles of body {i}"] = body.triangles.astype(np.uint32)
-        turns = [_rotation(body.points - middle, points - points.mean(axis=0)) for points in points_of]
+        turns = [rotation_between(body.points - middle, points - points.mean(axis=0)) for points in points_of]
         rows.append(
             {
                 "name": name,
@@ -246,7 +246,7 @@ def _bodies(frames, arrays):
     return rows
 
 
-def _rotation(before, after):
+def rotation_between(before, after):
     """The rotation that takes points, shape (n, 3), best from one place to another, both around the origin.
 
     W. Kabsch, Acta Crystallographica A32 (1976) 922.

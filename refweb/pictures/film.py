@@ -66,7 +66,7 @@ def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.
     if record.kind != "modes" and (frame is not None or time is not None):
         name, value = ("time", f"{time:g}") if frame is None else ("frame", frame)
         raise InputError(f"{name} = {value}: a film has all frames, leave it out")
-    poses = _poses(record, frame, time)
+    poses = poses_of(record, frame, time)
     first = record.frame(poses[0].number)
     options = look_of(record, first, field, range, scale, view)
     film = _Film(record, poses, options, fps)
@@ -81,7 +81,8 @@ class Pose(NamedTuple):
     phase: float
 
 
-def _poses(record, frame, time):
+def poses_of(record, frame, time):
+    """The poses of a film, each a `Pose`: those of all frames of a run, or a period of a mode."""
     if record.kind != "modes":
         record.chosen(-1)
         return [Pose(number, 1.0) for number in record.times]

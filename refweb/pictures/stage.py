@@ -222,12 +222,12 @@ class Stage:
             length = _round(-0.1 / axes.get_position().width * view.half[0] * depth)
             _triad(axes, view, view.point(-0.88, -0.72, depth), length)
             return
-        below, origin = 0.5 if self.beneath else 2, _different(view.project(self.origin)[0])
+        below, origin = 0.5 if self.beneath else 2, distinct_lines(view.project(self.origin)[0])
         if len(origin) <= MOST_UNDEFORMED:
             axes.add_collection(LineCollection(origin, colors=BEFORE, linewidths=0.8, zorder=below))
         else:
             height, width = np.ceil(axes.get_window_extent().size[::-1]).astype(int)
-            drawn = _marked(origin, view.extent, width, height)
+            drawn = marked_pixels(origin, view.extent, width, height)
             axes.imshow(drawn, extent=view.extent, aspect="auto", interpolation="none", zorder=below)
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=12, colors=DARK)
@@ -286,7 +286,7 @@ class Stage:
         bar.ax.set_title(name + (f" [{unit}]" if unit else ""), size=13 if over else 15, pad=14, color=DARK)
 
 
-def _different(lines):
+def distinct_lines(lines):
     """Those of lines on a page, shape (lines, points, 2), that lie beside each other, to a few thousandths of it.
 
     A flat web from its side is a single line, on which a million lie.
@@ -299,7 +299,7 @@ def _different(lines):
     return lines[np.unique(steps.reshape(-1, 4) @ order, return_index=True)[1]]
 
 
-def _marked(lines, extent, width, height):
+def marked_pixels(lines, extent, width, height):
     """An image, RGBA, shape (height, width, 4), of lines on a page, shape (lines, points, 2): the pixels they meet."""
     from matplotlib.colors import to_rgb
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..effects.self_contact.penetration import Passage, lines_of, pressed
+from ..kernels import ALL_DUE
 
 UNFOLLOWED = "what moves between load steps is not followed"
 
@@ -55,7 +56,7 @@ class LinePassage:
             self.deepest.record(float(depth[cell, 0]), None)
             self.deepest.refuse(float(depth[cell, 0]), f"load step {state.time:g}", cell)
         met, path = np.zeros(4, dtype=np.int64), state.x - self._x
-        numbers = 0.0, 0.0, 0.0, 1.0, self._x, path, still, still, term.cells, term.data, met
+        numbers = 0.0, 0.0, 0.0, 1.0, self._x, path, still, still, term.cells, term.data, ALL_DUE, met
         if self.why == UNFOLLOWED and term.contact.crossing.meets(*numbers):
             self.why = (
                 f"{lines_of(self._system.net, met)} meet on their straight ways to load step {state.time:g}; smaller "

@@ -49,7 +49,7 @@ def test_velocities_move_bodies_in_half_the_last_row(component, along):
     speed, node = (
         types.SimpleNamespace(name=n, body=b, unit=u) for n, b, u in [("v", "ball", "m/s"), ("n", None, "m")]
     )
-    watch._observables = [place, speed, node]
+    watch.observables = [place, speed, node]
     one, other = (types.SimpleNamespace(v=v) for v in (np.zeros((2, 3)), np.array([[9, 9, 9], [3e-3, 0, 4e-3]])))
     assert watch.drifts(one, other, 2.0) == pytest.approx({"place": 1e-3 * along}, rel=1e-14)
 

@@ -274,10 +274,13 @@ def test_a_run_that_ends_before_a_window_is_full(name):
 def test_no_means_are_no_numbers():
     """What a scene without any has in its loop: arrays without entries, in its checkpoints too."""
     from refweb.dynamics.integrators.central_difference import CentralDifference
+    from refweb.dynamics.integrators.monitors import Observed
 
     solver = CentralDifference(oscillator({}).build())
     course = solver.start()
-    arrays = {**solver._observed.windows.by_name(), **course.averages.by_name()}
+    outs = tuple(solver.system.per_cell())
+    windows = Observed.of((), (), len(outs), outs, solver.model.contacts).windows
+    arrays = {**windows.by_name(), **course.averages.by_name()}
     assert {array.size for name, array in arrays.items() if name != "looked"} == {0}
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import refweb
 from refweb.dynamics import budget
-from refweb.dynamics.integrators.step_observer import StepObserver
+from refweb.dynamics.integrators.sundials import Sundials
 from refweb.errors import InputError
 
 WEB = refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2])
@@ -20,14 +20,14 @@ FIRST, SECOND = 1e-4, 1e-4 * 0.01
 @pytest.fixture(scope="module")
 def steps():
     """Steps of all runs and twins so far, which the clock shows as seconds."""
-    taken, own = [0], StepObserver._take_step
+    taken, own = [0], Sundials.step
 
     def counted(self, *arguments):
         taken[0] += 1
         return own(self, *arguments)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(StepObserver, "_take_step", counted)
+        patch.setattr(Sundials, "step", counted)
         patch.setattr(budget, "clock", lambda: float(taken[0]))
         yield taken
 

@@ -357,13 +357,13 @@ def test_preconditioner_inverts_the_whole_jacobian():
 
     def rate(y):
         result = np.empty(2 * n)
-        solver._right_side(0.006, y, result)
+        solver.right_side(0.006, y, result)
         return result
 
     jacobian = np.column_stack([(rate(y + 1e-6 * e) - rate(y - 1e-6 * e)) / 2e-6 for e in np.eye(2 * n)])
-    solver._set_up(0.006, y, rate(y), False, np.zeros(1), gamma)
+    solver.set_up(0.006, y, rate(y), False, np.zeros(1), gamma)
     r, z = np.sin(np.arange(2.0 * n)), np.empty(2 * n)
-    solver._precondition(0.006, y, rate(y), r, z, gamma, 0.0, 0)
+    solver.precondition(0.006, y, rate(y), r, z, gamma, 0.0, 0)
     size = np.abs(gamma * jacobian).max() * np.abs(z).max()
     np.testing.assert_allclose(z - gamma * jacobian @ z, r, rtol=0, atol=1e-7 * size)
     assert run.time == 0.0 and not system.symmetric

@@ -374,14 +374,14 @@ def test_preconditioner_inverts_the_whole_jacobian():
 
     def rate(y):
         result = np.empty(2 * n)
-        solver._right_side(0.0, y, result)
+        solver.right_side(0.0, y, result)
         return result
 
     # The right-hand side is linear in v; in x differences of 1e-6 m leave 1e-9 of it.
     jacobian = np.column_stack([(rate(y + 1e-6 * e) - rate(y - 1e-6 * e)) / 2e-6 for e in np.eye(2 * n)])
-    solver._set_up(0.0, y, rate(y), False, np.zeros(1), gamma)
+    solver.set_up(0.0, y, rate(y), False, np.zeros(1), gamma)
     r, z = np.sin(np.arange(2.0 * n)), np.empty(2 * n)
-    solver._precondition(0.0, y, rate(y), r, z, gamma, 0.0, 0)
+    solver.precondition(0.0, y, rate(y), r, z, gamma, 0.0, 0)
     np.testing.assert_allclose(z - gamma * jacobian @ z, r, rtol=0, atol=1e-6)
 
 

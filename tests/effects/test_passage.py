@@ -8,9 +8,11 @@ import solids
 from nets import some
 
 import refweb
+from refweb.dynamics.integrators.crossings import APART, BESIDE, PAIRS, THROUGH, checks_of
 from refweb.dynamics.integrators.passages import turned_by
 from refweb.effects.contact.line_body_ccd import MIDDLE, SHOWN, limits_of
 from refweb.effects.contact.overlap import CORE
+from refweb.kernels import ALL_DUE
 from refweb.results.summary_text import on_run
 from validation.hard_cases.overlaps import random_hit, through
 from validation.hard_cases.topology import knot_determinant, passed
@@ -101,7 +103,7 @@ def test_drifts_that_come_to_the_middle_are_seen(shape):
         x, v, f = at(system, ends), still.copy(), still.copy()
         v[:2], f[:2] = way / 0.1 - 2.0 * way, 4.0 * way  # (v + ½ f) · 0.1 is the way
         v[:3], f[:3] = v[:3] + rng.standard_normal(3), f[:3] + 10.0 * rng.standard_normal(3)  # of line and body alike
-        found = term.contact.passing(0.0, 0.0, 0.5, 0.1, x, v, f, inverse, term.cells, term.data, met)
+        found = term.contact.passing(0.0, 0.0, 0.5, 0.1, x, v, f, inverse, term.cells, term.data, ALL_DUE, met)
         share, deep = np.linspace(0.0, 1.0, 201)[:, None], -np.inf
         for part in np.linspace(0.0, 1.0, 41):
             first, last = ends + part * way
@@ -113,6 +115,18 @@ def test_drifts_that_come_to_the_middle_are_seen(shape):
             assert met.tolist()[:3] == [0, 1, 2] and met[3] == (start >= CORE * body.thickness)
         seen[int(found)] += 1
     assert min(seen) >= 5
+
+
+def test_one_table_has_all_that_may_pass():
+    """A line and another, neighbours along the net, a line and a body, two bodies: each with the depth that none comes
+    to, by the radius of lines and the thickness of bodies; a scene without contact has an empty one."""
+    balls = [refweb.Body(name=n, position=(0, 0, z), mass=1.0, **SHAPES["sphere"]) for n, z in (("a", 1.0), ("b", 2.0))]
+    contact = refweb.Contact(stiffness=1e3, between_bodies=True)
+    scene = one_line(balls[0]).replace(effects=(*balls, contact, refweb.SelfContact(radius=0.01)))
+    checks = {check.kind: check for check in checks_of(scene.build())}
+    assert set(checks) == {APART, BESIDE, THROUGH, PAIRS}
+    assert checks[APART].limit == 0.02 and checks[THROUGH].limit == MIDDLE * 0.3
+    assert checks_of(scene.replace(effects=(balls[0],)).build()) == []
 
 
 def test_what_a_body_turns_by_is_followed():

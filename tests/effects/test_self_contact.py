@@ -12,9 +12,11 @@ from scipy.optimize import brentq, lsq_linear
 import refweb
 from refweb.compiled.rows import matrix_of
 from refweb.dynamics import schedule
+from refweb.dynamics.integrators.crossings import BESIDE, checks_of
 from refweb.effects.self_contact import line_line_damping, line_line_friction, line_line_penalty, search, table
 from refweb.effects.self_contact.pair import PAIR
 from refweb.errors import InputError, SolverError
+from refweb.kernels import ALL_DUE, DUE
 from refweb.net import discretisation
 from refweb.net.web import Web
 from refweb.registry import INTEGRATORS
@@ -309,7 +311,7 @@ def test_search_finds_all_pairs(flat, skin):
     web = Web(points=points, lines=rows, natural_length=lengths, rim=np.array([0]))
     net = discretisation.build(web, refweb.Cable(law="linear", modulus=1e5, area=1e-6, density=1e3))
     touch = refweb.SelfContact(radius=1e-4)
-    cells, data = touch._elements(net, np.zeros((len(rows), 0)))
+    cells, data = touch.elements_of(net, np.zeros((len(rows), 0)))
     x = 0.3 * rng.standard_normal((60, 3))
     place = (points + x)[rows]
     near = search.REACH * 2e-4 + skin
@@ -683,6 +685,27 @@ def test_neighbours_that_swing_through_each_other_are_named(method, third):
     assert clear.passage["lines"] == "certified" and not clear.warnings
 
 
+def test_a_list_of_what_is_due_tells_the_same_as_all_cells():
+    """Six lines from one node on random ways in a plane: of 400 drifts, some lead through others; few need checks."""
+    angle, rng = np.arange(6), np.random.default_rng(4)
+    points = np.vstack([np.zeros(3), np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)])
+    fan = refweb.Inline(points=points.tolist(), lines=[(0, n) for n in range(1, 7)], supports=[0])
+    system = swept().replace(web=fan, effects=(refweb.SelfContact(radius=0.005, stiffness=1e3),)).build()
+    (check,) = (check for check in checks_of(system) if check.kind == BESIDE)
+    still, count, looks, told = np.zeros((system.rows, 3)), len(check.cells), 0, 0
+    due, met = np.zeros(count + 3, dtype=DUE), np.zeros(4, dtype=np.int64)
+    x = still.copy()
+    for _ in range(400):
+        way = 0.04 * rng.standard_normal((system.rows, 3)) * (1.0, 1.0, 0.0) - 4e-3 * x
+        path = 2.0 * float(np.linalg.norm(way, axis=1).max())
+        drift = 0.0, path, 0.0, 1.0, x, way, still, still, check.cells, check.data
+        looks += int((due["path"][:count] <= due["path"][count] + path).sum())
+        listed, found = check.kernel(*drift, due, met), met.copy()
+        assert check.kernel(*drift, ALL_DUE, met) == listed and (not listed or (found == met).all())
+        due["path"][count], x, told = due["path"][count] + path, x + way, told + listed
+    assert told > 10 and count == 15 and looks < 200 * count
+
+
 @pytest.mark.parametrize("velocity", [0.75, 0.8, 0.9, 1.0])
 def test_neighbours_are_looked_at_when_their_turn_comes(velocity):
     """Where a look at lines does for many small steps, neighbours that meet in one of them are told of in that one."""
@@ -745,7 +768,7 @@ def test_a_look_leaves_no_more_open_than_lines_are_apart():
         course = solver.start()
         solver.advance(course, [time])
         ends = (system.net.points + course.x)[system.net.cells]
-        left[n], apart[n] = solver._model.guard.left[0], distance(*ends)
+        left[n], apart[n] = solver.model.ccd.paths[0]["free"], distance(*ends)
     assert (left <= apart).all() and (left > 0.0).all() and apart.min() < 9e-3 and course.nsteps > 500
 
 

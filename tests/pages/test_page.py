@@ -211,9 +211,9 @@ def test_a_rotation_is_found():
     before = rng.normal(size=(20, 3))
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     turn *= np.sign(np.linalg.det(turn))
-    np.testing.assert_allclose(space._rotation(before, before @ turn.T), turn, atol=1e-12)
+    np.testing.assert_allclose(space.rotation_between(before, before @ turn.T), turn, atol=1e-12)
     flat = before * [1, 1, 0]
-    found = space._rotation(flat, flat @ turn.T)
+    found = space.rotation_between(flat, flat @ turn.T)
     assert np.linalg.det(found) == pytest.approx(1.0) and found == pytest.approx(turn)
 
 

@@ -31,9 +31,9 @@ def test_lines_that_lie_on_each_other_are_drawn_once(monkeypatch):
     """A flat web from its side: what is left covers the same place; fewer lines are left alone."""
     x, y = (a.ravel() for a in np.meshgrid(np.arange(30.0), np.arange(40.0)))
     lines = np.stack([np.stack([x, 0 * y], axis=1), np.stack([x + 1, 0 * y], axis=1)], axis=1)
-    assert stage._different(lines) is lines
+    assert stage.distinct_lines(lines) is lines
     monkeypatch.setattr(stage, "MOST_UNDEFORMED", 100)
-    found = stage._different(lines)
+    found = stage.distinct_lines(lines)
     assert len(found) == 30
     np.testing.assert_array_equal(np.sort(found[:, 0, 0]), np.arange(30.0))
 
@@ -41,7 +41,7 @@ def test_lines_that_lie_on_each_other_are_drawn_once(monkeypatch):
 def test_marked_pixels_are_those_that_lines_meet():
     """A rising diagonal, and a line that leaves the page; rows count from the top."""
     diagonal = np.array([[[0.0, 0.0], [2.0, 1.0]], [[0.0, 0.97], [9.0, 0.97]]])
-    image = stage._marked(diagonal, (0.0, 2.0, 0.0, 1.0), 40, 20)[..., 3] > 0
+    image = stage.marked_pixels(diagonal, (0.0, 2.0, 0.0, 1.0), 40, 20)[..., 3] > 0
     columns = np.arange(40)
     assert image[0].all() and image[19 - columns // 2, columns].all()
     assert not image[19, 3:].any() and not image[10, :15].any() and image[1:].sum() <= 40

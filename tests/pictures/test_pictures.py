@@ -430,7 +430,7 @@ def test_a_mode_says_its_frequency(modes, no_opengl, tmp_path):
 def test_a_mode_swings_about_the_equilibrium(modes):
     """A whole period; half a period on, it is as far on the other side. It is seen, and it is where a folder has it."""
     record = of_solution(modes)
-    frame, poses = record.frame(1), films._poses(record, None, None)
+    frame, poses = record.frame(1), films.poses_of(record, None, None)
     rest = frame.posed(phase=0.0).paths
     nodes = modes.state.position[modes.state.system.net.cells]
     assert np.abs(rest[:, [0, -1]] - nodes[:, :2]).max() < 1e-12

@@ -1,173 +1,125 @@
 """Continuous collision detection: each drift of an explicit step is checked before it is taken.
 
-In a drift rows move in straight lines, with the velocities of the kick before. Lines cannot meet if their overlap plus
-the largest approach of two rows is less than the distance of contact. Else the pairs of lines are checked one by one,
-see `refweb.effects.self_contact.line_line_ccd`. A step in which two lines would meet is rejected and cut to `SHORTER`
-of its size, until the next row or corner of a table. The run ends if the step falls below `LEAST` of the stable step.
-Neighbours along the net do not push each other; the time at which the first two meet is reported.
+In a drift rows move in straight lines, with the velocities of the kick before. Nothing passes through anything if the
+deepest contact plus the largest approach of two rows is less than a limit: for lines the distance of contact, for lines
+and bodies the depth in the middle of a body. Else cells are checked one by one, by the kernels of
+`refweb.dynamics.integrators.crossings.checks_of`. A step in which lines would pass is rejected and cut to `SHORTER` of
+its size, until the next row or corner of a table. The run ends if the step falls below `LEAST` of the stable step.
+Neighbours along the net do not push each other, and a line may be in the core of a body already: the time at which the
+first is there is reported, and no step is cut.
 
-A check finds how far rows may move until the next check is needed; there is none while the sum of drifts is less.
+A check finds how far rows may move until the next check is needed; there is none while the sum of drifts is less. For
+bodies alone, a drift is checked after it if twice the approach of the last drift is still safe: then its approach is
+known without a search over all velocities. Lines that have moved further in that drift are reported.
 
 A step of higher order has several drifts, and cannot be rejected after the first. It is checked in advance as a step of
-order 2, and cut in the same way. Lines that pass in one of its drifts nevertheless are reported.
-
-The check of lines with bodies is similar, see `refweb.effects.contact.line_body_ccd`. No line can reach the middle of a
-body if the largest depth of all contacts plus the approach in a drift is less than the depth there. Else lines near
-bodies are checked one by one. A line that is in the core already is reported and does not cut the step. If twice the
-approach of the last drift is still safe, the next drift is checked after it, when its approach is known without a
-search over all velocities. Lines that have moved further in that drift are reported.
+order 2, and cut in the same way. Lines that pass in one of its drifts nevertheless are reported. The bound of explicit
+steps limits the approach of two bodies, see `refweb.effects.contact.pair_overlap`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from numba import from_dtype, types
 
 from ...kernels import (
-    CCD_NEIGHBOURS,
+    DUE,
+    DUE_LIST,
     INDICES,
-    INTEGERS,
     MATRIX,
     MEETS,
-    VECTOR,
     Arrays,
+    DueTable,
     Functions,
     IndexTable,
     Integers,
-    IntegerTable,
     MatrixTable,
     MeetsTable,
     Record,
-    Vector,
-    VectorTable,
-    WatchTable,
     kernel,
 )
 from ...net.rotation_bounds import beside_places
-from .crossings import APART, BESIDE, THROUGH, note_met
-from .neighbour_list import WAY, goes_freely, near_of
+from .crossings import APART, BESIDE, PAIRS, THROUGH, checks_of, note_met
+from .neighbour_list import WAY, goes_freely
 from .vector_spread import spread_of
 
 if TYPE_CHECKING:
-    from .neighbour_list import NeighbourList
-    from .records import ForceTerms, Model, Running
+    from .records import Model, Running
 
 SHORTER = 0.25
 """Share of a step in which lines would meet that is tried next."""
 LEAST = 1e-3
 """Share of the stable step below which none is tried."""
 CALM = 2.0
-"""Way of a drift that is not looked at before, over that of the last, at most; above, it is told of."""
-TOLD, KEPT_APART, FORESEEN = 0, 1, 2
-"""Where lines would pass, they are told of, the drift is not taken, or the step is not begun and nothing is told of."""
+"""Largest approach in a drift that is checked after it, over that in the last drift; a larger one is reported."""
+REPORT, REJECT, FORESEE = 0, 1, 2
+"""Where lines would pass, they are reported, the drift is not taken, or the step is not begun and nothing reported."""
 FEW = 16.0
-"""Number of drifts that what is open does for, below which their ways are looked at more closely."""
-PAST, DUE = -3, -1
-"""Numbers behind the turns of neighbours: way that rows have gone [m], and that of the next turn; between them is the
-way up to which some are chosen."""
+"""Number of drifts for which a free distance lasts, below which the approach is bounded more closely."""
+PAST, NEXT = -3, -1
+"""Places in a list of what is due of the approach so far, and of that at which the next is due, see `DUE`."""
+CHECK = np.dtype([("kind", np.int64), ("term", np.int64), ("limit", float), ("factor", float)])
+"""Numbers of a `refweb.dynamics.integrators.crossings.Check`."""
+PATHS = np.dtype([("free", float), ("past", float), ("unchecked", float)])
+"""Approach that is free until the next check, and that of all drifts so far [m]; for bodies alone that which is free in
+a drift that is checked after it, 0 where it is checked before."""
+CheckArray = Annotated[np.ndarray, types.Array(from_dtype(CHECK), 1, "C")]
+PathArray = Annotated[np.ndarray, types.Array(from_dtype(PATHS), 1, "C")]
 
 
 class Ccd(Record):
-    """Lines that push each other.
+    """Checks of a system: lines with lines, with neighbours along the net and with bodies.
 
     Attributes
     ----------
-    terms, places : ndarray of int
-        The number of the term, none without; its place among those that act nearby.
-    meets, watches : table
-        Its kernels, see `refweb.effects.base.Crossing`.
-    rows, data, due, chosen : table
-        Neighbours, and when their turn comes.
+    checks : ndarray of `CHECK`, shape (checks,)
+        Their numbers.
+    meets : table
+        Their kernels.
+    cells, data, due : table
+        All cells with their numbers, and of neighbours when each is due, see `refweb.kernels.DUE`.
     touch : float
-        Distance at which lines touch [m].
-    met : ndarray of int, shape (4,)
-        Rows of the last two lines that would have met.
-    left : ndarray, shape (2,)
-        Way that rows may go until lines are looked at, and that which they have gone since they were [m].
+        Distance at which lines touch [m], 0 where lines do not push each other.
+    bodies : int
+        Number of checks with bodies.
+    met : ndarray of int, shape (5,)
+        The last that would have met, see `refweb.kernels.MEETS`, and the kind that a step was rejected for.
+    paths : ndarray of `PATHS`, shape (1,)
+        Approach.
     """
 
-    terms: Integers
-    places: Integers
+    checks: CheckArray
     meets: MeetsTable
-    watches: WatchTable
-    rows: IndexTable
+    cells: IndexTable
     data: MatrixTable
-    due: VectorTable
-    chosen: IntegerTable
+    due: DueTable
     touch: float
+    bodies: int
     met: Integers
-    left: Vector
+    paths: PathArray
 
     @classmethod
     def of(cls, system):
         """Make the record of a system."""
-        numbers = [i for i, term in enumerate(system.terms) if term.contact.crossing is not None]
-        crossings, near = [system.terms[i].contact.crossing for i in numbers], near_of(system)
+        checks = [check for check in checks_of(system) if check.kind != PAIRS]
+        counts = [len(check.cells) + 3 if check.kind == BESIDE else 0 for check in checks]
         return cls(
-            terms=np.array(numbers, dtype=np.int64),
-            places=np.array([near.index(i) for i in numbers], dtype=np.int64),
-            meets=Functions(MEETS, [crossing.meets for crossing in crossings]),
-            watches=Functions(CCD_NEIGHBOURS, [crossing.watch for crossing in crossings]),
-            rows=Arrays(INDICES, [crossing.rows for crossing in crossings]),
-            data=Arrays(MATRIX, [crossing.data for crossing in crossings]),
-            due=Arrays(VECTOR, [np.zeros(len(crossing.rows) + 3) for crossing in crossings]),
-            chosen=Arrays(INTEGERS, [np.zeros(len(crossing.rows) + 1, dtype=np.int64) for crossing in crossings]),
-            touch=max((crossing.touch for crossing in crossings), default=0.0),
-            met=np.zeros(4, dtype=np.int64),
-            left=np.zeros(2),
+            checks=np.array([(check.kind, check.term, check.limit, check.factor) for check in checks], dtype=CHECK),
+            meets=Functions(MEETS, [check.kernel for check in checks]),
+            cells=Arrays(INDICES, [check.cells for check in checks]),
+            data=Arrays(MATRIX, [check.data for check in checks]),
+            due=Arrays(DUE_LIST, [np.zeros(count, dtype=DUE) for count in counts]),
+            touch=max((check.limit for check in checks if check.kind == APART), default=0.0),
+            bodies=sum(check.kind == THROUGH for check in checks),
+            met=np.zeros(5, dtype=np.int64),
+            paths=np.zeros(1, dtype=PATHS),
         )
 
 
-class BodyCcd(Record):
-    """Bodies that push lines.
-
-    Attributes
-    ----------
-    terms, places : ndarray of int
-        As in `Ccd`.
-    meets : table
-        Kernels of `refweb.effects.contact.line_body_ccd`.
-    limits : ndarray
-        Depth that nothing comes to of each term, at least [m].
-    factors : ndarray
-        Largest depth over what cells show, infinite where that is not known.
-    met : ndarray of int, shape (4,)
-        Nodes of the last line that would have come to the middle of a body, its row, and whether it was in the core.
-    left : ndarray, shape (1,)
-        Way that is open to a drift which is not looked at before [m], 0 where it is; none where nothing is pushed.
-    """
-
-    terms: Integers
-    places: Integers
-    meets: MeetsTable
-    limits: Vector
-    factors: Vector
-    met: Integers
-    left: Vector
-
-    @classmethod
-    def of(cls, system):
-        """Those of a system."""
-        numbers = [i for i, term in enumerate(system.terms) if term.contact.passing is not None]
-        passing, near, limits = [system.terms[i] for i in numbers], near_of(system), np.zeros((0, 2))
-        if numbers:
-            from ...effects.contact.line_body_ccd import limits_of
-
-            limits = np.array([limits_of(term, system.net.bodies) for term in passing])
-        return cls(
-            terms=np.array(numbers, dtype=np.int64),
-            places=np.array([near.index(i) for i in numbers], dtype=np.int64),
-            meets=Functions(MEETS, [term.contact.passing for term in passing]),
-            limits=np.ascontiguousarray(limits[:, 0]),
-            factors=np.ascontiguousarray(limits[:, 1]),
-            met=np.ones(4, dtype=np.int64),
-            left=np.zeros(1 if numbers else 0),
-        )
-
-
-@kernel(leaf=True, forceinline=True)
+@kernel(forceinline=True, leaf=True)
 def _larger(a, b):
     return b if b > a else a
 
@@ -189,181 +141,157 @@ def largest_of(kick, v, f, inverse, share):
 
 
 @kernel(apart=())
-def look_anew(guard: Ccd) -> None:
-    """Look at all lines when they come next: rows may be anywhere."""
-    guard.left[:] = 0.0
-    for m in range(guard.terms.size):
-        guard.due[m][:] = 0.0
+def reset_checks(ccd: Ccd) -> None:
+    """Make all cells due: rows may be anywhere."""
+    ccd.paths[0].free = ccd.paths[0].past = 0.0
+    for m in range(ccd.checks.size):
+        due = ccd.due[m]
+        for c in range(due.size):
+            due[c].path = 0.0
 
 
 @kernel(leaf=True)
-def way_among(drift, kick, v, f, inverse):
-    """Way by which two rows may come nearer to each other in a drift behind a kick, by how unlike velocities are."""
-    return abs(drift) * (spread_of(v.reshape(-1, 3)) + WAY * largest_of(kick, v, f, inverse, 0.0))
+def approach(kick, drift, free, model, running):
+    """(Largest component of a velocity [m/s], largest approach of two rows [m]) in a drift behind a kick.
+
+    The approach is bounded more closely, by how much velocities differ, if `FEW` times it is not ``free`` [m].
+    """
+    size = 3 * model.inertia.linear
+    v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
+    fastest = largest_of(kick, v, f, inverse, 1.0)
+    path = WAY * abs(drift) * fastest
+    if FEW * path > free:
+        relative = spread_of(v.reshape(-1, 3)) + WAY * largest_of(kick, v, f, inverse, 0.0)
+        path = min(path, abs(drift) * relative)
+    return fastest, path
 
 
-@kernel(leaf=True, apart=("guard",))
-def open_ahead(kick: float, drift: float, model: Model, running: Running) -> bool:
+@kernel(leaf=True, apart=("line_ccd",))
+def stays_free(kick: float, drift: float, model: Model, running: Running) -> bool:
     """Tell if a drift behind a kick stays within the distance that the last check found free, and use it up.
 
     The largest component of a velocity is written to the skin of what is near.
     """
-    left, skin, size = model.guard.left, model.nearby.skin[0], 3 * model.inertia.linear
-    v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
-    skin.fastest = largest_of(kick, v, f, inverse, 1.0)
-    path = WAY * abs(drift) * skin.fastest
-    if FEW * path > left[0]:
-        path = min(path, way_among(drift, kick, v, f, inverse))
-    if not path < left[0]:
+    paths, skin = model.ccd.paths[0], model.nearby.skin[0]
+    skin.fastest, path = approach(kick, drift, paths.free, model, running)
+    if not path < paths.free:
         return False
-    left[0] -= path
-    left[1] += path
+    paths.free -= path
+    paths.past += path
     return True
 
 
 @kernel(forceinline=True)
-def near_cells(path, i, index, model):
-    """(Cells, data) of a term that may touch on a way [m]: those that are looked at, or all."""
-    skin, terms = model.nearby.skin[0], model.terms
-    if path > skin.depth - skin.used:
-        source = len(terms.data) - model.nearby.terms.size + index  # see `refweb.dynamics.integrators.records`
-        return terms.cells[source], terms.data[source]
-    return terms.cells[i], terms.data[i]
+def near_cells(path, m, model):
+    """(Cells, data) that a check looks at, of those that may touch on a way [m]: those that are listed, or all."""
+    skin, ccd, check = model.nearby.skin[0], model.ccd, model.ccd.checks[m]
+    if check.kind == BESIDE or path > skin.depth - skin.used:
+        return ccd.cells[m], ccd.data[m]
+    return model.terms.cells[check.term], model.terms.data[check.term]
 
 
 @kernel(leaf=True, forceinline=True)
-def deepest_of(depths):
-    """Largest of what a term shows, 0 where that is nothing."""
-    deep = 0.0
-    for c in range(depths.shape[0]):
-        deep = max(deep, depths[c, 0])
-    return deep
+def depth_left(m, ccd, terms):
+    """Distance from the deepest contact of a check to the depth that nothing comes to [m]."""
+    check, deep = ccd.checks[m], 0.0
+    outs = terms.outs[check.term]
+    for c in range(outs.shape[0]):
+        deep = max(deep, outs[c, 0])
+    return check.limit - (check.factor * deep if deep > 0.0 else 0.0)
 
 
-@kernel(leaf=True, apart=("walls",))
-def calm(walls: BodyCcd, nearby: NeighbourList, terms: ForceTerms) -> bool:
-    """Tell if a drift behind another needs no check before, for bodies alone that do not turn."""
-    skin, left = nearby.skin[0], math.inf
-    for m in range(walls.terms.size):
-        deep = deepest_of(terms.outs[walls.terms[m]])
-        left = min(left, walls.limits[m] - (walls.factors[m] * deep if deep > 0.0 else 0.0))
-    walls.left[0] = left if skin.steps > 0 and CALM * skin.last < left else 0.0
-    return walls.left[0] > 0.0
+@kernel(leaf=True, apart=("body_ccd",))
+def checked_after(model: Model) -> bool:
+    """Tell if a drift is checked after it, for bodies alone that do not turn."""
+    ccd, skin, left = model.ccd, model.nearby.skin[0], math.inf
+    for m in range(ccd.checks.size):
+        left = min(left, depth_left(m, ccd, model.terms))
+    ccd.paths[0].unchecked = left if skin.steps > 0 and CALM * skin.last < left else 0.0
+    return ccd.paths[0].unchecked > 0.0
 
 
-@kernel(apart=("walls",))
-def look_back_at_bodies(time: float, model: Model, running: Running) -> None:
-    """Note lines that may have come to the middle of a body in a drift that was not looked at before, from its end."""
-    walls, x, v, f, skin = model.walls, running.x, running.v, running.f, model.nearby.skin[0]
-    for m in range(walls.terms.size):
-        cells, data = near_cells(math.inf, walls.terms[m], walls.places[m], model)
-        if walls.meets[m](skin.last, 0.0, 0.0, 0.0, x, v, f, model.inertia.inverse, cells, data, walls.met):
-            note_met(THROUGH, time, walls.met, running.crossings)
-
-
-@kernel(leaf=True, forceinline=True)
-def look_back_at_drift(time, model, running):
-    """Look back at the drift from a time on where it was not looked at before, and led further than it might."""
-    if model.walls.left.size:
-        if not (model.walls.left[0] == 0.0 or model.nearby.skin[0].last < model.walls.left[0]):
-            look_back_at_bodies(time, model, running)
+@kernel(apart=("body_ccd",))
+def report_bodies(time: float, model: Model, running: Running) -> None:
+    """Report lines that may have come to the middle of a body in a drift that is checked after it, from its end."""
+    ccd, x, v, f, inverse = model.ccd, running.x, running.v, running.f, model.inertia.inverse
+    last = model.nearby.skin[0].last
+    for m in range(ccd.checks.size):
+        cells, data, due = ccd.cells[m], ccd.data[m], ccd.due[m]
+        if ccd.meets[m](last, 0.0, 0.0, 0.0, x, v, f, inverse, cells, data, due, ccd.met):
+            note_met(THROUGH, time, ccd.met, running.crossings)
 
 
 @kernel(leaf=True, forceinline=True)
-def passes(time, kick, drift, stages, model, running):
-    """Tell if the last drift of a step, behind a kick and some ``stages``, must be rejected, see `comes_through`.
+def check_last_drift(time, model, running):
+    """Check the drift from a time on where it was not checked before, and led further than foreseen."""
+    if model.ccd.bodies:
+        unchecked = model.ccd.paths[0].unchecked
+        if not (unchecked == 0.0 or model.nearby.skin[0].last < unchecked):
+            report_bodies(time, model, running)
 
-    The safe distance of a check suffices if rows move with their velocities alone.
+
+@kernel(leaf=True, forceinline=True)
+def reject_drift(time, kick, drift, stages, model, running):
+    """Tell if the last drift of a step, behind a kick and some ``stages``, must be rejected, see `collides`.
+
+    The free distance of a check suffices if rows move with their velocities alone.
     """
     if goes_freely(model):
-        if open_ahead(kick, drift, model, running):
+        if stays_free(kick, drift, model, running):
             return False
-    elif stages + model.guard.terms.size + model.inertia.turns.moment.size == 0:
-        if calm(model.walls, model.nearby, model.terms):
+    elif stages + model.inertia.turns.moment.size == 0 and not model.ccd.touch > 0.0:
+        if checked_after(model):
             return False
-    return comes_through(time, kick, drift, TOLD if stages else KEPT_APART, model, running)
+    return collides(time, kick, drift, REPORT if stages else REJECT, model, running)
 
 
 @kernel(forceinline=True)
 def reject_step(time, h, model, running):
     """Tell if a step of several drifts, of size h, must not begin."""
-    if model.guard.terms.size + model.walls.terms.size == 0:
-        return False
-    return comes_through(time, 0.5 * h, h, FORESEEN, model, running)
+    return model.ccd.checks.size > 0 and collides(time, 0.5 * h, h, FORESEE, model, running)
 
 
-@kernel(apart=("guarded",))
-def comes_through(time: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
-    """Tell if lines would pass through each other or a body's middle in a drift behind a kick, from a time on.
+@kernel(apart=("ccd",))
+def collides(time: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
+    """Tell if a step is rejected for what would meet in a drift behind a kick, from a time on.
 
-    ``then`` is one of `TOLD`, `KEPT_APART` and `FORESEEN`.
+    ``then`` is one of `REPORT`, `REJECT` and `FORESEE`. Where the drift is taken, the free distance behind it is found.
     """
-    touch, size, left = model.guard.touch, 3 * model.inertia.linear, model.guard.left
-    v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
-    path = WAY * abs(drift) * largest_of(kick, v, f, inverse, 1.0)
-    if touch > 0.0 and FEW * path > touch:
-        path = min(path, way_among(drift, kick, v, f, inverse))
+    ccd, turns, paths = model.ccd, model.inertia.turns, model.ccd.paths[0]
+    x, v, f, inverse, met = running.x, running.v, running.f, model.inertia.inverse, model.ccd.met
+    path = approach(kick, drift, ccd.touch if ccd.touch > 0.0 else math.inf, model, running)[1]
     if not path < math.inf:
         return False
-    came = passes_lines(time, path, kick, drift, then, model, running) if touch > 0.0 else False
-    if model.walls.terms.size:
-        came = passes_bodies(time, path, kick, drift, then, model, running) or came
-    if came:
-        running.clock[0].rejected, left[0] = 1, 0.0
-    return came
-
-
-@kernel(apart=("guard",))
-def passes_lines(
-    time: float, path: float, kick: float, drift: float, then: int, model: Model, running: Running
-) -> bool:
-    """Tell if lines that push each other would meet; where the drift is taken, find the free distance behind it."""
-    guard, terms, x, v, f, came = model.guard, model.terms, running.x, running.v, running.f, False
-    inverse, left = model.inertia.inverse, math.inf
-    for m in range(guard.terms.size):
-        i, due = guard.terms[m], guard.due[m]
-        margin = guard.touch - deepest_of(terms.outs[i]) - path
-        if not margin > 0.0:
-            cells, data = near_cells(path - guard.touch, i, guard.places[m], model)
-            if guard.meets[m](0.0, path, kick, drift, x, v, f, inverse, cells, data, guard.met):
-                came = then != TOLD
-                if then == TOLD:
-                    note_met(APART, time, guard.met, running.crossings)
-        due[PAST] += guard.left[1]
-        if came or then == FORESEEN:
-            continue
-        if guard.watches[m](
-            0.0, path, kick, drift, x, v, f, inverse, guard.rows[m], guard.data[m], due, guard.chosen[m], guard.met
-        ):  # fmt: skip
-            note_met(BESIDE, time, guard.met, running.crossings)
-        left = min(left, margin, due[DUE] - due[PAST])
-    guard.left[0], guard.left[1] = 0.0 if then == FORESEEN else left, 0.0
-    return came
-
-
-@kernel(apart=("walls",))
-def passes_bodies(
-    time: float, path: float, kick: float, drift: float, then: int, model: Model, running: Running
-) -> bool:
-    """Tell if lines would come as deep in a body as its middle."""
-    walls, terms, x, v, f, came = model.walls, model.terms, running.x, running.v, running.f, False
-    inverse, margin = model.inertia.inverse, 0.0
-    if model.inertia.turns.moment.size:
-        margin = beside_places(kick, drift, x, v, f, inverse, model.inertia.turns)
-    walls.met[3] = 1
-    for m in range(walls.terms.size):
-        i = walls.terms[m]
-        deep = deepest_of(terms.outs[i])
-        left = walls.limits[m] - (walls.factors[m] * deep if deep > 0.0 else 0.0) - path - margin
-        if model.guard.terms.size:
-            model.guard.left[0] = 0.0 if model.inertia.turns.moment.size else min(model.guard.left[0], left)
-        if left > 0.0:
-            continue
-        cells, data = near_cells(path + margin, i, walls.places[m], model)
-        if walls.meets[m](margin, path, kick, drift, x, v, f, inverse, cells, data, walls.met):
-            if then != TOLD and walls.met[3] == 0:
-                came = True
+    turned, free, came, turning = 0.0, math.inf, False, ccd.bodies > 0 and turns.moment.size > 0
+    if turning:
+        turned = beside_places(kick, drift, x, v, f, inverse, turns)
+    for m in range(ccd.checks.size):
+        kind, due, margin, reach = ccd.checks[m].kind, ccd.due[m], 0.0, path
+        if kind == BESIDE:
+            if then == FORESEE:
+                continue
+            due[PAST].path = paths.past
+        else:
+            if kind == THROUGH:
+                margin, reach = turned, path + turned
+            else:
+                reach -= ccd.touch
+            left = depth_left(m, ccd, model.terms) - path - margin
+            free = min(free, left)
+            if left > 0.0:
+                continue
+        cells, data = near_cells(reach, m, model)
+        if ccd.meets[m](margin, path, kick, drift, x, v, f, inverse, cells, data, due, met):
+            if then != REPORT and (kind == APART or kind == THROUGH and met[3] == 0):
+                came, met[4] = True, kind
                 break
-            if then != FORESEEN:
-                note_met(THROUGH, time, walls.met, running.crossings)
+            if then != FORESEE:
+                note_met(kind, time, met, running.crossings)
+        if kind == BESIDE:
+            free = min(free, due[NEXT].path - paths.past - path)
+    if came:
+        running.clock[0].rejected = 1
+    elif then != FORESEE:
+        paths.past += path
+    paths.free = 0.0 if came or turning or then == FORESEE else free
     return came

@@ -21,7 +21,8 @@ import numpy as np
 from ...compiled.kernel import prepare
 from ...errors import EnergyDriftError, InputError, IntegrationError, SolverError
 from ...kernels import CONTACT, CONTACTS, PART, PARTS, Arrays
-from .ccd import look_anew
+from .ccd import reset_checks
+from .crossings import THROUGH
 from .dense_output import LOOKS
 from .energy_balance import DRIFT, least_energy, own_energies, refuse_open
 from .events import event_rows
@@ -63,6 +64,11 @@ class CentralDifference(Integrator):
     finer : float
         Factor on the number of steps in each row, ≥ 1.
 
+    Attributes
+    ----------
+    model : refweb.dynamics.integrators.records.Model
+        The system as the compiled loop sees it.
+
     Raises
     ------
     InputError
@@ -98,8 +104,8 @@ class CentralDifference(Integrator):
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
         self._outs = outs = tuple(system.per_cell())
-        self._model = Model.of(system, outs)
-        self._observed = Observed.of(probes, sums, len(outs), outs, self._model.contacts)
+        self.model = Model.of(system, outs)
+        self._observed = Observed.of(probes, sums, len(outs), outs, self.model.contacts)
         self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])
         self._events, self._least_energy, self._taken, self._prepared = (
             event_rows(events),
@@ -113,8 +119,8 @@ class CentralDifference(Integrator):
     def prepare(self):
         """Compile what the run calls, see `refweb.dynamics.integrators.integrator.Integrator`."""
         if not self._prepared:
-            model, observed = self._model, self._observed
-            called = [advance_rows, begin, open_balance, safe_step, look_anew]
+            model, observed = self.model, self._observed
+            called = [advance_rows, begin, open_balance, safe_step, reset_checks]
             called += [*model.all_kernels(), *observed.all_kernels()]
             prepare(called, features(self._scheme, model, observed, self._events))
             self._prepared = True
@@ -124,9 +130,7 @@ class CentralDifference(Integrator):
         self.prepare()
         rest = np.zeros((self.system.rows, 3))
         x = rest if x is None else x
-        return safe_step.call(
-            0.0, np.inf, len(self._model.lengths.elements) > 0, float(reach), 0.0, x, rest, self._model
-        )
+        return safe_step.call(0.0, np.inf, len(self.model.lengths.elements) > 0, float(reach), 0.0, x, rest, self.model)
 
     def steps_in(self, spans):
         """Number of steps in each of some spans of time [s] that a row or a corner ends, by the bound of the start."""
@@ -164,12 +168,12 @@ class CentralDifference(Integrator):
         extremes = Extremes.at_start(np.zeros(len(self._observed.signs)))
         work, total = np.zeros(len(system.terms) + 1), np.zeros(len(system.terms) + 3)
         where = np.zeros(2, dtype=np.int64)
-        begin.call(x, v, force, where, self._model, self._observed, extremes, work, total)
+        begin.call(x, v, force, where, self.model, self._observed, extremes, work, total)
         monitors = begin_monitors(self._observed, extremes, total, self._events)
         energy, stored = own_energies(total, system.working)
         ledger = MomentumBalance.empty()
-        mass = self._model.inertia.mass[:, None]
-        open_balance.call(x, mass * np.where(system.supported, 0.0, v), self._model.outside, ledger)
+        mass = self.model.inertia.mass[:, None]
+        open_balance.call(x, mass * np.where(system.supported, 0.0, v), self.model.outside, ledger)
         return ExplicitState(
             time=0.0,
             x=x,
@@ -227,7 +231,7 @@ class CentralDifference(Integrator):
         for name in SHARED:
             clock[name] = getattr(course, name)
         clock["least_energy"] = self._least_energy
-        changing = len(self._model.lengths.elements)
+        changing = len(self.model.lengths.elements)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
         carried = course.power, np.zeros((2, changing)), course.crossings, *self._contacts
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
@@ -243,12 +247,12 @@ class CentralDifference(Integrator):
         work = len(self.drifts) * sum(len(term.cells) for term in self.system.terms)
         done, breath = 0, max(BREATH // max(work, 1), 1)
         running = self._running(course)
-        records = self._scheme, self._model, self._observed, running, Workspace.of(self._model, running)
+        records = self._scheme, self.model, self._observed, running, Workspace.of(self.model, running)
         clock = running.clock
-        if len(self._model.guard.terms) or len(self._model.walls.terms):
-            look_anew.call(self._model.guard)
+        if len(self.model.ccd.checks):
+            reset_checks.call(self.model.ccd)
         if self._taken != (id(course), course.nsteps):
-            forget(self._model, course.nsteps > 0)
+            forget(self.model, course.nsteps > 0)
         try:
             while True:
                 more = advance_rows.call(times[done:], breath, DRIFT, *records, history.values[done:])
@@ -269,9 +273,9 @@ class CentralDifference(Integrator):
                 course.x[:], course.v[:], course.force[:] = course.before
             raise
         finally:
-            look_at_all(self.system, self._model)
+            look_at_all(self.system, self.model)
             self._taken = id(course), int(clock[0]["nsteps"])
-            nearby = self._model.nearby
+            nearby = self.model.nearby
             followed = len(nearby.terms) and len(self.drifts) == 1 and not self.system.carried.any()
             course.longest = max(course.longest, float(nearby.skin[0]["longest"]) if followed else math.inf)
             nearby.skin["longest"] = 0.0
@@ -299,12 +303,12 @@ class CentralDifference(Integrator):
         It returns the state (3, rows, 3) that is ``count`` steps after the state of ``begun`` steps.
         """
         running.clock["time"] = before
-        model = replace(self._model, nearby=self._model.nearby.without())  # its lists hold for steps in a row
+        model = replace(self.model, nearby=self.model.nearby.without())  # its lists hold for steps in a row
 
         def after(state, begun, count):
             state, running.clock["begun"] = state.copy(), begun
             copy = replace(running, x=state[0], v=state[1], f=state[2], events=course.events[:0])
-            changing, workspace = self._model.lengths.elements.size > 0, Workspace.of(model, copy)
+            changing, workspace = self.model.lengths.elements.size > 0, Workspace.of(model, copy)
             run_steps.call(count, float(course.step), changing, self._scheme, model, self._observed, copy, workspace)
             return state
 
@@ -333,14 +337,15 @@ class CentralDifference(Integrator):
 
     def _refuse_passing(self, course, now):
         """Refuse lines that would pass through lines or bodies in any step that is not far below the critical one."""
-        if self._model.walls.met[3] == 0:
+        met = self.model.ccd.met
+        if met[4] == THROUGH:
             from ...effects.contact.penetration import would_pass
 
-            reason = would_pass(self.system, self._model.walls.met)
+            reason = would_pass(self.system, met)
         else:
             from ...effects.self_contact.penetration import would_pass
 
-            reason = would_pass(self.system, course.v, self._model.guard.met)
+            reason = would_pass(self.system, course.v, met[:4])
         at = now["time"] + now["begun"] * now["step"]
         raise SolverError(
             f"at t = {at:.6g} s, in a step of {now['cut']:.3g} s where {now['stable']:.3g} is stable, {reason}"

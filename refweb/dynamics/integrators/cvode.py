@@ -88,7 +88,8 @@ class Cvode(Sundials):
     def _over_mass(self, f):
         return self._mass_factor.apply(f) if self._consistent else f / self._mass
 
-    def _right_side(self, t, y, yp):
+    def right_side(self, t, y, yp):
+        """Write y' = f(t, y), velocities and accelerations of the unknowns."""
         n = self.unknowns
         x, v = self.state(t, y[:n], y[n:])
         force = self.force_at(t, x, v)
@@ -108,7 +109,7 @@ class Cvode(Sundials):
 
     # Block elimination
 
-    def _set_up(self, t, y, yp, jok, jnew, gamma):
+    def set_up(self, t, y, yp, jok, jnew, gamma):
         """Factorize M + γC + γ²K; K and C are kept where CVODE allows."""
         may = self._sparing and not (self._plain and t == self._set_up_at)  # else iterations have not converged
         known, self._still = self._gamma is not None, may and self._nothing_moves(yp, gamma)
@@ -160,7 +161,8 @@ class Cvode(Sundials):
 
         self._factorize(values, definite)
 
-    def _precondition(self, t, y, yp, r, z, gamma, delta, side):
+    def precondition(self, t, y, yp, r, z, gamma, delta, side):
+        """Solve (I − γJ) z = r with the factors of `set_up`."""
         if self._plain:
             z[:] = r
             return
@@ -171,7 +173,8 @@ class Cvode(Sundials):
         z[n:] = self._factor.apply(self._times_mass(r[n:]) - self._gamma * (self._K @ first))
         z[:n] = first + self._gamma * (rotations.carried(z[n:]) if rotations else z[n:])
 
-    def _jacobian_times(self, t, y, yp, u, Ju):
+    def jacobian_times(self, t, y, yp, u, Ju):
+        """Write J u, J that of the last `set_up`."""
         if self._plain:
             Ju[:] = 0.0
             return
@@ -197,7 +200,8 @@ class Cvode(Sundials):
             rows, columns = [*rows, first, slow], [*columns, second, n + fast]
         return np.concatenate(rows), np.concatenate(columns)
 
-    def _jacobian(self, t, y, yp, J):
+    def jacobian(self, t, y, yp, J):
+        """Write J = ∂f/∂y to a dense matrix, or to the values of a sparse one."""
         n, (K, C) = self.unknowns, self._tangent(t, y)
         if not self._consistent:
             heavy = self._mass[self._force_rows]
@@ -219,15 +223,16 @@ class Cvode(Sundials):
             J[self.rotations.places.ravel(), n + self.rotations.places.ravel()] = 0.0
             J[first, second], J[slow, n + fast] = self.rotations.X.ravel(), self.rotations.V.ravel()
 
-    def _linear_options(self):
+    def linear_options(self):
+        """Options of SUNDIALS for the linear solver."""
         from sksundae.cvode import CVODEJacTimes, CVODEPrecond
 
         if self.linear_solver in ("dense", "sparse"):
             return self._full_matrix(*self._whole_pattern(), 2 * self.unknowns)
         if self.linear_solver == "block":
             self._symmetric = Symmetric(self.system.pattern)
-            precond = CVODEPrecond(self._set_up, self._precondition)
-            times = CVODEJacTimes(None, self._jacobian_times)
+            precond = CVODEPrecond(self.set_up, self.precondition)
+            times = CVODEJacTimes(None, self.jacobian_times)
             return dict(linsolver="gmres", krylov_dim=10, precond=precond, jactimes=times)
 
         def nothing(t, y, yp, u, Ju):
@@ -241,7 +246,7 @@ class Cvode(Sundials):
         from sksundae.cvode import CVODE
 
         def right_side(t, y, yp):
-            self._right_side(t, y, yp)
+            self.right_side(t, y, yp)
 
         tolerance = np.concatenate(self.tolerance())
         return CVODE(right_side, method={"bdf": "BDF", "adams": "Adams"}[self.family], atol=tolerance, **options)

@@ -18,7 +18,7 @@ from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import add_forces_to_bodies
 from ...net.rotation_bounds import fastest_point, hardest_push
 from .averages import average
-from .ccd import LEAST, SHORTER, TOLD, comes_through, look_back_at_drift, passes, reject_step
+from .ccd import LEAST, REPORT, SHORTER, check_last_drift, collides, reject_drift, reject_step
 from .contacts import feel
 from .dense_output import look_again, look_at_books, look_behind, look_inside
 from .energy_balance import (
@@ -91,8 +91,8 @@ def inner_stages(
         give_impulse(kick, push, running.ledger.pushed)
         book_kick(kick, model.inertia.driven, v, f, running.work)
         book_potential(1.0, kicked, x, terms, running.work)
-        if model.guard.terms.size + model.walls.terms.size:
-            comes_through(now - h, kick, drift, TOLD, model, running)
+        if model.ccd.checks.size:
+            collides(now - h, kick, drift, REPORT, model, running)
         move(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
         book_potential(-1.0, kicked, x, terms, running.work)
         add_forces(drifted, x, v, f, outs[0], first, terms.still, forces, cells, data, outs)
@@ -147,7 +147,7 @@ def run_steps(
     sums, bits = observed.sums, flat_v[: 3 * model.inertia.linear * (near and not stages)].view(np.int64)
     watched, fresh, turns = followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0), model.inertia.turns
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
-    guarded, moves = model.guard.terms.size + model.walls.terms.size > 0, driven.size + len(motions.kernels) > 0
+    checked, moves = model.ccd.checks.size > 0, driven.size + len(motions.kernels) > 0
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
@@ -155,7 +155,7 @@ def run_steps(
             note_state(x, v, f, inverse, space.inside.before)
         if stages and not inner_stages(now, h, scheme, model, running, reaction, push, extra):
             return step - 1
-        if guarded and passes(now - h, kick, drift, stages, model, running):
+        if checked and reject_drift(now - h, kick, drift, stages, model, running):
             return step - 1
         note_motion(driven, mass, x, v, f, before)
         move(kick, drift, flat_inverse, flat_x, flat_v, flat_f, x, v, turns)
@@ -167,7 +167,7 @@ def run_steps(
             change_lengths(now, h, model, space.was, running)
         if near:
             update_neighbours(drift, x, v, bits, before, model)
-            look_back_at_drift(now - h, model, running)
+            check_last_drift(now - h, model, running)
         first(now, x, v, f, terms.cells[0], data_of_lines, lines)
         for i in terms.still:
             act(i, now, x, v, f, terms)

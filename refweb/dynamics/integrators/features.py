@@ -14,8 +14,8 @@ def features(scheme, model, observed, events):
         that change, masses that ``follows`` them;
         ``powers``, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped`` (integrated impulses),
         ``booked`` (powers, lengths or pushing), ``angular`` momentum that is kept; ``near`` cells, ``pairs`` that are
-        found; lines that push each other (``guard``), bodies that push lines (``walls``), ``guarded`` (either);
-        ``contacts`` of bodies.
+        found; collision checks (``ccd``) of lines that push each other (``line_ccd``) and of bodies that push lines
+        (``body_ccd``); ``contacts`` of bodies.
     """
     inertia, terms, outside, windows = model.inertia, model.terms, model.outside, observed.windows
     has = {
@@ -40,9 +40,9 @@ def features(scheme, model, observed, events):
         "angular": len(outside.axes),
         "near": len(model.nearby.terms),
         "pairs": len(model.nearby.at),
-        "guard": len(model.guard.terms),
-        "walls": len(model.walls.terms),
-        "guarded": len(model.guard.terms) + len(model.walls.terms),
+        "ccd": len(model.ccd.checks),
+        "line_ccd": model.ccd.touch,
+        "body_ccd": model.ccd.bodies,
         "contacts": len(model.contacts.terms),
     }
     return {name for name, count in has.items() if count}

@@ -127,7 +127,8 @@ class Ida(Sundials):
         """Displacement and velocity of all rows at a state of the unknowns."""
         return self.state(t, self._parts(y)[0], self._velocity(y, yp))
 
-    def _residual(self, t, y, yp, r):
+    def residual(self, t, y, yp, r):
+        """Write F(t, y, y'), which is 0 along a motion."""
         n, heavy, bare = self.unknowns, self._heavy, self._bare
         x, v = self._rows(t, y, yp)
         force = self.force_at(t, x, v)
@@ -161,7 +162,7 @@ class Ida(Sundials):
 
     # Block elimination
 
-    def _set_up(self, t, y, yp, res, c):
+    def set_up(self, t, y, yp, res, c):
         """Factorize M + C/c + K/c²."""
         system = self.system
         K, C = self._tangent(t, y, yp)
@@ -179,7 +180,8 @@ class Ida(Sundials):
 
         self._factorize(rest + K / c**2, definite, self._adrift[1] is None)
 
-    def _precondition(self, t, y, yp, res, r, z, c, delta):
+    def precondition(self, t, y, yp, res, r, z, c, delta):
+        """Solve J z = r with the factors of `set_up`, J = ∂F/∂y + c ∂F/∂y'."""
         if self._inverts(z, c == self._factored and self._true):
             return
         n, heavy, bare, c = self.unknowns, self._heavy, self._bare, self._factored
@@ -191,7 +193,8 @@ class Ida(Sundials):
         carried = self.rotations.carried(velocity) if self.rotations else velocity
         z[:n], z[n:] = (first + carried) / c, velocity[heavy]
 
-    def _jacobian_times(self, t, y, yp, res, u, Ju, c):
+    def jacobian_times(self, t, y, yp, res, u, Ju, c):
+        """Write J u, J that of the last `set_up`."""
         if self._multiplied(u):
             return
         n, heavy, bare = self.unknowns, self._heavy, self._bare
@@ -206,7 +209,7 @@ class Ida(Sundials):
     # The whole Jacobian
 
     def _whole_pattern(self):
-        """Rows and columns of what `_jacobian` writes."""
+        """Rows and columns of what `jacobian` writes."""
         n, heavy, pattern = self.unknowns, self._heavy, self.system.pattern
         column = np.repeat(np.arange(n), np.diff(pattern.indptr))
         at = np.arange(n)  # row of M v' − f, and column of v; without mass that of x, whose rate v is
@@ -222,7 +225,8 @@ class Ida(Sundials):
             parts += self._links.places(heavy, at[heavy], n + len(heavy))
         return (np.concatenate(side) for side in zip(*parts, strict=True))
 
-    def _jacobian(self, t, y, yp, res, c, J):
+    def jacobian(self, t, y, yp, res, c, J):
+        """Write J = ∂F/∂y + c ∂F/∂y' to a dense matrix, or to the values of a sparse one."""
         K, C = self._tangent(t, y, yp)
         slope = c * self._M.data
         if C is not None:
@@ -234,14 +238,15 @@ class Ida(Sundials):
             parts += self._links.values(*self._at_state[1:], self._parts(y)[2])
         self._write(J, np.concatenate(parts))
 
-    def _linear_options(self):
+    def linear_options(self):
+        """Options of SUNDIALS for the linear solver."""
         from sksundae.ida import IDAJacTimes, IDAPrecond
 
         if self.linear_solver != "block":
             rows, columns = self._whole_pattern()
             return self._full_matrix(rows, columns, self.unknowns + len(self._heavy) + 2 * self._count)
         self._symmetric = Symmetric(self.system.pattern)
-        precond, times = IDAPrecond(self._set_up, self._precondition), IDAJacTimes(None, self._jacobian_times)
+        precond, times = IDAPrecond(self.set_up, self.precondition), IDAJacTimes(None, self.jacobian_times)
         return dict(linsolver="gmres", krylov_dim=10, precond=precond, jactimes=times)
 
     # Consistent initial conditions
@@ -274,7 +279,7 @@ class Ida(Sundials):
         n, heavy, links = self.unknowns, len(self._heavy), 2 * self._count
         position, velocity = self.tolerance()
         return IDA(
-            self._residual,
+            self.residual,
             atol=np.concatenate([position, velocity[self._heavy], np.full(links, UNTESTED)]),
             algebraic_idx=np.concatenate([self._bare, n + heavy + np.arange(links)]).astype(int).tolist(),
             **options,

@@ -326,7 +326,7 @@ def covered(path: float, x: Matrix, nearby: NeighbourList, terms: ForceTerms) ->
 def goes_freely(model):
     """Tell if lines push each other, and all rows move as their velocities say: none is moved or carried."""
     inertia = model.inertia
-    return model.guard.terms.size > 0 and inertia.driven.size + inertia.turns.carried.shape[0] == 0
+    return model.ccd.touch > 0.0 and inertia.driven.size + inertia.turns.carried.shape[0] == 0
 
 
 @kernel(leaf=True, apart=("near",))
@@ -334,10 +334,10 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
     """Record the approach in the drift that led to x, and make a new list if the skin is used up.
 
     ``bits`` are the velocities of all places, in a row, as whole numbers; none where nothing acts nearby. The largest
-    is known where a guard has looked for it. Motion that is prescribed is held against the places ``before``; to that
-    of a body is added what its rotation adds at its surface. States between the last three steps are covered as well,
-    which is what is looked at for peaks. Of pairs the ways relative to each other are taken where a skin as deep as may
-    be is used up in few steps otherwise.
+    is known where a check of collisions has found it. Motion that is prescribed is held against the places ``before``;
+    to that of a body is added what its rotation adds at its surface. States between the last three steps are covered as
+    well, which is what is looked at for peaks. Of pairs the ways relative to each other are taken where a skin as deep
+    as may be is used up in few steps otherwise.
     """
     if not bits.size:
         return

@@ -20,8 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernels import kernel
-from .crossings import APART, BESIDE, PAIRS, THROUGH, note_met
+from ...effects.base import pairs_of
+from ...kernels import ALL_DUE, kernel
+from .crossings import PAIRS, THROUGH, checks_of, note_met
 
 HALVINGS = 10
 """Largest number of times that a piece is halved where it is not certain that nothing meets."""
@@ -49,26 +50,14 @@ class Passages:
     """
 
     def __init__(self, system, position):
-        self._net, self._position = system.net, position
+        self._terms, self._net, self._position = system.terms, system.net, position
         self._still, self._rows_met = np.zeros((system.rows, 3)), np.zeros(4, dtype=np.int64)
-        self._crossing = [term for term in system.terms if term.contact.crossing is not None]
-        self._pairs = [pair for term in system.terms for pair in term.contact.pairs]
-        self._checks = []
-        for term in system.terms:
-            crossing, passing = term.contact.crossing, term.contact.passing
-            if crossing is not None:
-                pushed, beside = (term.cells, term.data), (crossing.rows, crossing.data)
-                for which, cells in ((APART, pushed), (BESIDE, beside)):
-                    self._checks.append((which, partial(self._lines_met, (), crossing.meets, *cells)))
-            if passing is not None:
-                met = partial(self._lines_met, system.net.bodies, passing, term.cells, term.data)
-                self._checks.append((THROUGH, met))
-            if term.contact.pairs:
-                self._checks.append((PAIRS, partial(self._pair_met, term)))
+        self._checks, self._pairs = checks_of(system), pairs_of(system)
 
     def soon(self, x, v):
         """Time in which no line comes through another, and no body much nearer to another, from a state [s]."""
-        times = [f.contact.crossing.soon(x, v, f.cells, f.data) for f in self._crossing]
+        lines = (term for term in self._terms if term.contact.crossing is not None)
+        times = [term.contact.crossing.soon(x, v, term.cells, term.data) for term in lines]
         for pair in self._pairs:
             speed = np.linalg.norm(np.subtract(*(v[body.row] for body in pair))) + sum(
                 body.extent * np.linalg.norm(body.turning(x, v)) for body in pair if body.turn is not None
@@ -79,11 +68,12 @@ class Passages:
 
     def inspect(self, course, piece):
         """Note in a course the first of each kind that may have met in a piece of a step."""
-        for which, met in self._checks:
-            if not np.isfinite(course.crossings[which, 0]):
+        for check in self._checks:
+            if not np.isfinite(course.crossings[check.kind, 0]):
+                met = partial(self._pair_met if check.kind == PAIRS else self._lines_met, check)
                 meeting = self._first(met, piece.start, piece.middle, piece.end, HALVINGS)
                 if meeting is not None:
-                    note_met(which, *meeting, course.crossings)
+                    note_met(check.kind, *meeting, course.crossings)
 
     def _first(self, met, begin, middle, end, halvings):
         """(Time from which on two may have met [s], their rows), None where none have."""
@@ -100,18 +90,21 @@ class Passages:
                 return meeting
         return None
 
-    def _lines_met(self, bodies, meets, cells, data, x, path, bend):
-        """Rows of lines, or of a line and one of some bodies, that may have met on a way; None where none can have."""
+    def _lines_met(self, check, x, path, bend):
+        """Rows of lines, or of a line and a body, that may have met on a way; None where none can have."""
+        bodies = self._net.bodies if check.kind == THROUGH else ()
         places = len(self._net.points) - self._net.spins if bodies else self._net.nodes
         turned = sum(max((turned_by(body, moved) for body in bodies), default=0.0) for moved in (path, bend))
         margin, largest, still = float(spread(bend, places) + turned), 2.0 * spread(path, places), self._still
-        came = meets(margin, largest, 0.0, 1.0, x, path, still, still, cells, data, self._rows_met)
+        drift = margin, largest, 0.0, 1.0, x, path, still, still
+        came = check.kernel(*drift, check.cells, check.data, ALL_DUE, self._rows_met)
         return self._rows_met if came else None
 
-    def _pair_met(self, term, x, path, bend):
+    def _pair_met(self, check, x, path, bend):
         """Rows of two bodies that may have come to the middle of one of them on a way; None where none can have."""
-        deep = np.zeros((len(term.cells), term.columns))
-        term.force(0.0, x, self._still, np.zeros_like(x), term.cells, term.data, deep)
+        term = self._terms[check.term]
+        deep = np.zeros((len(check.cells), term.columns))
+        check.kernel(0.0, x, self._still, np.zeros_like(x), check.cells, check.data, deep)
         for pair, (depth, *_) in zip(term.contact.pairs, deep, strict=True):
             nearer = _nearer(pair, path) + _nearer(pair, bend)
             if not (depth + nearer < _thickness(pair) or nearer < self._apart(pair, x)):

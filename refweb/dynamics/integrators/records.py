@@ -39,7 +39,7 @@ from ...kernels import (
 )
 from ...net.rotation import RigidRotations
 from .averages import Averages
-from .ccd import BodyCcd, Ccd
+from .ccd import Ccd
 from .contacts import Contacts
 from .energy_balance import no_energy
 from .events import EventArray
@@ -260,8 +260,7 @@ class Model(Record):
     corners: Vector
     outside: Outside
     nearby: NeighbourList
-    guard: Ccd
-    walls: BodyCcd
+    ccd: Ccd
     contacts: Contacts
 
     @classmethod
@@ -272,7 +271,7 @@ class Model(Record):
             lengths = replace(lengths, masses=FollowedMass.of(system, inertia.mass, inertia.inverse))
         forces = inertia, ForceTerms.of(system, outs), ImplicitContacts.of(system, inertia.turns)
         changes = Motions.of(system), lengths, system.corners, Outside.of(system)
-        return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), BodyCcd.of(system), Contacts.of(system))
+        return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), Contacts.of(system))
 
 
 class Running(Record):

@@ -51,7 +51,7 @@ class Sundials(StepObserver):
     linear_solver = choice = ""
     max_order: int
     _symmetric: Symmetric
-    _jacobian: Callable
+    jacobian: Callable
 
     def __init__(self, system, *observed, **tolerances):
         super().__init__(system, *observed, **tolerances)
@@ -87,7 +87,7 @@ class Sundials(StepObserver):
         """Take other masses of the unknowns [kg]."""
         raise NotImplementedError
 
-    # What a subclass brings, besides `_jacobian` as its solver calls it
+    # What a subclass brings, besides `jacobian` as its solver calls it
 
     def _made(self, **options):
         """The solver of sksundae at the tolerances."""
@@ -97,7 +97,7 @@ class Sundials(StepObserver):
         """Arguments of ``init_step`` of the solver."""
         raise NotImplementedError
 
-    def _linear_options(self) -> dict:
+    def linear_options(self) -> dict:
         """The linear solver, as options; a "block" one factorizes with `_symmetric`."""
         raise NotImplementedError
 
@@ -124,13 +124,13 @@ class Sundials(StepObserver):
         """Options for a Jacobian whose values stand at these rows and columns, where several of a place add up."""
         if self.linear_solver == "dense":
             self._places = rows * size + columns
-            return dict(linsolver="dense", jacfn=self._jacobian)
+            return dict(linsolver="dense", jacfn=self.jacobian)
         from scipy.sparse import csc_matrix
 
         keys, self._places = np.unique(columns * size + rows, return_inverse=True)
         indptr = np.searchsorted(keys, size * np.arange(size + 1)).astype(np.int32)
         pattern = csc_matrix((np.ones(keys.shape), (keys % size).astype(np.int32), indptr), shape=(size, size))
-        return dict(linsolver="sparse", sparsity=pattern, jacfn=self._jacobian)
+        return dict(linsolver="sparse", sparsity=pattern, jacfn=self.jacobian)
 
     def _write(self, J, values):
         """Write the values of `_whole` to a dense matrix, or to the values of a sparse one."""
@@ -173,7 +173,7 @@ class Sundials(StepObserver):
 
     def begin(self, t, x, v):
         """Make the solver at a state of the unknowns."""
-        options = dict(max_order=self.max_order, rtol=self.rtol, max_num_steps=10_000_000, **self._linear_options())
+        options = dict(max_order=self.max_order, rtol=self.rtol, max_num_steps=10_000_000, **self.linear_options())
         with _heard(), _quiet():
             self._solver = self._made(**options)
             _checked(self._solver.init_step(t, *self._initial(t, x, v)))

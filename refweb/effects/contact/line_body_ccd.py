@@ -101,7 +101,7 @@ def passing(depth, nodes, functions, spins=0):
             return False
 
     @kernel(MEETS)
-    def meets(margin, path, kick, drift, x, v, f, inverse, cells, data, met):
+    def meets(margin, path, kick, drift, x, v, f, inverse, cells, data, due, met):
         for c in range(cells.shape[0]):
             allowance = margin + nearing(cells, c, nodes, kick, drift, v, f, inverse)
             reach = record_at(SPHERE, data, c, 0).radius + allowance

@@ -6,7 +6,7 @@ step two bodies approach by at most the step times the speeds of their fastest p
 overlap of all steps is less than the least distance from a middle to its surface, it is proven that nothing has passed.
 The bound of explicit steps limits the approach to 0.2 times that distance times ``safety``. For explicit steps of a
 given size, it follows from the step and the largest speed of the run. Steps of CVODE and IDA are checked one by one,
-see `refweb.dynamics.integrators.body_body_ccd`.
+see `refweb.dynamics.integrators.passages`.
 """
 
 from __future__ import annotations

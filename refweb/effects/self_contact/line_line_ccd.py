@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from ...compiled.rows import records_of, width_of
-from ...kernels import CCD_NEIGHBOURS, MEETS, TIME_TO_CONTACT, kernel
+from ...kernels import MEETS, TIME_TO_CONTACT, kernel
 from ..vectors import dot
 from .pair import PAIR, nearest, numbers_of, place_of
 from .search import near_pairs
@@ -81,68 +81,57 @@ def gone(vector, share, path):
 
 @kernel()
 def would_meet(margin, geometry, ways, joined):
-    """(True if a pair comes nearer than ``margin`` in a drift, distance at its start, largest change of that)."""
+    """(True if a pair comes nearer than ``margin`` in a drift, distance at its start)."""
     (p, u, w), (dp, du, dw) = geometry, ways
     longest, share, start = longest_of(dp, du, dw), 0.0, distance(p, u, w, joined)
     left = start
     for _ in range(LOOKS):
         if not left - margin > 0.0:
-            return True, start, longest
+            return True, start
         if left - margin > (1.0 - share) * longest:
-            return False, start, longest
+            return False, start
         share += (left - margin) / longest
         left = distance(gone(p, share, dp), gone(u, share, du), gone(w, share, dw), joined)
-    return True, start, longest
+    return True, start
 
 
 @kernel(forceinline=True)
-def record_pair(cells, c, met):
-    """Write the nodes of pair c."""
-    for n in range(4):
-        met[n] = cells[c, n]
+def choose_due(reach, count, due):
+    """Number of cells that are chosen, anew where some may be due that are not: those that are due soon."""
+    if due[count].path + reach >= due[count + 1].path:
+        due[count + 1].path = due[count].path + AHEAD * reach if count else math.inf
+        due[count].chosen = 0
+        for c in range(count):
+            if due[c].path <= due[count + 1].path:
+                due[due[count].chosen].chosen = c
+                due[count].chosen += 1
+    return due[count].chosen
 
 
 @kernel(MEETS)
-def meets(margin, path, kick, drift, x, v, f, inverse, cells, data, met):
+def meets(margin, path, kick, drift, x, v, f, inverse, cells, data, due, met):
     if cells.shape[1] != 4:
         _, cells, data = near_pairs(max(path, 0.0) + margin, x, cells, data)
-    for c in range(cells.shape[0]):
-        of = numbers_of(data, c)
-        if of.scale > 0.0:
-            near, joined = margin + MEETING * of.touch, cells[c, 0] == cells[c, 2]
-            ways = ways_of(cells, c, kick, drift, v, f, inverse)
-            if would_meet(near, place_of(x, cells, data, c), ways, joined)[0]:
-                record_pair(cells, c, met)
-                return True
-    return False
-
-
-@kernel(CCD_NEIGHBOURS)
-def watch(margin, path, kick, drift, x, v, f, inverse, cells, data, due, chosen, met):
-    count = cells.shape[0]
-    past, until, came = due[count], due[count + 1], False
-    if past + path + margin >= until:  # choose those whose turn comes soon
-        until, chosen[count] = past + AHEAD * (path + margin) if count else math.inf, 0
-        for c in range(count):
-            if due[c] <= until:
-                chosen[chosen[count]] = c
-                chosen[count] += 1
-        due[count + 1] = until
-    next_one = until
-    for n in range(chosen[count]):
-        c = chosen[n]
-        if due[c] > past + path + margin:
-            next_one = min(next_one, due[c])
-            continue
-        of, joined = numbers_of(data, c), cells[c, 0] == cells[c, 2]
-        near, ways = margin + MEETING * of.touch, ways_of(cells, c, kick, drift, v, f, inverse)
-        closed, start, _ = would_meet(near, place_of(x, cells, data, c), ways, joined)
-        due[c] = past + start
-        next_one = min(next_one, due[c])
-        if closed and of.scale > 0.0 and not came:
-            record_pair(cells, c, met)
-            came = True
-    due[count], due[count + 2] = past + path, next_one
+    count, listed, came, following = cells.shape[0], due.size > 0, False, math.inf
+    for n in range(choose_due(path + margin, count, due) if listed else count):
+        c = due[n].chosen if listed else n
+        if not (listed and due[c].path > due[count].path + path + margin):
+            of, joined, closed, start = numbers_of(data, c), cells[c, 0] == cells[c, 2], False, math.inf
+            if of.scale > 0.0:
+                ways = ways_of(cells, c, kick, drift, v, f, inverse)
+                closed, start = would_meet(margin + MEETING * of.touch, place_of(x, cells, data, c), ways, joined)
+            if closed and not came:
+                came = True
+                for k in range(4):
+                    met[k] = cells[c, k]
+                if not listed:
+                    break
+            if listed:
+                due[c].path = due[count].path + start
+        if listed:
+            following = min(following, due[c].path)
+    if listed:
+        due[count + 2].path = min(following, due[count + 1].path)
     return came
 
 
@@ -152,11 +141,7 @@ def soon(x, v, cells, data):
     for c in range(cells.shape[0]):
         of = numbers_of(data, c)
         if of.scale > 0.0:
-            i, j, k, m = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3]
-            p = v[i, 0] - v[k, 0], v[i, 1] - v[k, 1], v[i, 2] - v[k, 2]
-            u = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
-            w = v[m, 0] - v[k, 0], v[m, 1] - v[k, 1], v[m, 2] - v[k, 2]
-            speed = 2.0 * longest_of(p, u, w)
+            speed = 2.0 * longest_of(*ways_of(cells, c, 0.0, 1.0, v, v, v))
             if speed > 0.0:
                 geometry = place_of(x, cells, data, c)
                 left = distance(geometry.p, geometry.u, geometry.w, False) - of.touch

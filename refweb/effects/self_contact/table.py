@@ -114,7 +114,7 @@ class SelfContact(Table):
         from . import line_line_ccd, line_line_penalty
 
         self._refuse_too_large(net)
-        cells, data = self._elements(net, near_along(net, 2.0 * self.radius))
+        cells, data = self.elements_of(net, near_along(net, 2.0 * self.radius))
         self._refuse_overlap(net, *near_pairs(0.0, np.zeros_like(net.points), cells, data))
         chosen = listed(cells, data) if len(cells) ** 2 < 4 * LISTED + 4 * len(cells) else None
         if chosen is not None and len(chosen) <= LISTED:
@@ -130,7 +130,7 @@ class SelfContact(Table):
             common = dict(cells=cells, data=data, elements=CellElements(np.arange(len(cells)), without(BROKEN)))
             search = ContactForce(finder=near_pairs)
         beside = line_line_ccd.neighbours(net, data[:, APART:], 2.0 * self.radius)
-        kernels = line_line_ccd.meets, line_line_ccd.watch, line_line_ccd.soon
+        kernels = line_line_ccd.meets, line_line_ccd.soon
         follows = Crossing(*kernels, 2.0 * self.radius, self.stiffness_on(net), *beside)
         push = ForceTerm(
             name="self_contact",
@@ -160,7 +160,7 @@ class SelfContact(Table):
             return self.stiffness
         return float((net.axial / net.line_data.natural_length).max())
 
-    def _elements(self, net, beside):
+    def elements_of(self, net, beside):
         """Nodes and numbers of all elements with those beside them, see `refweb.effects.self_contact.pair`."""
         touch = 2.0 * self.radius
         data = np.zeros((len(net.cells), APART + beside.shape[1]))
@@ -183,7 +183,7 @@ class SelfContact(Table):
             )
         if touch < FAR * net.natural_length.max():
             return
-        cells, data = self._elements(net, np.zeros((len(net.cells), 0)))
+        cells, data = self.elements_of(net, np.zeros((len(net.cells), 0)))
         graph, largest = _graph(net), 0
         for element in np.linspace(0, len(cells) - 1, SOME).astype(np.int64):
             beside = _reached(graph, cells[element], touch).any(axis=0)[cells].any(axis=1)

@@ -248,23 +248,23 @@ def test_every_linear_solver_inverts_the_same_matrix(order, consistent, lossy):
         if name == "block":
             for gamma in (1e-7, 1e-5, 1e-3):
                 new, r, z = [None], scale * rng.standard_normal(2 * n), np.empty(2 * n)
-                solver._set_up(0.0, y, None, False, new, gamma)
-                solver._precondition(0.0, y, None, r, z, gamma, 0.0, 1)
+                solver.set_up(0.0, y, None, False, new, gamma)
+                solver.precondition(0.0, y, None, r, z, gamma, 0.0, 1)
                 expected = np.linalg.solve(np.eye(2 * n) - gamma * J, r)
                 np.testing.assert_allclose(z / scale, expected / scale, rtol=0, atol=1e-9 * np.abs(z / scale).max())
                 assert new == [1]
             product = np.empty(2 * n)
-            solver._precondition(0.0, y, None, r, z, 2.0 * gamma, 0.0, 1)  # γ has changed since the set-up
-            solver._jacobian_times(0.0, y, None, r, product)
+            solver.precondition(0.0, y, None, r, z, 2.0 * gamma, 0.0, 1)  # γ has changed since the set-up
+            solver.jacobian_times(0.0, y, None, r, product)
             found = product
             expected = J @ r
         elif name == "dense":
             found = np.empty((2 * n, 2 * n))
-            solver._jacobian(0.0, y, None, found)
+            solver.jacobian(0.0, y, None, found)
             expected = J
         else:
-            pattern = solver._linear_options()["sparsity"]
-            solver._jacobian(0.0, y, None, pattern.data)
+            pattern = solver.linear_options()["sparsity"]
+            solver.jacobian(0.0, y, None, pattern.data)
             found, expected = pattern.toarray(), J
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
 
@@ -278,9 +278,9 @@ def test_the_jacobian_is_that_of_the_right_side(consistent):
     u = rng.standard_normal(2 * n) * np.repeat([1e-3, 1.0], n)
     steps, left = np.array([1e-1, 3e-2, 1e-2, 3e-3]), []
     before, after = np.empty(2 * n), np.empty(2 * n)
-    solver._right_side(0.0, y, before)
+    solver.right_side(0.0, y, before)
     for h in steps:
-        solver._right_side(0.0, y + h * u, after)
+        solver.right_side(0.0, y + h * u, after)
         left.append(np.abs(after - before - h * (J @ u)).max())
     # The next term of the remainder is of the relative size h.
     assert abs(slope(steps, left) - 2.0) < 0.05
@@ -508,13 +508,13 @@ def test_an_open_book_is_repeated_with_a_tenth_of_the_tolerance(tmp_path, monkey
 @pytest.mark.parametrize("linear_solver", SOLVERS)
 def test_a_corrupted_book_is_never_returned(tmp_path, monkeypatch, linear_solver):
     """Forces that push along every motion put energy in whatever the tolerance: it is repeated twice, and fails."""
-    own = Cvode._right_side
+    own = Cvode.right_side
 
     def corrupted(self, t, y, yp):
         own(self, t, y, yp)
         yp[self.unknowns :] += 5.0 * y[self.unknowns :]
 
-    monkeypatch.setattr(Cvode, "_right_side", corrupted)
+    monkeypatch.setattr(Cvode, "right_side", corrupted)
     with pytest.raises(EnergyDriftError, match="energy drift .* limit 0.01: use a smaller rtol than 1e-06"):
         refweb.run(scene(ball(), rtol=1e-4, linear_solver=linear_solver), out=tmp_path / "out")
     summary = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
@@ -627,7 +627,7 @@ def here(tmp_path, monkeypatch):
     return command
 
 
-def failing(monkeypatch, error, after=300, name="_right_side"):
+def failing(monkeypatch, error, after=300, name="right_side"):
     """Make a callback raise an error at one of its calls."""
     own, calls = getattr(Cvode, name), []
 
@@ -655,8 +655,8 @@ def test_interrupted_in_a_callback(here, tmp_path, monkeypatch, capsys, linear_s
     assert len(list((tmp_path / "out" / "frames").glob("web_*.vtu"))) == (len(history) + 1) // 2
 
 
-CALLBACKS = [("dense", "_jacobian"), ("sparse", "_jacobian"), ("block", "_set_up")]
-CALLBACKS += [("block", "_precondition"), ("block", "_jacobian_times"), *((name, "_right_side") for name in SOLVERS)]
+CALLBACKS = [("dense", "jacobian"), ("sparse", "jacobian"), ("block", "set_up")]
+CALLBACKS += [("block", "precondition"), ("block", "jacobian_times"), *((name, "right_side") for name in SOLVERS)]
 
 
 @pytest.mark.parametrize("linear_solver, name", CALLBACKS)
@@ -680,7 +680,7 @@ import test_cvode
 from refweb.dynamics.integrators.cvode import Cvode
 def fault(self, t, y, yp):
     raise ZeroDivisionError
-own, Cvode._right_side = Cvode._right_side, fault
+own, Cvode.right_side = Cvode.right_side, fault
 for _ in range(20):
     solver = Cvode(test_cvode.small(size=3), linear_solver="sparse")
     try:
@@ -689,7 +689,7 @@ for _ in range(20):
         pass
     del solver
     gc.collect()
-Cvode._right_side = own
+Cvode.right_side = own
 test_cvode.ran(test_cvode.small(size=3), [1e-3], linear_solver="sparse")
 print("alive")
 """
@@ -710,7 +710,7 @@ def test_a_good_run_says_nothing(capfd, linear_solver):
 @pytest.mark.parametrize("linear_solver", ["", *SOLVERS])
 def test_what_sundials_says_is_in_the_message(capfd, monkeypatch, linear_solver):
     """With the time, the step size and the node that is moved most; on neither stream."""
-    own, options, meaning = Cvode._right_side, {"rtol": 1e-18}, "too much accuracy requested"
+    own, options, meaning = Cvode.right_side, {"rtol": 1e-18}, "too much accuracy requested"
 
     noise = np.random.default_rng(0)
 
@@ -719,7 +719,7 @@ def test_what_sundials_says_is_in_the_message(capfd, monkeypatch, linear_solver)
         yp[-1] += 1e20 * noise.normal() if self.stats["nfev"] > 100 else 0.0
 
     if linear_solver:
-        monkeypatch.setattr(Cvode, "_right_side", broken)
+        monkeypatch.setattr(Cvode, "right_side", broken)
         options, meaning = {"linear_solver": linear_solver}, "corrector convergence test failed repeatedly"
     with pytest.raises(refweb.SolverError) as caught:
         ran(small(size=3), [END], thrown(small(size=3)), **options)
@@ -732,13 +732,13 @@ def test_what_sundials_says_is_in_the_message(capfd, monkeypatch, linear_solver)
 
 def test_a_run_that_would_not_end(monkeypatch):
     """Noise in the forces holds the steps to where it does not show: that is said instead of taking 1e8 of them."""
-    own, noise = Cvode._right_side, np.random.default_rng(0)
+    own, noise = Cvode.right_side, np.random.default_rng(0)
 
     def noisy(self, t, y, yp):
         own(self, t, y, yp)
         yp[-1] += 1e10 * noise.normal()
 
-    monkeypatch.setattr(Cvode, "_right_side", noisy)
+    monkeypatch.setattr(Cvode, "right_side", noisy)
     with pytest.raises(refweb.SolverError, match="more than 1e[+]08 to the next row: raise rtol = 1e-06, or lower"):
         ran(small(size=3), [END], thrown(small(size=3)))
 

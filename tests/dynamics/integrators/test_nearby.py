@@ -153,7 +153,7 @@ def test_far_from_a_body_few_lines_are_looked_at():
     from refweb.dynamics.integrators import neighbour_list
 
     solver = solver_of(case(BALL), False)
-    course, model = solver.start(), solver._model
+    course, model = solver.start(), solver.model
     solver.advance(course, [2e-3])
     skin, lists = model.nearby.skin, model.terms
     everything = len(lists.cells[1])

@@ -36,11 +36,11 @@ def test_what_a_run_has_used_is_free_behind_it(name, changes):
     course = integrator.start(*simulation.begin.motion)
     for end in (times[1], 1.01 * times[1]):
         integrator.advance(course, [end])
-    model, running = integrator._model, integrator._running(course)
-    used = [course.x, course.v, course.force, course.before, course.work, course.extremes.values, *integrator._outs]
-    used += [model.inertia.inverse, model.inertia.rates, model.terms.still, running.clock]
+    model = integrator.model
+    used = [course.x, course.v, course.force, course.before, course.work, course.extremes.values, *model.terms.outs]
+    used += [model.inertia.inverse, model.inertia.rates, model.terms.still]
     alive = [weakref.ref(array) for array in used]
-    del simulation, integrator, course, model, running, used
+    del simulation, integrator, course, model, used
     gc.collect()
     assert [one() for one in alive] == [None] * len(alive)
 
