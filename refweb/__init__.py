@@ -32,6 +32,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .errors import SolverError as SolverError
     from .net.cable import Cable as Cable
     from .net.cable import Group as Group
+    from .net.cable import Viscous as Viscous
     from .net.inline import Inline as Inline
     from .net.lattices import Layers as Layers
     from .net.lattices import Paper as Paper

@@ -72,7 +72,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     net = replace(net, end=float(max(solve.load_steps) if net.quasi_static else solve.duration))
     _check_forming(net, solve)
     supported = _supported(net, supports, support)
-    system = System(net, [Elasticity(), *_acting(effects)], supported, solve.factorization)
+    system = System(net, [*_of_lines(cable, net), *_acting(effects)], supported, solve.factorization)
     if len(net.web.broken):
         from .system.broken_lines import with_broken_lines
         from .system.static_system import refuse_broken
@@ -103,6 +103,15 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
         with refused_at(f"[[event]] {i + 1}"):
             _check_event(event, [earlier.name for earlier in events[:i]], observables, system)
     return system
+
+
+def _of_lines(cable, net):
+    """Effects of the cable itself: the law of its lines, and their arms; statics has these in its modulus."""
+    if cable.viscous is None or net.quasi_static:
+        return [Elasticity()]
+    from .effects.viscous import ViscousArms
+
+    return [Elasticity(), ViscousArms(cable.viscous)]
 
 
 def _web(web, folder):

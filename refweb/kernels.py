@@ -26,6 +26,9 @@ all its digits, which it loses when positions are the unknowns.
                    at most, with ``inverse`` as in `LAW`; its rows are written to ``met``. Where ``due`` has any, only
                    the cells that are due are looked at, see `DUE`
 `TIME_TO_CONTACT`  ``(x, v, cells, data)``: time in which no cell comes much nearer [s]
+`RELAX`            ``(h, x, cells, data, before, lost)``: takes internal variables of all cells, in ``x``, to the end of
+                   a step h; ``before`` has strains at its start and gets those at its end, for h = 0 alone; writes the
+                   energy that is dissipated in each cell [J] to ``lost``
 =================  ===================================================================================================
 
 `STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
@@ -128,6 +131,7 @@ ALL_DUE = np.zeros(0, dtype=DUE)
 """List with which all cells are checked."""
 MEETS = types.boolean(_f, _f, _f, _f, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, MATRIX, DUE_LIST, INTEGERS)
 TIME_TO_CONTACT = types.float64(MATRIX, MATRIX, INDICES, MATRIX)
+RELAX = types.void(_f, MATRIX, INDICES, MATRIX, VECTOR, VECTOR)
 NEAR = types.int64(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), INTEGERS)
 
 
@@ -151,6 +155,7 @@ BoundTable = Annotated[Functions, BOUND]
 DetectTable = Annotated[Functions, DETECT]
 LawTable = Annotated[Functions, LAW]
 MeetsTable = Annotated[Functions, MEETS]
+RelaxTable = Annotated[Functions, RELAX]
 ImpulseTable = EnergyTable
 """Annotations of tables of kernels in records."""
 

@@ -217,6 +217,7 @@ EXPORTS = (
     "refweb.solution:Solution",
     "refweb.net.cable:Cable",
     "refweb.net.cable:Group",
+    "refweb.net.cable:Viscous",
     "refweb.net.tension_laws:Law",
     "refweb.net.web:Web",
     "refweb.errors:InputError",

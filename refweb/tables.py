@@ -295,6 +295,16 @@ def by_group(kind, where, *, default_factory=dict) -> Any:
     return field(read, default_factory=default_factory)
 
 
+def part(kind) -> Any:
+    """A table of a class below another one, None without it."""
+
+    @accepts(kind)
+    def read(name, value):
+        return value if isinstance(value, kind) else kind.read(name, value)
+
+    return field(read, default=None)
+
+
 def key_of(f):
     """Key of a field in scenes: its name, without the ``_`` behind a word of Python's own."""
     return f.name.removesuffix("_")
@@ -330,6 +340,7 @@ def refuse_keys(cls, given):
         component,
         components,
         by_group,
+        part,
         dataclasses.field,
     ),
 )

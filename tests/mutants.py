@@ -90,6 +90,8 @@ MIRRORS = {
     "effects/base": "test_contract.py dynamics/integrators/test_ida.py",
     "effects/elasticity": "net/test_elements.py test_contract.py",
     "effects/temperature": "effects/test_temperature.py",
+    "effects/natural_lengths": "effects/test_viscous.py",
+    "effects/damping": "test_contract.py effects/test_damping.py effects/test_viscous.py",
     "effects/outer_load": "test_contract.py",
     "effects/mass_flow": "effects/test_reel_mass.py",
     "effects/drag": "test_contract.py effects/test_drag.py",
@@ -307,6 +309,14 @@ MUTANTS = [
         "effects/damping",
         "power -= weights[q] * line.natural_length * pull * rate",
         "power += weights[q] * line.natural_length * pull * rate",
+    ),
+    Mutant("effects/damping", "along = share * (by_strain - by_rate * growth(data, c))", "along = share * by_strain"),
+    Mutant("effects/natural_lengths", "lengths.growth] += slope / factor", "lengths.growth] += slope"),
+    Mutant("effects/viscous", "time * (1.0 - decay * decay)", "time * (1.0 - decay)"),
+    Mutant("effects/viscous", "pull + max(by_law, 0.0) >= 0.0:", "pull + by_law >= 0.0 or e > 0.0:"),
+    Mutant("effects/viscous", "data, c, q) - (1.0 + e) * pull)", "data, c, q) - pull)"),
+    Mutant(
+        "effects/viscous", "weighted += arm(data, c, k) * (slope * before - left)", "weighted -= arm(data, c, k) * left"
     ),
     Mutant(
         "effects/bending", "f[cells[c, 1], r] += first_pull + last_pull", "f[cells[c, 1], r] += first_pull - last_pull"

@@ -467,10 +467,10 @@ ABSENT = (
     "inner_stages", "turn_on", "carry_nodes", "move_supports", "set_lengths", "set_masses", "exchange_masses",
     "viscous_kick", "rubbing_kick",
     "take_pairs", "stays_free", "set_push", "average", "note_events", "look_at_books", "book_powers",
-    "add_half_steps", "turning",
+    "add_half_steps", "turning", "relax", "set_growth",
 )  # fmt: skip
 """Kernels of the loop that a plain impact has no use for: stages, bodies that turn or carry, motion, reels, damping,
-friction, lines on lines, integrated impulses, averages, events, energies as observables, angular momentum."""
+friction, lines on lines, integrated impulses, averages, events, energies as observables, angular momentum, arms."""
 
 
 def machine_code(*changes):

@@ -107,6 +107,7 @@ def print_scene(scene, system):
             ("", sizes),
             ("cable", f"{law}; {modulus}A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
             *(("curve", _curve(curve)) for curve in system.net.kept),
+            *_arms(cable),
             ("effects", ", ".join(counted) or "none"),
             *((f'body "{body.name}"', text) for body in system.net.bodies for text in body.shape.texts()),
             *_stiffness(scene, system),
@@ -116,6 +117,12 @@ def print_scene(scene, system):
             *corners,
         ],
     )
+
+
+def _arms(cable):
+    """Row of the viscous arms of a cable, none without."""
+    if cable.viscous is not None:
+        yield "arms", "; ".join(f"E = {modulus:g} Pa, τ = {time:g} s" for modulus, time in cable.viscous.arms)
 
 
 def _stiffness(scene, system):

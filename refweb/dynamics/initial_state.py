@@ -54,7 +54,7 @@ def start_of(scene, system):
     """The `Start` of a scene."""
     if scene.start_folder is not None:
         return stored(system, scene.start_folder)[0]
-    return Start(equilibrium(system).x) if scene.solve.start == "equilibrium" else Start(system.laid)
+    return Start(system.settled(equilibrium(system).x if scene.solve.start == "equilibrium" else system.laid))
 
 
 def remarks_on(start, system):
@@ -235,8 +235,9 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
     """The `Start` of a system from the nodes of a checkpoint and, after them, from the bodies with their names."""
     net, nodes = system.net, len(positions) - len(bodies)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
+    names = [*row_names(net.bodies), *net.internal_names]
     row = {str(body): nodes + i for i, body in enumerate(bodies)}
-    numbered = zip(row_names(net.bodies), range(net.nodes, system.rows), strict=True)
+    numbered = zip(names, range(net.nodes, system.rows), strict=True)
     fixed_names = [body.name for body in net.bodies if body.fixed]
     pairs = [(row_here, row[name]) for name, row_here in numbered if name in row and name not in fixed_names]
     row_here, rows_there = np.array([*((i, i) for i in range(nodes)), *pairs]).T
@@ -260,4 +261,4 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
         )
         if (len(rows_there) == 2) != (body.turn is not None) or not all(alike):
             _turn(body, bearings[body.name], rows_there, x, v)
-    return Start(x, v)
+    return Start(x if set(net.internal_names) <= set(row) else system.settled(x), v)

@@ -84,7 +84,7 @@ class Simulation:
 
             self._ways = MethodFallback(scene, system, kept)
             scene = self._ways.scene
-        self.begin, self.begin_of_twin = Start(system.laid), None
+        self.begin, self.begin_of_twin = Start(system.settled(system.laid)), None
         if kept is not None:
             self.begin = Start(*(kept.get(f"begin_{name}") for name in Start._fields))
             if "twin_begin_x" in kept:
@@ -178,7 +178,8 @@ class Simulation:
         from ..system.static_system import waiting
 
         equilibrium_ = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
-        self.begin, state = Start(equilibrium_.x), State(self.system, 0.0, equilibrium_.x)
+        self.begin = Start(self.system.settled(equilibrium_.x))
+        state = State(self.system, 0.0, self.begin.x)
         for finding in remark_on_open(state, equilibrium_):
             text = f"of the equilibrium it starts from: {finding.text}"
             self.solution.findings.append(finding._replace(text=text))

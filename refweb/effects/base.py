@@ -9,6 +9,8 @@ matrix and knows no other effect.
 ``extend(net)``
     Returns the `refweb.net.net.Net` with more rows, mass or columns of line data. It is called before any ``on``;
     effects without ``on`` come first.
+``add_internal(net)``
+    Returns the net with rows of internal variables behind all others, see `InternalVariables`.
 ``start(net, supported, v)``
     Writes initial velocities; the points of this net are the positions at the start.
 ``lay(net, supported)``
@@ -26,10 +28,10 @@ import numpy as np
 from ..compiled.rows import column_of, width_of
 from ..errors import InputError
 
-LINE_OUT = np.dtype([(name, float) for name in ("tension", "strain", "damped_tension", "power")])
+LINE_OUT = np.dtype([(name, float) for name in ("tension", "strain", "damped_tension", "power", "length_power")])
 """Numbers that terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law the
-tension with it [N] and its power [W]."""
-TENSION, STRAIN, DAMPED_TENSION, POWER = range(4)
+tension with it [N], its power [W] and that of changes of natural lengths against it [W]."""
+TENSION, STRAIN, DAMPED_TENSION, POWER, LENGTH_POWER = range(5)
 """Columns of these."""
 
 
@@ -238,6 +240,33 @@ class CellElements(NamedTuple):
     disable: Callable | None = None
 
 
+class InternalVariables(NamedTuple):
+    """Internal variables of elements, unknowns z that are no places, with c z' = f.
+
+    They are in rows at the end, `refweb.net.net.Net.internal`. f is the force that terms add there, and c z'² is what
+    their own term dissipates.
+
+    Attributes
+    ----------
+    components : ndarray of int, shape (variables,)
+        3 row + axis of each.
+    elements : ndarray of int, shape (variables,)
+        Element of each.
+    resistance : ndarray, shape (variables,)
+        c over the natural length of the element.
+    relax : kernel
+        Takes them over a step of an explicit method.
+    space : int
+        Number of strains that this notes.
+    """
+
+    components: np.ndarray
+    elements: np.ndarray
+    resistance: np.ndarray
+    relax: Callable
+    space: int
+
+
 @dataclass(frozen=True, eq=False)
 class ForceTerm:
     """Force of cells of one kind with its kernels, whose signatures are in `refweb.kernels`.
@@ -258,7 +287,7 @@ class ForceTerm:
         Part in the balances of energy and momentum.
     energy : kernel, optional
         Potential of the force, if there is one; for a force with a power it is linear in time between its times.
-    tangent, velocity, contact, frame, timing, elements
+    tangent, velocity, contact, frame, timing, elements, internal
         Optional parts, see the classes.
     """
 
@@ -274,6 +303,7 @@ class ForceTerm:
     frame: MovingFrame = MovingFrame()
     timing: Timing = Timing()
     elements: CellElements = CellElements()
+    internal: InternalVariables | None = None
 
     @property
     def over_lines(self):

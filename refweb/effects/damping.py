@@ -1,6 +1,6 @@
 """Damping of the lines: Kelvin–Voigt on the tangent of their law, and a drag in proportion to mass; and that of bodies.
 
-At the rate of strain ε̇ = t·v'/L, v' = dv/dξ, a line has the stress
+At the rate of strain ε̇ = t·v'/L − (1 + ε) L'/L, v' = dv/dξ and L' = dL/dt, a line has the stress
 
     max(σ + τ σ'(ε) ε̇, −αE),        −αE the floor of its law,
 
@@ -11,8 +11,9 @@ dx/dξ, l = |p| and t = p/l, a quadrature point has
     damping of (a, b)       w dN_a/dξ dN_b/dξ (∂N/∂ε̇)/L t⊗t
     stiffness of (a, b)     w dN_a/dξ dN_b/dξ [(∂N/∂ε)/L t⊗t + (N/l)(I − t⊗t) + (∂N/∂ε̇)/(L l) t⊗(v' − (t·v') t)]
 
-and the power −w L N ε̇ ≤ 0. Changes of natural lengths do not count in ε̇. The force of a line without smoothing jumps
-when it snaps taut, and central differences are of order 1 across this jump.
+and the power −w L N ε̇ ≤ 0. Where L changes, by reels and heat, ∂N/∂ε has −(∂N/∂ε̇) L'/L as well, and what changes it
+does the work −(1 + ε) N L' w. The force of a line without smoothing jumps when it snaps taut, and central differences
+are of order 1 across this jump.
 """
 
 from __future__ import annotations
@@ -25,12 +26,24 @@ from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
 from ..tables import Table, real, table
-from .base import LINE_OUT, POWER, Balance, ForceTerm, Tangent, Timing, VelocityForce, column, refuse_flows
+from .base import (
+    LENGTH_POWER,
+    LINE_OUT,
+    POWER,
+    Balance,
+    ForceTerm,
+    Tangent,
+    Timing,
+    VelocityForce,
+    column,
+    refuse_flows,
+)
 from .line_kernels import gradient, line_at, pull_together, strain
+from .natural_lengths import GROWTH
 
 
 @functools.cache
-def kernels(law, record, tau, gradients, weights):
+def kernels(law, record, tau, changing, gradients, weights):
     """Force, stiffness, damping and damping bound of one law and reference element.
 
     Parameters
@@ -40,7 +53,9 @@ def kernels(law, record, tau, gradients, weights):
     record : numpy.dtype
         Numbers of an element that it reads, see `refweb.net.net.Net.law_record`.
     tau : int
-        Column of τ in the numbers of the lines.
+        Column of τ in the numbers of the lines; that behind it has L'/L.
+    changing : bool
+        True if natural lengths change.
     gradients : tuple of tuple of float
         dN/dξ by quadrature point and node.
     weights : tuple of float
@@ -63,23 +78,32 @@ def kernels(law, record, tau, gradients, weights):
             return -slope, 0.0
         return time * rate * curvature(e, line), time * slope
 
+    @kernel(forceinline=True)
+    def growth(data, c):
+        """L'/L of cell c."""
+        return data[c, tau + 1] if changing else 0.0
+
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            largest = power = 0.0
+            largest = power = reeled = 0.0
             line = record_at(record, data, c, 0)
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 v0, v1, v2 = gradient(v, cells, c, q, nodes, flat)
-                rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / line.natural_length
+                longer = (1.0 + e) * growth(data, c)
+                rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / line.natural_length - longer
                 pull = viscous(e, rate, data[c, tau], line)
                 tension = pull + stress(e, line)
                 if q == 0 or tension > largest:
                     largest = tension
                 power -= weights[q] * line.natural_length * pull * rate
+                reeled -= weights[q] * line.natural_length * pull * longer
                 pull_together(f, cells, c, q, nodes, flat, weights[q] * pull * inverse, p0, p1, p2)
             shows = record_at(LINE_OUT, out, c, 0)
             shows.damped_tension, shows.power = largest, power
+            if changing:
+                shows.length_power = reeled
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
@@ -92,10 +116,12 @@ def kernels(law, record, tau, gradients, weights):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p, speed = (p0 * inverse, p1 * inverse, p2 * inverse), (p0 * w[0] + p1 * w[1] + p2 * w[2]) * inverse
-                rate, share = speed / line.natural_length, weights[q] / line.natural_length
+                share = weights[q] / line.natural_length
+                rate = speed / line.natural_length - (1.0 + e) * growth(data, c)
                 by_strain, by_rate = slopes(e, rate, time, line)
                 across = weights[q] * viscous(e, rate, time, line) * inverse
-                along, turn = share * by_strain - across, share * by_rate * inverse
+                along = share * (by_strain - by_rate * growth(data, c)) - across
+                turn = share * by_rate * inverse
                 for i in range(3):
                     for j in range(3):
                         value = p[i] * (along * p[j] + turn * (w[j] - speed * p[j]))
@@ -114,7 +140,7 @@ def kernels(law, record, tau, gradients, weights):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
-                rate = (p[0] * w[0] + p[1] * w[1] + p[2] * w[2]) / line.natural_length
+                rate = (p[0] * w[0] + p[1] * w[1] + p[2] * w[2]) / line.natural_length - (1.0 + e) * growth(data, c)
                 along = weights[q] / line.natural_length * slopes(e, rate, time, line)[1]
                 for a in range(nodes):
                     for b in range(nodes):
@@ -138,6 +164,11 @@ def kernels(law, record, tau, gradients, weights):
                     rates[np.uint64(cells[c, a])] += weights[q] * abs(flat[q * nodes + a]) * total * coefficient
 
     return force, stiffness, damping, damping_bound
+
+
+@kernel(FORCE)
+def no_force(t, x, v, f, cells, data, out):
+    pass
 
 
 @kernel(FORCE)
@@ -178,8 +209,9 @@ class Damping(Table):
     ----------
     time : float
         τ of the material [s], ≥ 0; an axial vibration of taut lines, of period T, has the damping ratio πτ/T. The force
-        is proportional to the velocity at which the ends of a line separate. Changes of natural length L by reels and
-        heat do not count: the part −(l/L²) dL/dt of the rate of strain is left out.
+        is proportional to the rate of strain of the material, (d/dt)(l/L) of length l and natural length L: a line that
+        is paid out at the velocity at which its ends separate is not damped, and one that is reeled in between fixed
+        ends is.
     rate : float
         Rate at which velocities fade [1/s], ≥ 0: a force −rate m v on every node, m its lumped mass, with consistent
         mass as well. Bodies are not damped by it.
@@ -218,19 +250,22 @@ class Damping(Table):
             )
 
     def extend(self, net):
-        """The net with τ in one more column of line data."""
-        return net.with_column("damping_time", self.time) if self.time else net
+        """The net with τ in one more column of line data, and room for L'/L behind it."""
+        return net.with_column("damping_time", self.time).with_column(GROWTH, 0.0) if self.time else net
 
     def on(self, net):
         """The terms of all lines, whose tension is that with damping, of all nodes with mass, and of free bodies."""
         terms, free = [], [body.row for body in net.bodies if not body.prescribed]
         if self.bodies and not free:
             raise InputError(f"bodies = {self.bodies:g} [1/s]: the scene has no free [[body]], leave it out")
+        if self.time and net.internal:
+            from .viscous import refuse_beside
+
+            refuse_beside(net, f"time = {self.time:g} [s]")
         if self.time:
             element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
-            force, stiffness, damping, bound = kernels(
-                net.law, net.law_record, net.line_data.column("damping_time"), *element
-            )
+            at, changing = net.line_data.column("damping_time"), len(net.factors) > 0
+            force, stiffness, damping, bound = kernels(net.law, net.law_record, at, changing, *element)
             terms.append(
                 ForceTerm(
                     name="damping",
@@ -243,6 +278,12 @@ class Damping(Table):
                     timing=Timing(at_rest=False),
                 )
             )
+            if changing:
+                work = Balance("work", LENGTH_POWER, internal=True)
+                cells, apart = net.cells, Timing(at_rest=False)
+                terms.append(
+                    ForceTerm(name="damping", cells=cells, data=None, force=no_force, balance=work, timing=apart)
+                )
         if self.rate:
             refuse_flows(net, f"rate = {self.rate:g}")
         if self.rate or self.bodies:

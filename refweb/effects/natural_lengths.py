@@ -34,6 +34,18 @@ from .line_kernels import LINE
 from .mass_flow import FollowedMass, set_masses
 from .time_tables import flattened, interpolate
 
+GROWTH = "growth"
+"""Column of line data with (dL/dt)/L of each element [1/s], of effects that need it."""
+
+
+def work_of_lengths(net):
+    """The kernel (signature `refweb.kernels.ENERGY`) of ∂E/∂L of each element [N], of its law and its arms."""
+    if not net.internal:
+        return length_force(net)
+    from .viscous import length_force as with_arms
+
+    return with_arms(net)
+
 
 class NaturalLengths(Record):
     """Natural lengths that change over time.
@@ -48,6 +60,8 @@ class NaturalLengths(Record):
         First and last + 1 of the elements that follow each other.
     cells, tables : table
         Elements of each factor, as a column, and its table over time.
+    growth : int
+        Column of (dL/dt)/L in the numbers of the lines; −1 without one.
     by_length : table
         One kernel of ∂E/∂L [N], where any length changes.
     corners : ndarray
@@ -62,6 +76,7 @@ class NaturalLengths(Record):
     runs: IntegerMatrix
     cells: IndexTable
     tables: VectorTable
+    growth: int
     by_length: EnergyTable
     corners: Vector
     masses: FollowedMass
@@ -80,10 +95,22 @@ class NaturalLengths(Record):
             runs=np.ascontiguousarray(np.column_stack([elements[begins], elements[ends] + 1])),
             cells=Arrays(INDICES, [column(part) for part, _ in factors]),
             tables=Arrays(VECTOR, [np.array(flattened(table)) for _, table in factors]),
-            by_length=Functions(ENERGY, [length_force(net)] if factors else []),
+            growth=net.line_data.column(GROWTH) if factors and GROWTH in net.line_data.dtype.names else -1,
+            by_length=Functions(ENERGY, [work_of_lengths(net)] if factors else []),
             corners=np.array([*corners, *([np.inf] if factors else []), -np.inf]),
             masses=FollowedMass.none(),
         )
+
+
+@kernel(apart=("growth",))
+def set_growth(t: float, lengths: NaturalLengths, lines: Matrix) -> None:
+    """Write (dL/dt)/L at time t, at a corner of a factor that behind it, to the numbers of all ``lines``."""
+    for c in range(lengths.elements.size):
+        lines[lengths.elements[c], lengths.growth] = 0.0
+    for i in range(len(lengths.tables)):
+        (factor, slope), cells = interpolate(t, lengths.tables[i], 0, 2, 1), lengths.cells[i]
+        for c in range(cells.shape[0]):
+            lines[cells[c, 0], lengths.growth] += slope / factor
 
 
 @kernel(apart=("lengths",))
@@ -97,6 +124,8 @@ def set_lengths(t: float, lengths: NaturalLengths, lines: Matrix) -> None:
             record_at(LINE, lines, cells[c, 0], 0).natural_length *= factor
     if lengths.masses.rows.size:
         set_masses(t, lengths.masses)
+    if lengths.growth >= 0:
+        set_growth(t, lengths, lines)
 
 
 def with_factor(net, lines, table):

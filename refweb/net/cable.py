@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError, refused_at
 from ..messages import quote
 from ..registry import LAWS
-from ..tables import LARGEST, Table, by_group, choice, integer, real, table
+from ..tables import LARGEST, Several, Table, by_group, choice, integer, nodes, part, real, rows, table
 from . import law_keys
 from .groups import givers
 from .law_keys import numbers_by_name, points
@@ -101,6 +101,66 @@ class Group(Table):
 
 
 @table
+class Viscous(Table):
+    """Viscoelastic lines: Maxwell arms, each a spring and a dashpot in series, beside the law of the cable.
+
+    One arm is the standard linear solid. A line that is strained at once has the modulus of its law and of all arms;
+    what an arm bears fades with its time, and after all time the law alone is left. A slack line does not push: its
+    material is free of tension, and creeps back while the line hangs loose. Lines with the linear law push, and so do
+    their arms.
+
+    Parameters
+    ----------
+    arms : list of (modulus, time)
+        Modulus [Pa] and relaxation time [s] of each arm, both > 0, any number of arms; their viscosity is the product
+        of both.
+    lines : int, str or list
+        Lines that have the arms, by number or group, or "all".
+    statics : {"long", "short"}
+        Limit that statics takes, and the state in which a run starts: "long" has arms that have relaxed, so that the
+        law alone bears loads and pretension; with "short" all arms act as springs. In statics the smoothing of the
+        smooth law is then that of the sum of both.
+
+    Raises
+    ------
+    InputError
+        For a modulus or a time that is not > 0. From a scene, for lines that the web does not have or with a law of
+        form finding, a ``[damping] time``, and methods of orders 4 and 6.
+
+    References
+    ----------
+    The generalized Maxwell model: J. D. Ferry, *Viscoelastic Properties of Polymers*, 3rd ed., Wiley 1980, ch. 1. The
+    exact step for strain that is linear in time: R. L. Taylor, K. S. Pister, G. L. Goudreau, "Thermomechanical analysis
+    of viscoelastic solids", Int. J. Numer. Methods Eng. 2 (1970) 45–59.
+
+    Examples
+    --------
+        [cable.viscous]
+        arms = [[2e9, 0.01], [5e8, 1.0]]
+    """
+
+    arms: Several = rows(2)
+    lines: Several = nodes(default="all", what="line")
+    statics: str = choice("long", "short", default="long")
+
+    def check(self):
+        """Refuse arms that are none."""
+        for i, arm in enumerate(self.arms):
+            for j, (name, unit) in enumerate((("modulus", "Pa"), ("time", "s"))):
+                if not arm[j] > 0.0:
+                    raise InputError(f"arms[{i}][{j}] = {arm[j]:g} must be > 0: it is a {name} [{unit}]")
+
+    def at_once(self, web):
+        """Modulus that the arms add where they act as springs [Pa], shape (lines,); 0 where they have relaxed."""
+        total = sum(modulus for modulus, _ in self.arms) if self.statics == "short" else 0.0
+        return total * np.isin(np.arange(len(web.lines)), self.chosen(web))
+
+    def chosen(self, web):
+        """Numbers of the lines that have arms, shape (k,)."""
+        return web.find_lines(self.lines)
+
+
+@table
 class Cable(Table):
     """Material and section of the lines.
 
@@ -159,6 +219,8 @@ class Cable(Table):
         Order of the elements: straight, quadratic, cubic.
     subdivide : int
         Elements per line.
+    viscous : Viscous, optional
+        Arms of viscoelastic lines.
     groups : dict of str to Group
         Values that differ by group of lines; groups that share lines give them different keys.
 
@@ -201,6 +263,7 @@ class Cable(Table):
     knot_factor: float = real(default=1.0, above=0, at_most=1, unit="1")
     order: int = choice(1, 2, 3, default=1)
     subdivide: int = integer(default=1, at_least=1, at_most=1000)
+    viscous: Viscous | None = part(Viscous)
     groups: dict = by_group(Group, "cable", default_factory=dict)
 
     def check(self):
@@ -234,8 +297,8 @@ class Cable(Table):
         groups = {name: _smoothed(group, share) for name, group in self.groups.items()}
         return replace(_smoothed(self, share), groups=groups)
 
-    def properties(self, web):
-        """Values for each line of a web.
+    def properties(self, web, quasi_static=False):
+        """Values for each line of a web; ``quasi_static`` with the modulus of arms that act in statics.
 
         Returns
         -------
@@ -257,7 +320,9 @@ class Cable(Table):
             steepest = np.array([curve.steepest for curve in values["curve"][lines]])
             by_tension = np.array([curve.unit == "N" for curve in values["curve"][lines]])
             values["modulus"][lines] = steepest / np.where(by_tension, values["area"][lines], 1.0)
+        alone, values["modulus"] = values["modulus"], values["modulus"] + self._at_once(web, values["law"])
         values["natural_length"] = _natural_lengths(web, values)
+        values["modulus"] = values["modulus"] if quasi_static else alone
         forming, area = _forming(values["law"]), values["area"]
         density, force = values.pop("force_density"), values.pop("pretension")
         with np.errstate(over="ignore"):
@@ -270,6 +335,22 @@ class Cable(Table):
             if len(bad):
                 raise InputError(f"[cable] line {bad[0]}: {name} = {value[bad[0]]:g} must be ≤ {LARGEST:g} [{unit}]")
         return values
+
+    def _at_once(self, web, law):
+        """Modulus that the arms add at rest [Pa]; refuses arms of lines that they do not fit."""
+        if self.viscous is None:
+            return 0.0
+        with refused_at("[cable] viscous"):
+            chosen = self.viscous.chosen(web)
+            for line in chosen[_forming(law)[chosen]][:1]:
+                raise InputError(f'line {line} has law = "{law[line]}" of form finding: leave it out')
+            straight = np.array([law_of(name).cone or law_of(name).bar for name in law])
+            for line in chosen[~straight[chosen]][:1] if self.viscous.statics == "short" else ():
+                raise InputError(
+                    f'statics = "short" must be "long" with law = "{law[line]}", which line {line} has: with arms that '
+                    "act as springs it is another law"
+                )
+            return self.viscous.at_once(web)
 
     def _values(self, web):
         """Values that the cable and its groups give to each line, by key."""

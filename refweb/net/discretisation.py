@@ -180,7 +180,7 @@ def build(web, cable, quasi_static=False, consistent=False, explicit=False):
     explicit : bool
         True if no matrix is assembled, so that straight elements do without scikit-fem.
     """
-    given, pieces, element = cable.properties(web), cable.subdivide, line_element(cable.order)
+    given, pieces, element = cable.properties(web, quasi_static), cable.subdivide, line_element(cable.order)
     laws = names_in(given["law"])
     values = {name: np.repeat(value, pieces) for name, value in given.items()}
     length = values["natural_length"] / pieces

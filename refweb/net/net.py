@@ -79,7 +79,9 @@ class Net:
     spins : int
         Number of rows at the end that are rotations of bodies, with a moment of inertia [kg m²] in place of mass: of
         one without orientation its rotation vector [rad] and its angular velocity [rad/s], of one with an orientation
-        two rows, see `refweb.net.rotation`.
+        two rows, see `refweb.net.rotation`; with those of internal variables of lines behind them.
+    internal : int
+        Number of rows at the end that are internal variables of lines, which have no mass.
     """
 
     web: Web
@@ -102,6 +104,7 @@ class Net:
     consistent_minus_lumped: np.ndarray | None = None
     bodies: tuple = ()
     spins: int = 0
+    internal: int = 0
     factors: tuple = ()
     flows: tuple = ()
     end: float = math.inf
@@ -156,6 +159,12 @@ class Net:
     def heavy(self):
         """Rows with a mass, which a moment of inertia is not."""
         return np.flatnonzero(self.mass[: len(self.mass) - self.spins])
+
+    @property
+    def internal_names(self):
+        """Names of the rows of internal variables, by element and number, a list."""
+        width = self.internal // max(len(self.cells), 1)
+        return [f".{width}.{number}" for number in range(self.internal)]
 
     @property
     def carried(self):

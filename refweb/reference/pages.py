@@ -197,10 +197,12 @@ def _bounds(schema):
 
 
 def _inner(name, kind):
-    """Pages of the tables by name inside a table."""
+    """Pages of the tables inside a table, and of those by name."""
     for f in dataclasses.fields(kind):
         schema_of = getattr(f.metadata["read"], "accepts", None)
         inner = schema_of.get("additionalProperties") if isinstance(schema_of, dict) else None
+        if isinstance(schema_of, type):
+            yield _page(f"{name}.{f.name}", f"[{name}.{f.name}]", schema_of)
         if isinstance(inner, type):
             yield _page(f"{name}.{f.name}", f"[{name}.{f.name}.NAME]", inner, like=kind)
 

@@ -294,7 +294,8 @@ class Folder:
                 write_mesh(self.path / f"frames/{name}_{number:06d}.vtu", mesh)
             net = state.system.net
             arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
-            arrays |= {"supported": state.system.fixed, "bodies": np.array(row_names(net.bodies), dtype=str)}
+            names = [*row_names(net.bodies), *net.internal_names]
+            arrays |= {"supported": state.system.fixed, "bodies": np.array(names, dtype=str)}
             arrays |= {"lines": net.web.lines, "scene": self._scene}
             for key in ("axes", "inertia", "offset") if net.bodies else ():
                 arrays[f"body_{key}"] = np.array([getattr(body, key) for body in net.bodies])

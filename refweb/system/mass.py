@@ -95,7 +95,8 @@ class Mass:
 
 def refuse_massless(system, method):
     """Refuse free nodes without mass, for a method that divides by it."""
-    bare = np.flatnonzero((system.net.mass <= 0.0) & ~system.supported.all(axis=1))
+    places = len(system.net.mass) - system.net.internal
+    bare = np.flatnonzero((system.net.mass <= 0.0)[:places] & ~system.supported.all(axis=1)[:places])
     if len(bare):
         raise InputError(
             f"node {bare[0]} has no mass, which {method} needs: give density > 0 or a [[point_mass]], or use "

@@ -19,7 +19,6 @@ from functools import cached_property
 import numpy as np
 
 from ..effects.base import DAMPED_TENSION, TENSION, BreakLimits, Constraint, ForceTerm, PrescribedMotion
-from ..effects.elasticity import length_force
 from ..findings import Finding
 from ..net.rigid_body import row_names, with_rotations
 from ..net.rotation import turn_by
@@ -62,6 +61,8 @@ class System:
         Limits of elements that may break; None if no element breaks.
     carried : ndarray of bool, shape (rows,)
         Nodes that free bodies carry: those move with these.
+    internal : refweb.effects.base.InternalVariables or None
+        Internal variables of lines.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     angles : bool
@@ -74,6 +75,9 @@ class System:
             if hasattr(effect, "extend"):
                 net = effect.extend(net)
         net = with_rotations(net)
+        for effect in effects:
+            if hasattr(effect, "add_internal"):
+                net = effect.add_internal(net)
         self.net, self.effects = net, effects
         self.rows = len(net.points)
         acting = parts_of(effects, net)
@@ -85,9 +89,14 @@ class System:
         self.drives = [a for a in acting if isinstance(a, PrescribedMotion)]
         self.constraints = [a for a in acting if isinstance(a, Constraint)]
         self.weakness = next((a for a in acting if isinstance(a, BreakLimits)), None)
-        if sum(term.over_lines and term.balance.power is not None for term in self.terms) > 1:
+        powers = [term.balance.power for term in self.terms if term.over_lines and term.balance.power is not None]
+        if len(set(powers)) < len(powers):
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
+        self.internal = next((term.internal for term in self.terms if term.internal), None)
         self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
+        if self.internal is not None:
+            self.supported[self.rows - net.internal :] = True
+            self.supported.ravel()[self.internal.components] = False
         for body in net.bodies:
             self.supported[body.row] = self.supported[body.base] = body.fixed or bool(body.axle)
         for drive in self.drives:
@@ -132,6 +141,15 @@ class System:
         """Findings on the factorizations."""
         remarks = self.library.remarks if "library" in self.__dict__ else []
         return [Finding("slow-library", text, "solve") for text in remarks]
+
+    def resistance(self, t):
+        """c of each internal variable at time t, in the order of their components, see `InternalVariables`."""
+        return self.internal.resistance * self.natural_length(t)[self.internal.elements]
+
+    def settled(self, x):
+        """A state, x or None as it is given, with internal variables as they are after all time at rest, or new."""
+        settling = [effect for effect in self.effects if hasattr(effect, "settled")]
+        return settling[0].settled(self.net, x) if settling else x
 
     @cached_property
     def laid(self):
@@ -346,8 +364,10 @@ class System:
 
     def length_force(self, t, x):
         """∂E/∂L of each element [N], shape (elements,): with the change of L the work of reels."""
+        from ..effects.natural_lengths import work_of_lengths
+
         force = np.empty(len(self.net.cells))
-        length_force(self.net)(t, x, self.net.cells, self.line_data(t).matrix, force)
+        work_of_lengths(self.net)(t, x, self.net.cells, self.line_data(t).matrix, force)
         return force
 
     def drive(self, t, x, v=None):
@@ -405,6 +425,8 @@ class System:
 
     def row_name(self, row):
         """Name of a row in messages: a node by its number, a body by its name."""
+        if row >= self.rows - self.net.internal:
+            return f"arms of line {self.net.line[(row - self.rows) // (self.net.internal // len(self.net.cells))]}"
         return f"node {row}" if row < self.net.nodes else f'body "{row_names(self.net.bodies)[row - self.net.nodes]}"'
 
     def energy_of(self, term, t, x):

@@ -95,6 +95,10 @@ EFFECTS = {
         "cable": {"law": "table", "stress": CURVE, "area": 1e-5, "density": 1000.0, "prestrain": 0.01},
         "damping": {"time": 1e-4},
     },
+    "[cable.viscous]": {
+        "cable": SMALL["cable"] | {"viscous": {"arms": [[1e6, 0.05], [5e5, 0.5]]}},
+        "observe": [*SMALL["observe"], {"name": "lost", "quantity": "dissipated_energy"}],
+    },
     "a box that tumbles into it": {
         "body": [BOX | {"position": [0.1, 0.03, 0.15]}],
         "contact": {"stiffness": 300.0},

@@ -85,6 +85,7 @@ class CentralDifference(Integrator):
         self.system, self.safety, self.step_size, self.finer = system, safety, step_size, finer
         self.observed = tuple(probes), tuple(sums), tuple(events)
         net, free = system.net, ~system.supported
+        free[system.rows - net.internal :] = False
         if net.order > 1:
             raise InputError(
                 f"[cable] order = {net.order} must be 1 with {self.method}: its bound of stability is that of straight "

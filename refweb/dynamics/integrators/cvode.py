@@ -67,20 +67,25 @@ class Cvode(Sundials):
                 "the mass matrix has no pattern"
             )
         self._mass = np.repeat(system.net.mass, 3)[system.free]
+        self._mass[self._inner] = 1.0  # internal variables follow from forces, and have no velocity that changes
         self._sparing = (
-            linear_solver == "auto" and self.linear_solver == "block" and not (self._consistent or self.rotations)
+            linear_solver == "auto"
+            and self.linear_solver == "block"
+            and not (self._consistent or self.rotations or len(self._inner))
         )
         if self._sparing:
             self.choice += f"; none where a step is short, γω ≤ {SHORT:g}"
         self._gamma, self._plain, self._set_up_at, self._due = None, False, None, 0
         if self._consistent:
-            self._mass_values = system.mass.values
+            self._mass_values = system.mass.values.copy()
+            self._mass_values[system.pattern.diagonal[self._inner]] = 1.0  # of what has no velocity
             self._mass_matrix = system.pattern.matrix(self._mass_values)
             self._mass_factor = Symmetric(system.pattern)
             self._mass_factor.update(self._mass_values)
 
     def _set_masses(self, mass):
         self._mass = mass
+        self._mass[self._inner] = 1.0
 
     def _times_mass(self, v):
         return self._mass_matrix @ v if self._consistent else self._mass * v
@@ -96,6 +101,9 @@ class Cvode(Sundials):
         yp[:n] = y[n:]
         if self.rotations:
             self.rotations.set_rates(x, v, yp[:n])
+        if len(inner := self._inner):
+            yp[inner] = force[inner] / self.system.resistance(t)
+            force[inner] = 0.0
         yp[n:] = self._over_mass(force)
 
     def _tangent(self, t, y):
@@ -103,6 +111,8 @@ class Cvode(Sundials):
         self.stats["njev"] += 1
         x, v = self.state(t, y[: self.unknowns], y[self.unknowns :])
         self._at_state = t, x, v
+        if len(self._inner):
+            self._resistance = self.system.resistance(t)
         if self.rotations:
             self.rotations.linearize(x, v)
         return self.tangents(t, x, v)
@@ -153,6 +163,7 @@ class Cvode(Sundials):
             values += self._mass_values
         else:
             values[system.pattern.diagonal] += self._mass
+        values[system.pattern.diagonal[self._inner]] -= 1.0
 
         def definite():
             return values + gamma * gamma * (
@@ -169,9 +180,11 @@ class Cvode(Sundials):
         if self._inverts(z, gamma == self._gamma and self._true):
             return
         n, rotations = self.unknowns, self.rotations
-        first = rotations.before(r[:n]) if rotations else r[:n]
-        z[n:] = self._factor.apply(self._times_mass(r[n:]) - self._gamma * (self._K @ first))
+        first, inner, push = rotations.before(r[:n]) if rotations else r[:n], self._inner, r[n:].copy()
+        push[inner] = 0.0
+        z[n:] = self._factor.apply(self._times_mass(push) - self._gamma * (self._K @ first))
         z[:n] = first + self._gamma * (rotations.carried(z[n:]) if rotations else z[n:])
+        z[n + inner] = r[n + inner]
 
     def jacobian_times(self, t, y, yp, u, Ju):
         """Write J u, J that of the last `set_up`."""
@@ -181,10 +194,14 @@ class Cvode(Sundials):
         if self._multiplied(u):
             return
         n, pull = self.unknowns, self._K @ u[: self.unknowns]
+        rates = pull[self._inner]
         if self._C is not None:
             pull += self._C @ u[n:]
+        pull[self._inner] = 0.0
         Ju[:n] = self.rotations.product(u[:n], u[n:]) if self.rotations else u[n:]
         Ju[n:] = -self._over_mass(pull)
+        if len(self._inner):
+            Ju[self._inner] = -rates / self._resistance
 
     # The whole Jacobian
 
@@ -193,7 +210,12 @@ class Cvode(Sundials):
         pattern, n = self.system.pattern, self.unknowns
         row, column, at = pattern.indices, np.repeat(np.arange(n), np.diff(pattern.indptr)), np.arange(n)
         self._force_rows, self._unit = row, np.ones(n)
-        rows, columns = [n + row, at, at, n + row], [column, at, n + at, n + column]
+        self._unit[self._inner] = 0.0
+        self._of_inner, below = np.isin(row, self._inner), n + row
+        if len(self._inner):
+            below = np.where(self._of_inner, row, below)
+            self._which = np.searchsorted(self._inner, row[self._of_inner])
+        rows, columns = [below, at, at, n + row], [column, at, n + at, n + column]
         if self.rotations:
             self._unit[self.rotations.places] = 0.0
             (first, second), (slow, fast) = self.rotations.pattern()
@@ -206,6 +228,9 @@ class Cvode(Sundials):
         if not self._consistent:
             heavy = self._mass[self._force_rows]
             damped = np.zeros(K.shape) if C is None else -C / heavy
+            if len(self._inner):
+                heavy[self._of_inner] = self._resistance[self._which]
+                damped[self._of_inner] = 0.0
             parts = [-K / heavy, np.zeros(n), self._unit, damped]
             if self.rotations:
                 parts += [self.rotations.X.ravel(), self.rotations.V.ravel()]
@@ -218,6 +243,10 @@ class Cvode(Sundials):
         J[n:, :n] = -np.linalg.solve(mass, matrix(K).toarray())
         if C is not None:
             J[n:, n:] = -np.linalg.solve(mass, matrix(C).toarray())
+        if len(inner := self._inner):
+            J[inner] = 0.0
+            J[inner, :n] = -matrix(K).toarray()[inner] / self._resistance[:, None]
+            J[n + inner] = 0.0
         if self.rotations:
             (first, second), (slow, fast) = self.rotations.pattern()
             J[self.rotations.places.ravel(), n + self.rotations.places.ravel()] = 0.0

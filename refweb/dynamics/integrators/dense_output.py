@@ -46,7 +46,7 @@ from .extremes import (
     update_extreme,
 )
 from .neighbour_list import show_near
-from .step import add_forces, interpolate, interpolate_kicks, note_state
+from .step import interpolate, interpolate_kicks, note_state
 
 if TYPE_CHECKING:
     from .monitors import Observed
@@ -154,9 +154,10 @@ def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: M
     if model.lengths.elements.size:
         set_lengths(t, model.lengths, data[0])
     f[:] = 0.0
-    add_forces(t, x, v, f, lines, (forces[0], cells[0], data[0]), terms.still, forces, cells, data, outs)
-    for i in terms.viscous:
-        forces[i](t, x, v, f, cells[i], data[i], lines if i == terms.line_damping else outs[i])
+    forces[0](t, x, v, f, cells[0], data[0], lines)
+    for some in (terms.still, terms.viscous):
+        for i in some:
+            forces[i](t, x, v, f, cells[i], data[i], lines if among(terms.beside, i) else outs[i])
     for i in model.implicit_contacts.terms:
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
     add_forces_to_bodies(x, f, model.inertia.turns)

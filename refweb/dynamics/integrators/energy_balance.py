@@ -13,7 +13,7 @@ import numpy as np
 from ...compiled.rows import record_at
 from ...effects.line_kernels import LINE
 from ...effects.mass_flow import exchange_masses
-from ...effects.natural_lengths import NaturalLengths, set_lengths
+from ...effects.natural_lengths import NaturalLengths, set_growth, set_lengths
 from ...errors import EnergyDriftError
 from ...kernels import (
     ENERGY,
@@ -207,6 +207,16 @@ def write_length_force(
         begin = end
 
 
+@kernel(leaf=True, apart=("relaxing",))
+def relax(h: float, x: Matrix, model: Model, work: Vector) -> None:
+    """Take internal variables to the end of a step h, and note what they dissipate; for h = 0 note strains alone."""
+    relaxing, terms = model.relaxing, model.terms
+    for n in range(relaxing.terms.size):
+        i, lost = relaxing.terms[n], relaxing.lost[n]
+        relaxing.kernels[n](h, x, terms.cells[i], terms.data[i], relaxing.before[n], lost)
+        work[i] -= sum_of(lost)
+
+
 @kernel(leaf=True, apart=("lengths",))
 def change_lengths(t: float, h: float, model: Model, was: Vector, running: Running) -> None:
     """Set natural lengths at the end t of a step, and add the work of that, ½ (∂E/∂L + ∂E/∂L) ΔL.
@@ -220,11 +230,24 @@ def change_lengths(t: float, h: float, model: Model, was: Vector, running: Runni
     for c in range(was.size):
         was[c] = record_at(LINE, lines, lengths.elements[c], 0).natural_length
     set_lengths(t, lengths, lines)
+    if lengths.growth >= 0:
+        set_growth(t - 0.5 * h, lengths, lines)
+    if model.relaxing.terms.size:
+        relax(h, x, model, work)
     write_length_force(t, x, lengths, cells, lines, length_force[1])
     for c in range(was.size):
         change = record_at(LINE, lines, lengths.elements[c], 0).natural_length - was[c]
         work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * change
         length_force[0, c] = length_force[1, c]
+
+
+@kernel(forceinline=True)
+def change_lines(changing, t, h, model, was, running):
+    """Set natural lengths and internal variables at time t, a step h later, where the lines have any that change."""
+    if changing:
+        change_lengths(t, h, model, was, running)
+    elif model.relaxing.terms.size:
+        relax(h, running.x, model, running.work)
 
 
 @kernel(leaf=True)

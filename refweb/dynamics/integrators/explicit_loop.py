@@ -29,9 +29,10 @@ from .energy_balance import (
     book_motion,
     book_potential,
     book_powers,
-    change_lengths,
+    change_lines,
     drifts_away,
     note_motion,
+    relax,
     write_length_force,
 )
 from .events import ended_by, note_events
@@ -108,6 +109,8 @@ def inner_stages(
 def begin_forces(t, changing, extra, reaction, push, model, running):
     """Write powers, force of supports and push from outside at the time t that steps begin at."""
     set_reaction(model.inertia.fixed, running.f.reshape(-1), reaction)
+    if model.relaxing.terms.size:
+        relax(0.0, running.x, model, running.work)
     if model.terms.powers.shape[0] or changing or model.outside.pushing.size:
         begin_more(t, changing, extra, push, model, running)
 
@@ -163,8 +166,7 @@ def run_steps(
             book_potential(-1.0, now - last, x, terms, work)
         if moves:
             move_supports(now, h, x, v, f, space.aside, motions.kernels, motions.cells, motions.data, motions.outs)
-        if changing:
-            change_lengths(now, h, model, space.was, running)
+        change_lines(changing, now, h, model, space.was, running)
         if near:
             update_neighbours(drift, x, v, bits, before, model)
             check_last_drift(now - h, model, running)
@@ -323,7 +325,7 @@ def advance_rows(
             clock.begun = 0
             if halved > 0.0:
                 add_half_steps(halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
-            if model.inertia.driven.size and turn_supports(clock.time, model, running):
+            if (model.inertia.driven.size or lengths.growth >= 0) and turn_supports(clock.time, model, running):
                 look_behind(model, observed, running, space)
             if clock.time < times[n]:  # a corner: what is stored may be gone again at the row
                 largest = energies_now(model, running, total)[1]

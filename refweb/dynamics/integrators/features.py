@@ -11,7 +11,7 @@ def features(scheme, model, observed, events):
     set of str
         ``stages`` or ``kicks`` (steps of one drift); ``watched`` (extremes), ``books`` (of energies), ``averages``,
         ``looks`` (any of these), ``events``; ``turning`` bodies and ``carried`` nodes; ``driven`` rows, ``lengths``
-        that change, masses that ``follows`` them;
+        that change, masses that ``follows`` them, their ``growth``, ``relaxing`` internal variables;
         ``powers``, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped`` (integrated impulses),
         ``booked`` (powers, lengths or pushing), ``angular`` momentum that is kept; ``near`` cells, ``pairs`` that are
         found; collision checks (``ccd``) of lines that push each other (``line_ccd``) and of bodies that push lines
@@ -28,9 +28,11 @@ def features(scheme, model, observed, events):
         "events": len(events),
         "turning": len(inertia.turns.moment),
         "carried": len(inertia.turns.carried),
-        "driven": len(inertia.driven) + len(model.motions.kernels),
+        "driven": len(inertia.driven) + len(model.motions.kernels) + (model.lengths.growth >= 0),
         "lengths": len(model.lengths.elements),
         "follows": len(model.lengths.masses.rows),
+        "growth": model.lengths.growth >= 0,
+        "relaxing": len(model.relaxing.terms),
         "powers": len(terms.powers),
         "viscous": len(terms.viscous),
         "rubbing": len(model.implicit_contacts.terms),

@@ -83,12 +83,13 @@ class Ida(Sundials):
         self.max_order = self.order = max_order
         mass = np.repeat(system.net.mass, 3)[system.free]
         self._heavy, self._bare = np.flatnonzero(mass > 0.0), np.flatnonzero(mass <= 0.0)
+        weightless = np.setdiff1d(self._bare, self._inner)
         self._M = system.pattern.matrix(system.mass.values)
         self._massless = self._links = None
-        if len(self._bare):
+        if len(weightless):
             from .massless_nodes import Massless
 
-            self._massless = Massless(system, self._bare)
+            self._massless = Massless(system, weightless)
         if system.constraints:
             self._links = system.links
         self._count = len(self._links) if self._links else 0
@@ -114,7 +115,7 @@ class Ida(Sundials):
     def _velocity(self, y, yp):
         """Velocity of every unknown displacement [m/s]."""
         v = self._parts(yp)[0].copy()
-        v[self._heavy] = self._parts(y)[1]
+        v[self._heavy], v[self._inner] = self._parts(y)[1], 0.0
         return v
 
     def _of_all(self, values):
@@ -141,6 +142,8 @@ class Ida(Sundials):
         slope = np.zeros(n)
         slope[heavy] = self._parts(yp)[1]
         balance = self._M @ slope - force
+        if len(inner := self._inner):
+            balance[inner] += self.system.resistance(t) * rate[inner]
         moved = stored
         if self.rotations:
             moved = self._of_all(stored)
@@ -281,7 +284,9 @@ class Ida(Sundials):
         return IDA(
             self.residual,
             atol=np.concatenate([position, velocity[self._heavy], np.full(links, UNTESTED)]),
-            algebraic_idx=np.concatenate([self._bare, n + heavy + np.arange(links)]).astype(int).tolist(),
+            algebraic_idx=np.concatenate([np.setdiff1d(self._bare, self._inner), n + heavy + np.arange(links)])
+            .astype(int)
+            .tolist(),
             **options,
         )
 
@@ -300,6 +305,8 @@ class Ida(Sundials):
         rate = v.copy()
         if self.rotations:
             self.rotations.set_rates(*rows, rate)
+        if len(inner := self._inner):
+            rate[inner] = force.ravel()[self.system.free[inner]] / self.system.resistance(t)
         return np.concatenate([x, v[heavy], multipliers, rest]), np.concatenate([rate, slope, rest, rest])
 
     # A solver's steps

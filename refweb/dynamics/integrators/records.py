@@ -34,6 +34,7 @@ from ...kernels import (
     MatrixTable,
     PartTable,
     Record,
+    RelaxTable,
     Vector,
     VectorTable,
 )
@@ -146,6 +147,7 @@ class Inertia(Record):
     def of(cls, system):
         """Make the record of a system with lumped mass."""
         net, free = system.net, ~system.supported
+        free[system.rows - net.internal :] = False
         inverse = aligned(np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0))
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
         moving, fixed = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.fixed)
@@ -174,8 +176,8 @@ class ForceTerms(Record):
     still, viscous : ndarray of int
         Terms behind the first whose forces follow from displacement and time alone, and those of velocity whose
         kicks are iterated.
-    line_damping : int
-        Number of the one of these that acts on the lines, −1 where there is none.
+    beside : ndarray of int
+        Those of both that act on the lines, and write where the first term does.
     energies, stored : table
         Kernel of the energy of each term, and what it writes per cell [J].
     working : ndarray of int, shape (terms,)
@@ -192,7 +194,7 @@ class ForceTerms(Record):
     outs: MatrixTable
     still: Integers
     viscous: Integers
-    line_damping: int
+    beside: Integers
     energies: EnergyTable
     stored: VectorTable
     working: Integers
@@ -208,8 +210,9 @@ class ForceTerms(Record):
         numbers = [lines if term.over_lines else term.data for term in terms]
         fast = [i for i, term in enumerate(terms) if term.velocity.damping is not None]
         viscous = [i for i in fast if terms[i].velocity.implicit is None]
-        still = [i for i in range(1, len(terms)) if i not in fast]
-        powers = [(i, f.balance.power, i in fast) for i, f in enumerate(terms) if f.balance.power is not None]
+        still = [i for i in range(1, len(terms)) if i not in fast and terms[i].internal is None]
+        booked = [(i, f.balance.power) for i, f in enumerate(terms) if f.balance.power is not None]
+        powers = [(i, column, i in fast) for i, column in booked if terms[i].internal is None]
         near, stored = near_of(system), [np.zeros(len(term.cells)) for term in terms]
         cells = [*(terms[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
         return cls(
@@ -219,13 +222,33 @@ class ForceTerms(Record):
             outs=Arrays(MATRIX, [*outs, *(outs[i] for i in near)]),
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
-            line_damping=next((i for i in viscous if terms[i].over_lines), -1),
+            beside=np.array([i for i in (*still, *viscous) if terms[i].over_lines], dtype=np.int64),
             energies=Functions(k.ENERGY, [term.energy or no_energy for term in terms]),
             stored=Arrays(VECTOR, [*stored, *(stored[i] for i in near)]),
             working=system.working,
             powers=np.array(powers, dtype=np.int64).reshape(len(powers), 3),
             bounds=Functions(k.BOUND, [term.tangent.bound or no_bound for term in terms]),
             dampings=Functions(k.BOUND, [terms[i].velocity.bound or no_bound for i in viscous]),
+        )
+
+
+class Relaxing(Record):
+    """Internal variables: the term of each kind, its kernel, strains at the start of a step, and energies lost [J]."""
+
+    terms: Integers
+    kernels: RelaxTable
+    before: VectorTable
+    lost: VectorTable
+
+    @classmethod
+    def of(cls, system):
+        """Make the record of a system."""
+        terms = [(i, term) for i, term in enumerate(system.terms) if term.internal is not None]
+        return cls(
+            terms=np.array([i for i, _ in terms], dtype=np.int64),
+            kernels=Functions(k.RELAX, [term.internal.relax for _, term in terms]),
+            before=Arrays(VECTOR, [np.zeros(term.internal.space) for _, term in terms]),
+            lost=Arrays(VECTOR, [np.zeros(len(term.cells)) for _, term in terms]),
         )
 
 
@@ -255,6 +278,7 @@ class Model(Record):
     inertia: Inertia
     terms: ForceTerms
     implicit_contacts: ImplicitContacts
+    relaxing: Relaxing
     motions: Motions
     lengths: NaturalLengths
     corners: Vector
@@ -269,7 +293,7 @@ class Model(Record):
         inertia, lengths = Inertia.of(system), system.lengths
         if system.net.flows:
             lengths = replace(lengths, masses=FollowedMass.of(system, inertia.mass, inertia.inverse))
-        forces = inertia, ForceTerms.of(system, outs), ImplicitContacts.of(system, inertia.turns)
+        forces = inertia, ForceTerms.of(system, outs), ImplicitContacts.of(system, inertia.turns), Relaxing.of(system)
         changes = Motions.of(system), lengths, system.corners, Outside.of(system)
         return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), Contacts.of(system))
 

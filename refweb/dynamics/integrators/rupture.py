@@ -53,7 +53,8 @@ class Rupturing:
         self._make, self._intact, self._weakness = make, system, system.weakness
         self._report = None
         self.inner = self._of(system)
-        bare = np.flatnonzero((system.net.mass <= 0.0) & ~system.supported.all(axis=1))
+        places = system.rows - system.net.internal
+        bare = np.flatnonzero((system.net.mass <= 0.0)[:places] & ~system.supported.all(axis=1)[:places])
         if len(bare):
             raise InputError(
                 f"[rupture] needs mass at every node that moves: {system.row_name(bare[0])} has none, and would jump "

@@ -112,6 +112,11 @@ class Splitting(CentralDifference):
 
     def __init__(self, system, *observed, order=6, **steps):
         for term in system.terms:
+            if term.internal is not None:
+                raise InputError(
+                    f'[solve] method = "explicit" takes no [cable.{term.name}]: steps of order above 2 go back in time '
+                    'as well, where what relaxes would grow; use "central-difference" or "cvode"'
+                )
             timed = term.balance.power is not None or len(term.timing.times) > 0
             if term.velocity.damping is not None or timed and not term.dead:
                 given = " with damping or friction" if term.name in ("contact", "self_contact") else ""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...effects.contact_solver import commit, forget, gauss_seidel, warm_start
+from ...effects.natural_lengths import set_growth
 from ...kernels import (
     ContactTable,
     Cube,
@@ -262,6 +263,9 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
             now = v[driven[d], k]
             running.work[running.work.size - 1] += 0.5 * mass[driven[d]] * (now + was[d, k]) * (now - was[d, k])
             turned = turned or now != was[d, k]
+    if model.lengths.growth >= 0:
+        set_growth(t, model.lengths, terms.data[0])
+        turned = True
     update_attached_nodes(x, v, model.inertia.turns)
     if turned and terms.viscous.size + model.implicit_contacts.terms.size:
         f[:] = 0.0
@@ -271,6 +275,8 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
         feel(model.contacts, terms)
         for i in model.implicit_contacts.terms:
             running.power[i] = sum_of(terms.outs[i][:, 0])
+        for n in range(terms.powers.shape[0] if model.lengths.growth >= 0 else 0):
+            running.power[terms.powers[n, 0]] = sum_of(terms.outs[terms.powers[n, 0]][:, terms.powers[n, 1]])
     return turned
 
 

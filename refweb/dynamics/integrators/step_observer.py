@@ -99,9 +99,9 @@ class StepObserver(Integrator):
     on_progress = staticmethod(lambda t: None)
     course_type = ObservedState
     _made_of: tuple
-    takes_massless = takes_links = takes_rotations = takes_flows = False
-    """True if the method's equations can include nodes without mass, rigid links, rotating bodies, and masses that
-    change."""
+    takes_massless = takes_links = takes_rotations = takes_flows = takes_internal = False
+    """True if the method's equations can include nodes without mass, rigid links, rotating bodies, masses that change,
+    and internal variables."""
     rotations = None  # the `refweb.dynamics.integrators.rotations.Rotations` of such bodies
     restarts = False
     """True if the method restarts at corners of tables. The polynomial of IDA through the steps before a pulse of 1e-8
@@ -118,6 +118,10 @@ class StepObserver(Integrator):
         self._per_cell, self._blocks = system.per_cell(), system.blocks()
         if not self.takes_massless:
             refuse_massless(system, self.method)
+        if system.internal and not self.takes_internal:
+            raise InputError(
+                f'[cable.viscous] needs method = "central-difference", "cvode" or "ida", not {self.method}'
+            )
         if system.constraints and not self.takes_links:
             raise InputError(f'[[link]] needs method = "ida": {self.method} does not hold lengths')
         if not self.takes_flows:

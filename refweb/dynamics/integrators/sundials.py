@@ -47,7 +47,7 @@ class Sundials(StepObserver):
         Linear solver, and the reason for it.
     """
 
-    takes_rotations = takes_flows = True
+    takes_rotations = takes_flows = takes_internal = True
     linear_solver = choice = ""
     max_order: int
     _symmetric: Symmetric
@@ -57,10 +57,16 @@ class Sundials(StepObserver):
         super().__init__(system, *observed, **tolerances)
         refuse_found(system.terms, f'method = "{self.method}"')
         self._product, self._exact, self._true = None, False, False
+        internal = system.internal
+        self._inner = (
+            np.zeros(0, dtype=np.int64) if internal is None else np.searchsorted(system.free, internal.components)
+        )
 
     def tolerance(self):
         """Absolute tolerances of unknown displacements and of velocities, each of shape (unknowns,)."""
         both = [np.full(self.unknowns, size) for size in (self.atol_position, self.atol_velocity)]
+        if len(self._inner):
+            both[0][self._inner] /= self.system.natural_length(0.0).min()
         if self.rotations:
             self.rotations.scale(both[0], False)
             self.rotations.scale(both[1], True)
@@ -76,11 +82,17 @@ class Sundials(StepObserver):
         return force
 
     def tangents(self, t, x, v):
-        """Values of K, and of C or None, at a state of all rows; a drum that moves is not coupled."""
+        """Values of K, and of C or None, at a state of all rows; a drum that moves is not coupled.
+
+        C has what resists internal variables, c z' = f.
+        """
         K, C = super().tangents(t, x, v)
         if self.system.net.flows:
             C = np.zeros_like(K) if C is None else C
             C[self.system.pattern.diagonal] += np.repeat(self.system.material_flow.rates(t), 3)[self.system.free]
+        if len(self._inner):
+            C = np.zeros_like(K) if C is None else C
+            C[self.system.pattern.diagonal[self._inner]] += self.system.resistance(t)
         return K, C
 
     def _set_masses(self, mass):
