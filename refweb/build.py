@@ -107,11 +107,18 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
 
 def _of_lines(cable, net):
     """Effects of the cable itself: the law of its lines, and their arms; statics has these in its modulus."""
-    if cable.viscous is None or net.quasi_static:
-        return [Elasticity()]
-    from .effects.viscous import ViscousArms
+    of_lines: list = [Elasticity()]
+    if net.law_is("plastic").any():
+        from .effects.plastic import PlasticLines
 
-    return [Elasticity(), ViscousArms(cable.viscous)]
+        of_lines.append(PlasticLines(cable))
+    if cable.viscous is not None and len(of_lines) > 1:
+        raise InputError('[cable] viscous cannot stand beside law = "elastic-plastic": leave one of them out')
+    if cable.viscous is not None and not net.quasi_static:
+        from .effects.viscous import ViscousArms
+
+        of_lines.append(ViscousArms(cable.viscous))
+    return of_lines
 
 
 def _web(web, folder):

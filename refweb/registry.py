@@ -97,6 +97,7 @@ OBSERVABLES = {
     "frame_energy": "refweb.results.observables.balances:FrameEnergy",
     "orbit_energy": "refweb.results.observables.balances:OrbitEnergy",
     "rupture_energy": "refweb.results.observables.balances:RuptureEnergy",
+    "plastic_energy": "refweb.results.observables.balances:PlasticEnergy",
     "dissipated_energy": "refweb.results.observables.balances:DissipatedEnergy",
     "total_energy": "refweb.results.observables.balances:TotalEnergy",
     "work": "refweb.results.observables.balances:Work",
@@ -124,6 +125,7 @@ LAWS = {
     "force-density": "refweb.net.laws.straight:ForceDensity",
     "constant-force": "refweb.net.laws.straight:ConstantForce",
     "table": "refweb.net.laws.curve:Table",
+    "elastic-plastic": "refweb.net.laws.straight:ElasticPlastic",
 }
 """Tension laws of lines; how to write one says `refweb.net.laws`."""
 

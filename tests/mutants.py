@@ -132,6 +132,7 @@ MIRRORS = {
     "dynamics/integrators/explicit_loop": "dynamics/test_dynamics.py dynamics/test_impact.py",
     "dynamics/integrators/energy_balance": "test_readme.py dynamics/test_impact.py effects/test_moved_bodies.py",
     "dynamics/integrators/ida": "dynamics/integrators/test_ida.py",
+    "dynamics/integrators/yielding": "effects/test_plastic.py",
     "dynamics/integrators/averages": "dynamics/test_averages.py",
     "dynamics/integrators/events": "dynamics/test_bodies_come_to_rest.py dynamics/test_events.py",
     "dynamics/integrators": "dynamics/integrators/test_cvode.py dynamics/test_dynamics.py",
@@ -312,6 +313,12 @@ MUTANTS = [
     ),
     Mutant("effects/damping", "along = share * (by_strain - by_rate * growth(data, c))", "along = share * by_strain"),
     Mutant("effects/natural_lengths", "lengths.growth] += slope / factor", "lengths.growth] += slope"),
+    Mutant(
+        "effects/plastic", "yields, ahead = slope, p + beyond / (ea + slope)", "yields, ahead = slope, p + beyond / ea"
+    ),
+    Mutant("effects/plastic", "slope = line.ea * yields / (line.ea + yields)", "slope = yields"),
+    Mutant("effects/plastic", "(y0 + 0.5 * (end - p0)", "(y0 + (end - p0)"),
+    Mutant("dynamics/integrators/yielding", "self._turned = True", "self._turned = False"),
     Mutant("effects/viscous", "time * (1.0 - decay * decay)", "time * (1.0 - decay)"),
     Mutant("effects/viscous", "pull + max(by_law, 0.0) >= 0.0:", "pull + by_law >= 0.0 or e > 0.0:"),
     Mutant("effects/viscous", "data, c, q) - (1.0 + e) * pull)", "data, c, q) - pull)"),
@@ -615,7 +622,7 @@ MUTANTS = [
         "return proven.strain / 2.0",
     ),
     Mutant("results/observables/observable", "changes[0] + 3.0 * max(changes[1:])", "changes[0]"),
-    Mutant("results/state", "self.element_strain <= self.system.net.slackness", "self.element_strain <= 0.0"),
+    Mutant("results/state", "self.element_strain <= self._slack_below", "self.element_strain <= 0.0"),
     # Studies and modes
     Mutant("sweeps/chances", "between + float(np.mean(np.square(within)))", "between"),
     Mutant("sweeps/expressions", "return True if holds(a.high, b.low)", "return True if holds(a.low, b.low)"),

@@ -75,7 +75,13 @@ def roots(given, method):
     yield from (registered(EFFECTS[effect]) for effect in given.keys() & EFFECTS.keys())
     yield from (registered(OBSERVABLES[observe["quantity"]]) for observe in given.get("observe", DEFAULT))
     yield from (registered(SHAPES[shape]) for shape in shapes)
-    yield registered(LAWS[law])
+    cable = given["cable"]
+    laws = {law, *(group.get("law", law) for group in cable.get("groups", {}).values())}
+    yield from (registered(LAWS[name]) for name in laws)
+    if "elastic-plastic" in laws:
+        yield "effects.plastic"
+    if "viscous" in cable:
+        yield "effects.viscous"
     if given["web"].get("path", "").endswith(".csv"):
         yield "net.csv_files"
     if "fold" in given or "positions" in given["web"]:
@@ -195,6 +201,8 @@ SCENES["a curve"]["cable"] = {
     "area": 1e-4,
     "density": 1.0,
 }
+SCENES["arms"] = brief("square-impact")
+SCENES["arms"]["cable"] |= {"viscous": {"arms": [[7e7, 1e-3]]}}
 SCENES["a platform"] = {
     "web": {"kind": "inline", "points": [[-1, 0, 2], [1, 0, 2], [-1, 0, 0], [1, 0, 0]], "lines": [[0, 2], [1, 3]]},
     "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-4, "density": 1000.0},
@@ -287,7 +295,7 @@ TABLES = {
 }
 SOLVED = ("detection", "law")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
-LISTED += ("motion", "work of lengths", "impulse", "near", "collisions", "probe")
+LISTED += ("relax", "motion", "work of lengths", "impulse", "near", "collisions", "probe")
 TERM = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: TERM for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
 KERNELS |= {name: {**TERM, "impulse": 1} for name in ("gravity", "load")}
@@ -436,6 +444,8 @@ def summed(*effects):
         for which, number in KERNELS[name].items():
             total[which] += number * (2 if name == "drag" and {"body", "contact"} & set(effects) else 1)
     total["work of lengths"] = int(bool({"reel", "temperature"} & set(effects)))
+    for which in TERM if "damping" in effects and total["work of lengths"] else ():
+        total[which] += 1  # the work of lengths against damping
     return total
 
 

@@ -12,6 +12,7 @@ def add_arguments(parser):
     text += "stress, tension or strain of lines, over distance; frequencies, of modes. Repeatable (default: the "
     text += "observables and the energy balance; in statics results over load steps, of one stress over distance)"
     parser.add_argument("--quantity", action="append", metavar="NAME", help=text)
+    parser.add_argument("--against", metavar="NAME", help="a column of history.csv in place of time, such as strain")
     parser.add_argument("--out", metavar="FILE", help="a .png, .svg or .pdf (default: plot.png in the first DIR)")
 
 
@@ -19,7 +20,7 @@ def run(arguments):
     """Draw, and print where the plot is; which folders lack what goes to the error stream."""
     from ..pictures.plots import plot
 
-    picture = plot(arguments.folders, quantity=arguments.quantity, out=arguments.out)
+    picture = plot(arguments.folders, quantity=arguments.quantity, out=arguments.out, against=arguments.against)
     print(picture.path)
     for words in picture.lacking:
         print(f"refweb: {words}", file=sys.stderr)

@@ -363,7 +363,7 @@ class Simulation:
             yield from floor_remark(self.system.net, self._largest_stress)
         if self.system.weakness is None:
             yield from strength_remark(self.solution.utilisation)
-        yield from strain_remark(self._strain)
+        yield from strain_remark(self.system.net, self._strain)
         if self._share_of_curve is not None:
             yield from curve_remark(self.system.net, *self._share_of_curve)
         yield from self.system.remarks()

@@ -21,12 +21,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..compiled.rows import column_of, width_of
 from ..errors import InputError
+from ..kernels import FORCE, kernel
 
 LINE_OUT = np.dtype([(name, float) for name in ("tension", "strain", "damped_tension", "power", "length_power")])
 """Numbers that terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law the
@@ -258,6 +259,9 @@ class InternalVariables(NamedTuple):
         Takes them over a step of an explicit method.
     space : int
         Number of strains that this notes.
+    follower : object, optional
+        Has ``taken_on(net, x)``, the displacement of all rows with variables that follow at once and are no unknowns,
+        and ``plastic_strain(net, x)`` and ``strain(net, x)`` at each point; None where all are unknowns.
     """
 
     components: np.ndarray
@@ -265,6 +269,7 @@ class InternalVariables(NamedTuple):
     resistance: np.ndarray
     relax: Callable
     space: int
+    follower: Any = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,6 +294,8 @@ class ForceTerm:
         Potential of the force, if there is one; for a force with a power it is linear in time between its times.
     tangent, velocity, contact, frame, timing, elements, internal
         Optional parts, see the classes.
+    adds_tension : bool
+        True for a force over the lines beside their law, which writes the whole tension to ``out``.
     """
 
     name: str
@@ -304,6 +311,7 @@ class ForceTerm:
     timing: Timing = Timing()
     elements: CellElements = CellElements()
     internal: InternalVariables | None = None
+    adds_tension: bool = False
 
     @property
     def over_lines(self):
@@ -315,6 +323,8 @@ class ForceTerm:
         """Number of values per cell that ``force`` writes to its ``out``."""
         if self.contact.felt:
             return CONTACT_COLUMNS
+        if self.adds_tension and self.balance.power is None:
+            return DAMPED_TENSION + 1
         return int(self.contact.crossing is not None) if self.balance.power is None else self.balance.power + 1
 
     @property
@@ -322,6 +332,11 @@ class ForceTerm:
         """True for a load that follows from time alone, with a power and a potential."""
         linear = self.tangent.stiffness is None and self.velocity.damping is None
         return linear and self.balance.power is not None and self.energy is not None
+
+
+@kernel(FORCE)
+def no_force(t, x, v, f, cells, data, out):
+    pass
 
 
 def pairs_of(system):

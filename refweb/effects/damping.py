@@ -36,6 +36,7 @@ from .base import (
     Timing,
     VelocityForce,
     column,
+    no_force,
     refuse_flows,
 )
 from .line_kernels import gradient, line_at, pull_together, strain
@@ -167,11 +168,6 @@ def kernels(law, record, tau, changing, gradients, weights):
 
 
 @kernel(FORCE)
-def no_force(t, x, v, f, cells, data, out):
-    pass
-
-
-@kernel(FORCE)
 def drag(t, x, v, f, cells, data, out):
     for c in range(cells.shape[0]):
         row = cells[c, 0]
@@ -276,6 +272,7 @@ class Damping(Table):
                     velocity=VelocityForce(damping, bound),
                     balance=Balance("dissipated_energy", POWER, internal=True),
                     timing=Timing(at_rest=False),
+                    adds_tension=True,
                 )
             )
             if changing:

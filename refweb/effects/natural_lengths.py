@@ -42,9 +42,9 @@ def work_of_lengths(net):
     """The kernel (signature `refweb.kernels.ENERGY`) of ∂E/∂L of each element [N], of its law and its arms."""
     if not net.internal:
         return length_force(net)
-    from .viscous import length_force as with_arms
+    from . import plastic, viscous
 
-    return with_arms(net)
+    return (viscous if viscous.ROW in net.line_data.dtype.names else plastic).length_force(net)
 
 
 class NaturalLengths(Record):

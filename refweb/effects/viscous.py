@@ -328,6 +328,7 @@ class ViscousArms:
             tangent=Tangent(stiffness, bound),
             balance=Balance("strain_energy", internal=True),
             timing=Timing(at_rest=self.viscous.statics == "short"),
+            adds_tension=True,
         )
         dashpots = ForceTerm(
             name="viscous",
@@ -361,6 +362,8 @@ class ViscousArms:
 
 
 def refuse_beside(net, what):
-    """Refuse ``what`` beside arms; `InputError`."""
-    if net.internal:
+    """Refuse ``what`` beside arms or lines that yield; `InputError`."""
+    if ROW in net.line_data.dtype.names:
         raise InputError(f"{what} cannot stand beside [cable.viscous]: give it one more arm, of a short time, instead")
+    if net.internal:
+        raise InputError(f'{what} cannot stand beside law = "elastic-plastic": damp with rate = ... [1/s]')

@@ -15,6 +15,7 @@ from . import law_keys
 from .groups import givers
 from .law_keys import numbers_by_name, points
 from .materials import FILLED, MATERIALS
+from .plastic_keys import check_yield, hardening_key
 from .tension_laws import law_of, names_in, strains_of
 
 SMOOTH_LAW = {"slackness": 0.0, "smoothing": 1e-5}
@@ -33,7 +34,7 @@ class Group(Table):
 
     Parameters
     ----------
-    law : {"smooth", "tension-only", "linear", "force-density", "constant-force", "table"}, optional
+    law : {"smooth", "tension-only", "linear", "force-density", "constant-force", "table", "elastic-plastic"}, optional
         Tension law; of the smooth one ε0 = 0 and η = 1e-5 where the cable has another and the group none of its own.
     material : str, optional
         As for `Cable`: modulus, density and strength of the group where it has none of its own.
@@ -52,6 +53,8 @@ class Group(Table):
         Of the law "force-density" [N/m], not 0.
     stress, tension : list of list of float or str, optional
         Of the law "table", see `Cable`; one of them takes the place of what the cable gives.
+    yield_stress, hardening : float or list of list of float, optional
+        Of the law "elastic-plastic", see `Cable`.
     parameters : dict of str to float, optional
         Of a law of another package, see `Cable`; a number takes the place of that of the cable.
     strength : float, optional
@@ -84,6 +87,8 @@ class Group(Table):
     force_density: float | None = real(default=None, unit="N/m")
     stress: Any = points(unit="Pa")
     tension: Any = points(unit="N")
+    yield_stress: float | None = real(default=None, above=0, unit="Pa")
+    hardening: Any = hardening_key()
     parameters: dict | None = numbers_by_name()
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float | None = real(default=None, above=0, unit="1")
@@ -166,7 +171,7 @@ class Cable(Table):
 
     Parameters
     ----------
-    law : {"smooth", "tension-only", "linear", "force-density", "constant-force", "table"}
+    law : {"smooth", "tension-only", "linear", "force-density", "constant-force", "table", "elastic-plastic"}
         Tension law, see `refweb.net.laws`. Groups may have others: struts beside cables. Lines that can push end the
         proven bound that statics has where all lines are tension-only or have a curve, the law "table". The laws
         "force-density" and "constant-force" are those of form finding, for statics: the tension of a line is
@@ -205,6 +210,20 @@ class Cable(Table):
     tension : list of list of float or str, optional
         The same as tension, [[strain, tension in N], ...], or a file with ``strain`` and ``tension`` [N]: of a rope
         that is sold without a section, whose area then counts for mass and stress alone.
+    yield_stress : float, optional
+        Of the law "elastic-plastic": stress at which a line yields [Pa], > 0. It keeps its elongation: unloaded, it is
+        slack below it. Statics takes plastic strains on from load step to load step, without a proven bound.
+    hardening : float or list of list of float, optional
+        Of the same law: the slope of the yield stress over plastic strain [Pa], ≥ 0 and 0 by default, which is a brake
+        that pays out at constant force; or points of that curve, [[plastic strain, stress in Pa], ...], from a plastic
+        strain of 0 on in place of ``yield_stress``. Its last slope goes on.
+    yield_stress : float, optional
+        Of the law "elastic-plastic": stress at which a line yields [Pa], > 0. It keeps its elongation: unloaded, it is
+        slack below it. Statics takes plastic strains on from load step to load step, without a proven bound.
+    hardening : float or list of list of float, optional
+        Of the same law: the slope of the yield stress over plastic strain [Pa], ≥ 0 and 0 by default, which is a brake
+        that pays out at constant force; or points of that curve, [[plastic strain, stress in Pa], ...], from a plastic
+        strain of 0 on in place of ``yield_stress``. Its last slope goes on.
     parameters : dict of str to float, optional
         Numbers that a law of another package asks for, by name.
     strength : float, optional
@@ -257,6 +276,8 @@ class Cable(Table):
     force_density: float | None = real(default=None, unit="N/m")
     stress: Any = points(unit="Pa")
     tension: Any = points(unit="N")
+    yield_stress: float | None = real(default=None, above=0, unit="Pa")
+    hardening: Any = hardening_key()
     parameters: dict | None = numbers_by_name()
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float = real(default=1.0, above=0, unit="1")
@@ -272,6 +293,7 @@ class Cable(Table):
         _fill(self)
         _check_lengths(self)
         law_keys.check(self, own_modulus)
+        check_yield(self)
         tables = (self, *self.groups.values())
         needs = any((table.law or self.law) != "table" and table.modulus is None for table in tables)
         for key, unit in (("modulus", "Pa"), ("density", "kg/m³")):
@@ -359,11 +381,13 @@ class Cable(Table):
         missing = {
             "strength": np.inf,
             "modulus": np.nan,
+            "yield_stress": np.nan,
             "slackness": 0.0,
             "smoothing": 0.0,
             **dict.fromkeys((*LENGTHS[1:], DENSITY), np.nan),
         }
-        for key in (f.name for f in fields(Group) if f.name not in ("material", "parameters", *law_keys.CURVES)):
+        without = ("material", "parameters", "hardening", *law_keys.CURVES)
+        for key in (f.name for f in fields(Group) if f.name not in without):
             values[key] = np.full(len(web.lines), _number(self, key, missing), widest if key == "law" else float)
             for number, group in enumerate(self.groups.values()):
                 if key in given and getattr(group, key) is not None:

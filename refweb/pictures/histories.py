@@ -50,6 +50,25 @@ def history(runs, name):
     ]
 
 
+def across(runs, name, against):
+    """The panel of a column over another one, such as a loop of tension over strain; it begins at the point."""
+    factor, called = unit_of(runs[0].units[name], *(s.history[name] for s in runs))
+    width, below = unit_of(runs[0].units[against], *(s.history[against] for s in runs))
+
+    def draw(axes):
+        entries = []
+        for s in runs:
+            x, y = s.history[against] / width, s.history[name] / factor
+            (line,) = axes.plot(x, y, color=s.ink.colour, linestyle=s.ink.style, linewidth=1.4)
+            axes.plot(x[:1], y[:1], color=s.ink.colour, marker=s.ink.marker, markeredgecolor=DARK)
+            entries += [(line, s.name)] if s.name else []
+        limit(axes, np.concatenate([s.history[name] for s in runs]) / factor, [], bounds_of(runs, name, factor), called)
+        label(axes, name, called)
+        legend(axes, entries)
+
+    return [Panel(draw, f"{against} [{below}]" if below else against, notes=("The point is the start.",))]
+
+
 def bounds_of(runs, name, factor):
     """Least and largest possible value of a column in all of some runs, in units of the axis."""
     lower, upper = zip(*(s.bounds.get(name, (-np.inf, np.inf)) for s in runs), strict=True)

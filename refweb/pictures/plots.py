@@ -63,7 +63,7 @@ def usual(record):
     return run.observables if len(run.along) > 1 or not record.times else [f"stress{DISTANCE}"]
 
 
-def draw(records, what=None, title=None):
+def draw(records, what=None, title=None, against=None):
     """Draw some of the `kinds` of one record, or of several over each other.
 
     Parameters
@@ -76,6 +76,8 @@ def draw(records, what=None, title=None):
         that of the first observable, a field of lines alone that over distance.
     title : str, optional
         Title above the plot; by default the titles of the scenes, with the status of runs that are not solved.
+    against : str, optional
+        Column over which those named in ``what`` are drawn, in place of time or load step.
 
     Returns
     -------
@@ -87,20 +89,22 @@ def draw(records, what=None, title=None):
     InputError
         For a name that no record has, with the nearest; records of several kinds, or without rows.
     """
-    return _drawn([records] if isinstance(records, Record) else list(records), what, title)[0]
+    return _drawn([records] if isinstance(records, Record) else list(records), what, title, against)[0]
 
 
-def _drawn(records, what, title=None):
+def _drawn(records, what, title=None, against=None):
     """The figure of some records, and which of them lack what, in words."""
     runs, notes = _beside(records)
     panels, missing, asked = [], {}, {}
+    if against is not None and what is None:
+        what = [name for name in _usual_of_all(runs) if any(name in s.units for s in runs) and name != against]
     for typed in _asked(runs, what):
         asked.setdefault(_meant(runs, typed), typed)
     for name, typed in asked.items():
-        having = [s for s in runs if _has(s, name)]
+        having = [s for s in runs if (_has(s, name) if against is None else {name, against} <= s.units.keys())]
         if not having:
-            _refuse(runs, name, typed)
-        panels += _panels(having, name)
+            _refuse(runs, name, typed, against)
+        panels += _panels(having, name) if against is None else histories.across(having, name, against)
         for s in runs:
             missing.setdefault(s.name, []).extend([typed] if s not in having else [])
     lacking = tuple(f"{who} has no {', '.join(names)}" for who, names in missing.items() if names)
@@ -123,8 +127,12 @@ def _known(runs):
     return dict.fromkeys(name for s in runs for name in (*kinds(s.record), *s.units))
 
 
-def _refuse(runs, name, typed):
+def _refuse(runs, name, typed, against=None):
     """Say why there is nothing to draw of a name that stands for nothing here."""
+    if against is not None:
+        columns = dict.fromkeys(column for s in runs for column in s.units)
+        key, missing = ("quantity", typed) if against in columns else ("against", against)
+        raise InputError(f"{key} = {as_shown(missing)}: there is no such column, {nearest(missing, columns)}")
     known, kind = _known(runs), runs[0].record.kind
     if name.startswith(SPECTRUM) or name == "spectrum":
         if kind != "dynamic":
@@ -211,7 +219,7 @@ class Plotted(NamedTuple):
     lacking: tuple[str, ...]
 
 
-def plot(folders, quantity=None, out=None):
+def plot(folders, quantity=None, out=None, against=None):
     """Draw result folders over each other, and write the figure.
 
     Parameters
@@ -222,6 +230,8 @@ def plot(folders, quantity=None, out=None):
         As ``what`` of `draw`.
     out : path-like, optional
         A ``.png``, ``.svg`` or ``.pdf``; default ``plot.png`` in the first folder.
+    against : str, optional
+        As for `draw`.
 
     Returns
     -------
@@ -237,7 +247,7 @@ def plot(folders, quantity=None, out=None):
     if len({record.name for record in records}) < len(records):
         records = [r._replace(name=str(folder)) for r, folder in zip(records, folders, strict=True)]
     path = target(folders[0] / "plot.png" if out is None else out, ENDINGS)
-    figure, lacking = _drawn(records, quantity)
+    figure, lacking = _drawn(records, quantity, against=against)
     write(figure, path)
     return Plotted(path, lacking)
 

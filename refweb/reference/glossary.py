@@ -90,6 +90,7 @@ GLOSSARY = {
         "clamp": "Node at which lines keep their direction in space.",
         "Rayleigh damping": "Forces proportional to velocity, by mass and by stiffness.",
         "Kelvin–Voigt damping": "Stress proportional to the rate of strain.",
+        "plastic strain": "Elongation over natural length that a line keeps when it has yielded.",
         "Maxwell arm": "Spring and dashpot in series beside a line; its tension fades while the line is held.",
     },
     "Statics": {

@@ -56,7 +56,9 @@ def as_text(name, width=100):
 
 
 def _text(page, width):
-    wrapped = lambda text, indent="": textwrap.fill(text, width, initial_indent=indent, subsequent_indent=indent)  # noqa: E731
+    wrapped = lambda text, indent="": textwrap.fill(  # noqa: E731
+        text, width, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False
+    )
     parts = [page.header, wrapped(page.summary, "  ")]
     parts += [text if "\n" in text else wrapped(text, "  ") for text in page.prose]
     keys = []

@@ -83,7 +83,21 @@ class State:
     @cached_property
     def element_slack(self):
         """True for each element that is slack all along, as `slack`, shape (cells,); none of form finding is."""
-        return (self.element_strain <= self.system.net.slackness) & ~self.system.net.forming
+        return (self.element_strain <= self._slack_below) & ~self.system.net.forming
+
+    @property
+    def _slack_below(self):
+        """Strain at or below which each element is slack, shape (cells,)."""
+        return self.system.net.slackness if self.plastic_strain is None else self.plastic_strain
+
+    @cached_property
+    def plastic_strain(self):
+        """Plastic strain of each element, the largest over its quadrature points [1], None where no line yields."""
+        if not self.system.net.law_is("plastic").any():
+            return None
+        from ..effects.plastic import plastic_strain
+
+        return plastic_strain(self.system.at(self.time).net, self.x).max(axis=1)
 
     @cached_property
     def strain(self):
@@ -185,9 +199,9 @@ MUCH = 0.2
 """Strain above which a finding warns: real cables break below it, and a linear law does not describe them."""
 
 
-def strain_remark(strain):
-    """Find a largest strain, (value, line), above `MUCH`."""
-    if strain[0] > MUCH:
+def strain_remark(net, strain):
+    """Find a largest strain, (value, line), above `MUCH`, of a line that does not yield."""
+    if strain[0] > MUCH and not net.law_is("plastic")[net.line == strain[1]].any():
         yield Finding(
             "large-strain",
             f"line {strain[1]} is strained by {100.0 * strain[0]:.3g} %, above {100.0 * MUCH:g} %: no cable stretches "

@@ -104,6 +104,8 @@ def frame_data(state, shape=None):
             values[inner] = np.einsum("ia,cax->cix", weights, values[net.cells])
     cells = (state.element_tension, state.element_tension / net.area, state.element_strain)
     cell_data = dict(zip(CELL_DATA, (*cells, net.natural_length, state.element_slack), strict=True))
+    if state.plastic_strain is not None:
+        cell_data["plastic_strain"] = state.plastic_strain
     if np.isfinite(net.strength).any():
         cell_data["utilisation"] = state.element_tension / (net.area * net.strength)
     if state.system.weakness is not None:

@@ -109,7 +109,7 @@ def solve(system, load_steps, progress=None, limit=10_000_000, tolerance=TOLERAN
     relaxation, x = Relaxation(system, progress, limit, tolerance), np.zeros((system.rows, 3))
     for t in load_steps:
         state = relaxation.solve(t, x)
-        x = state.x
+        x = state.x = system.taken_on(t, state.x)
         yield state
 
 

@@ -69,6 +69,7 @@ def solve(system, load_steps, progress=None):
             if state.stability.sign == 1 and system.dead and (system.net.forming & system.net.law_is("convex")).all():
                 state.stats["above_lowest"] = 0.0  # a quadratic potential has one minimum
         state.deviations = newton.deviations(state)
+        state.x = system.taken_on(t, state.x)
         states = [*states[-1:], state]
         yield state
 

@@ -124,7 +124,7 @@ def remarks_on(state, stats, utilisation, equilibrium):
             )
     yield from strength_remark(utilisation)
     strain = np.where(net.forming, -np.inf, state.element_strain)
-    yield from strain_remark((float(strain.max()), int(net.line[strain.argmax()])))
+    yield from strain_remark(net, (float(strain.max()), int(net.line[strain.argmax()])))
     if (scale := net.curve_scale) is not None:
         shares = state.element_strain * scale
         yield from curve_remark(net, float(shares.max()), int(shares.argmax()))

@@ -149,7 +149,12 @@ class System:
     def settled(self, x):
         """A state, x or None as it is given, with internal variables as they are after all time at rest, or new."""
         settling = [effect for effect in self.effects if hasattr(effect, "settled")]
-        return settling[0].settled(self.net, x) if settling else x
+        return settling[0].settled(self.at(0.0).net, x) if settling else x
+
+    def taken_on(self, t, x):
+        """A state with plastic strains that it asks for at time t, x itself where no line can yield."""
+        follower = self.internal and self.internal.follower
+        return follower.taken_on(self.at(t).net, x) if follower else x
 
     @cached_property
     def laid(self):
@@ -277,7 +282,7 @@ class System:
     @property
     def tension_column(self):
         """Column of what the lines observe that has their whole tension."""
-        return DAMPED_TENSION if any(f.over_lines and f.balance.power is not None for f in self.terms) else TENSION
+        return DAMPED_TENSION if any(f.adds_tension for f in self.terms) else TENSION
 
     def blocks(self):
         """New arrays for `stiffness` and `damping` to fill, shape (cells, 3 arity, 3 arity) each."""

@@ -576,3 +576,21 @@ def test_the_verb(runs, tmp_path, monkeypatch, capsys):
     assert main([*both, "speed"]) == main([*both, "spectrum", "--quantity", "energy"]) == 0
     said = capsys.readouterr()
     assert said.err == "refweb: b has no speed\nrefweb: b has no energy\n" and "b/plot.png\nb/plot.png" in said.out
+
+
+def test_a_column_over_another(runs, tmp_path, capsys):
+    """The line is that of both columns in their units; what is no column is named with the nearest that is."""
+    folder, path = runs / "dynamic", tmp_path / "loop.svg"
+    figure = plots.draw(of_folder(folder), "speed", against="deflection")
+    (axes,) = figure.axes
+    history = refweb.load(folder).history
+    x, y = axes.lines[0].get_data()
+    factors = [np.abs(history[name]).max() / np.abs(drawn).max() for name, drawn in (("deflection", x), ("speed", y))]
+    np.testing.assert_allclose([x * factors[0], y * factors[1]], [history["deflection"], history["speed"]], atol=1e-12)
+    assert axes.get_xlabel().startswith("deflection [")
+    assert main(["plot", str(folder), "--quantity", "speed", "--against", "deflection", "--out", str(path)]) == 0
+    assert path.is_file() and "loop.svg" in capsys.readouterr().out
+    assert main(["plot", str(folder), "--quantity", "speed", "--against", "deflexion"]) == 2
+    assert 'against = "deflexion": there is no such column' in capsys.readouterr().err
+    assert main(["plot", str(folder), "--quantity", "sped", "--against", "deflection"]) == 2
+    assert 'quantity = "sped": there is no such column' in capsys.readouterr().err

@@ -117,6 +117,7 @@ UNKNOWN = (
     "rupture_energy",
     "body_contact_energy",
     "self_contact_energy",
+    "plastic_energy",
 )
 """Energies that a state of these scenes does not know."""
 

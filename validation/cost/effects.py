@@ -96,6 +96,7 @@ EFFECTS = {
     "damping, time": {"damping": {"time": 1e-5}},
     "damping, rate": {"damping": {"rate": 1.0}},
     "viscous, one arm": {"cable": PLAIN["cable"] | {"viscous": {"arms": [[7e7, 1e-3]]}}},
+    "lines that may yield": {"cable": PLAIN["cable"] | {"law": "elastic-plastic", "yield_stress": 1e5}},
     "bending": {"bending": {"stiffness": 1e-3}},
     "reel": {"reel": [{"lines": "all", "factor": [[0.0, 1.0], [1.0, 0.9]]}]},
     "temperature": {"temperature": {"expansion": 1e-5, "change": -10.0}},

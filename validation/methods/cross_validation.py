@@ -95,6 +95,11 @@ EFFECTS = {
         "cable": {"law": "table", "stress": CURVE, "area": 1e-5, "density": 1000.0, "prestrain": 0.01},
         "damping": {"time": 1e-4},
     },
+    "elastic-plastic": {
+        "cable": {key: value for key, value in SMALL["cable"].items() if key != "smoothing"}
+        | {"law": "elastic-plastic", "yield_stress": 1.5e4, "hardening": 1e5},
+        "observe": [*SMALL["observe"], {"name": "lost", "quantity": "plastic_energy"}],
+    },
     "[cable.viscous]": {
         "cable": SMALL["cable"] | {"viscous": {"arms": [[1e6, 0.05], [5e5, 0.5]]}},
         "observe": [*SMALL["observe"], {"name": "lost", "quantity": "dissipated_energy"}],

@@ -118,7 +118,7 @@ class StepObserver(Integrator):
         self._per_cell, self._blocks = system.per_cell(), system.blocks()
         if not self.takes_massless:
             refuse_massless(system, self.method)
-        if system.internal and not self.takes_internal:
+        if system.internal and not system.internal.follower and not self.takes_internal:
             raise InputError(
                 f'[cable.viscous] needs method = "central-difference", "cvode" or "ida", not {self.method}'
             )
@@ -146,6 +146,11 @@ class StepObserver(Integrator):
         self._measurements = Measurements(probes, sums, self._book)
         self._limits = StepLimits(system, self.rotations, lambda t: self.state(t, *self.interpolated(t))[0])
         self._monitors = self._measurements, self._limits.passages
+        self._yielding = None
+        if system.internal and system.internal.follower:
+            from .yielding import Yielding
+
+            self._yielding = Yielding(system, rtol)
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
     # What a method brings
@@ -317,9 +322,13 @@ class StepObserver(Integrator):
 
     def _take_step(self, course: ObservedState, end):
         """Take a step of the method, not beyond a corner of a table, nor further than a body can be passed."""
+        turned = False
+        if self._yielding is not None:
+            turned = self._yielding.take_on(course)
+            self._reference = np.where(self.system.supported, course.x, 0.0)
         stop = self._limits.stop(course.time, course.x, course.v, end)
         ahead = max(end, course.time + 1e-3 * end)  # from a corner it may be too near for a first step to be chosen
-        if self.restarts and course.nsteps and self._limits.at_corner(course.time):
+        if turned or self.restarts and course.nsteps and self._limits.at_corner(course.time):
             self._enter(course)  # and the first step is chosen whatever the rows are
             ahead = course.time + max(1e3 * course.step, 1e-6 * course.time)
         self._wrong = None
@@ -331,6 +340,8 @@ class StepObserver(Integrator):
                 raise Stopped("numbers are not finite")
         if abs(reached - stop) <= 4.0 * np.spacing(reached):  # a sum of time and step, and corners are to be met
             reached = stop
+        if self._yielding is not None:
+            reached = self._yielding.turn(course.time, reached, self)
         course.step, course.reached, course.nsteps = reached - course.reached, reached, course.nsteps + 1
         course.short = course.short + 1 if course.step * MAX_STEPS_PER_ROW < end - course.time else 0
         if course.short > PATIENCE:

@@ -67,6 +67,8 @@ class TensionLaw:
         True if tension is 0 up to some strain ≥ 0 and rises from there on: errors of statics are then proven.
     cone : bool
         True if it is, apart from smoothing, EA (ε − ε0) of taut and 0 of slack lines, ε0 the ``slackness``.
+    plastic : bool
+        True if lines yield, see `refweb.effects.plastic`: the law is what is elastic of them.
     smoothed : bool
         True if ``smoothing`` has a meaning.
     """
@@ -84,6 +86,7 @@ class TensionLaw:
     convex: ClassVar[bool] = False
     cone: ClassVar[bool] = False
     smoothed: ClassVar[bool] = False
+    plastic: ClassVar[bool] = False
 
     def __init_subclass__(cls):
         super().__init_subclass__()

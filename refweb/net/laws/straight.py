@@ -40,6 +40,14 @@ class TensionOnly(TensionLaw):
         return tension / lines.ea
 
 
+class ElasticPlastic(TensionOnly):
+    """The elastic part of lines that yield; the rest is in `refweb.effects.plastic`."""
+
+    name = "elastic-plastic"
+    plastic = True
+    convex = cone = False
+
+
 class Linear(TensionLaw):
     """Linear in tension and compression, like a bar."""
 

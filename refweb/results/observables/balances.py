@@ -127,12 +127,21 @@ class RuptureEnergy(Booked):
     needs = "[rupture]"
 
 
+class PlasticEnergy(Booked):
+    """Energy lost in lines that have yielded."""
+
+    signed = False
+    needs = 'law = "elastic-plastic"'
+
+
 class DissipatedEnergy(Booked):
     """Energy lost by damping and friction."""
 
     signed = False
     dynamic = True
-    needs = "[damping], [drag] in a fluid at rest, or damping or friction in [contact] or [self_contact],"
+    needs = (
+        "[damping], [cable.viscous], [drag] in a fluid at rest, or damping or friction in [contact] or [self_contact],"
+    )
 
 
 class TotalEnergy(Booked):

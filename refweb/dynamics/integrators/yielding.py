@@ -1,0 +1,65 @@
+"""Plastic strains between the steps of a method that chooses them: steps end where a line that yields turns back.
+
+Within a step forces follow from the plastic strains at its start, which is exact until a line that yields turns back.
+So a step whose dense output turns back is cut at the first such moment, from which the method begins anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+SAMPLES = 8
+"""Number of pieces of a step at whose ends plastic strains are looked at."""
+ROUNDS = 40
+"""Number of rounds of the golden section for the moment at which a line turns back."""
+SMALL = 1e-3
+"""Plastic strain over rtol by which a step may turn back."""
+
+
+class Yielding:
+    """Plastic strains of a run on one system.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With lines that yield.
+    rtol : float
+        Relative tolerance.
+    """
+
+    def __init__(self, system, rtol):
+        self._system, self._small, self._turned = system, SMALL * rtol, False
+        self._lines = system.internal.follower
+
+    def take_on(self, course):
+        """Write the plastic strains of a state to it; True if a line has turned back there."""
+        course.x[:] = self._system.taken_on(course.time, course.x)
+        turned, self._turned = self._turned, False
+        return turned
+
+    def _at(self, t, method, of):
+        """Strains at each quadrature point at a time in the last step, shape (elements × points,)."""
+        return of(self._system.at(t).net, method.state(t, *method.interpolated(t))[0]).ravel()
+
+    def turn(self, start, end, method):
+        """The first moment at which a line that yields turns back in a step, by its dense output; its end if none does.
+
+        ``start`` and ``end`` are times of the step [s].
+        """
+        times = np.linspace(start, end, SAMPLES + 1)
+        plastic = np.array([self._at(t, method, self._lines.plastic_strain) for t in times[1:]])
+        over = plastic.max(axis=0) - plastic[-1] > self._small
+        if not over.any():
+            return end
+        tops = plastic[:, over].argmax(axis=0)
+        point = np.flatnonzero(over)[tops.argmin()]
+        low, high = times[tops.min()], times[tops.min() + 2]
+        ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+        for _ in range(ROUNDS):
+            first, second = high - ratio * (high - low), low + ratio * (high - low)
+            if self._at(first, method, self._lines.strain)[point] < self._at(second, method, self._lines.strain)[point]:
+                low = first
+            else:
+                high = second
+        self._turned = True
+        return float(high)

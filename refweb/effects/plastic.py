@@ -1,0 +1,286 @@
+"""Lines that yield: elastic–plastic tension with hardening, which goes slack at its plastic strain and never pushes.
+
+The state of a line is its plastic strain p ≥ 0. With the yield stress Y(p), which does not fall, and σ₀ = E max(ε − p,
+0),
+
+    stress          σ₀ while σ₀ ≤ Y(p); else p grows to where E (ε − p) = Y(p)      (return mapping)
+    tangent         E, 0 of a slack line, E Y'/(E + Y') of one that yields           (consistent)
+    energy          A L ½ E max(ε − p, 0)², kept, and A L ∫ Y dp from 0 to p, lost.
+
+A line that does not push yields in one direction alone, so that p is the largest that the strain has asked for. The
+energy that it has lost, the area of its loops, is a function of p, and the sum of both energies is the incremental
+potential: convex in the strain, and its gradient is the tension for any p of before. So states of steps that do not
+turn back need no history within the step. Beside ``law = "elastic-plastic"``, whose term has the elastic tension of p =
+0, this term has the rest.
+
+p stands in rows behind all places, see `refweb.effects.base.InternalVariables`, three quadrature points to a row. They
+are no unknowns: explicit steps take them on at their ends, load steps of statics at equilibria, and CVODE and IDA
+between their steps, which end where a line that yields turns back.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..compiled.rows import record_at
+from ..kernels import ENERGY, FORCE, RELAX, STIFFNESS, kernel
+from ..net.plastic_keys import yield_curves
+from . import elasticity
+from .base import LINE_OUT, Balance, ForceTerm, InternalVariables, Tangent, no_force
+from .line_kernels import line_at, pull_together, strain
+
+if TYPE_CHECKING:
+    from ..net.cable import Cable
+
+ROW = "plastic_row"
+"""Column of line data with the first row of an element; p and A Y [N] of each point of the curve follow it."""
+
+
+@functools.cache
+def kernels(law, record, first, corners, gradients, weights):
+    """Force, energy kept, stiffness, energy lost, relaxation, length and strain kernels.
+
+    Parameters
+    ----------
+    law : type or refweb.net.laws.law.Mixed
+        Law of the lines.
+    record : numpy.dtype
+        Numbers of an element that it reads, see `refweb.net.net.Net.law_record`.
+    first : int
+        Number of the column `ROW`.
+    corners : int
+        Number of points of the curve of yield stress over plastic strain; its last slope goes on.
+    gradients : tuple of tuple of float
+        dN/dξ by quadrature point and node.
+    weights : tuple of float
+        Quadrature weights.
+    """
+    points, nodes = len(gradients), len(gradients[0])
+    flat, stress = tuple(value for row in gradients for value in row), law.stress
+    by_law_alone = elasticity.kernels(law, record, gradients, weights)[-1]
+
+    @kernel()
+    def plastic(e, p, data, c):
+        """(p, slope of A Y over p where the line yields, −1 where it does not) at a strain, from p of before."""
+        ea, yields = line_at(data, c).ea, -1.0
+        for i in range(corners - 1):
+            p0, y0 = data[c, first + 1 + 2 * i], data[c, first + 2 + 2 * i]
+            p1, y1 = data[c, first + 3 + 2 * i], data[c, first + 4 + 2 * i]
+            slope, last = (y1 - y0) / (p1 - p0), i == corners - 2
+            if (p < p1 or last) and ea > 0.0:
+                beyond = ea * (e - p) - (y0 + slope * (p - p0))
+                if beyond <= 0.0:
+                    break
+                yields, ahead = slope, p + beyond / (ea + slope)
+                p = ahead if last else min(ahead, p1)
+                if p < p1:
+                    break
+        return p, yields
+
+    @kernel()
+    def lost(p, data, c):
+        """∫ A Y dp from 0 [N]."""
+        total = 0.0
+        for i in range(corners - 1):
+            p0, y0 = data[c, first + 1 + 2 * i], data[c, first + 2 + 2 * i]
+            p1, y1 = data[c, first + 3 + 2 * i], data[c, first + 4 + 2 * i]
+            end = p if i == corners - 2 else min(p, p1)
+            if end > p0:
+                total += (end - p0) * (y0 + 0.5 * (end - p0) * (y1 - y0) / (p1 - p0))
+        return total
+
+    @kernel(forceinline=True)
+    def state_of(x, data, c, q):
+        """p of before at quadrature point q of cell c."""
+        return x[int(data[c, first]) + q // 3, q % 3]
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            largest, ea = 0.0, line_at(data, c).ea
+            for q in range(points):
+                p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
+                pull = ea * max(e - plastic(e, state_of(x, data, c, q), data, c)[0], 0.0) - ea * max(e, 0.0)
+                tension = stress(e, record_at(record, data, c, 0)) + pull
+                if q == 0 or tension > largest:
+                    largest = tension
+                if pull != 0.0:
+                    pull_together(f, cells, c, q, nodes, flat, weights[q] * pull * inverse, p0, p1, p2)
+            record_at(LINE_OUT, out, c, 0).damped_tension = largest
+
+    @kernel(ENERGY)
+    def kept(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            total = 0.0
+            for q in range(points):
+                e = strain(x, cells, data, c, q, nodes, flat)[4]
+                p = plastic(e, state_of(x, data, c, q), data, c)[0]
+                total += weights[q] * (max(e - p, 0.0) ** 2 - max(e, 0.0) ** 2)
+            out[c] = 0.5 * line_at(data, c).ea * total * line_at(data, c).natural_length
+
+    @kernel(ENERGY)
+    def gone(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            total = 0.0
+            for q in range(points):
+                e = strain(x, cells, data, c, q, nodes, flat)[4]
+                total += weights[q] * lost(plastic(e, state_of(x, data, c, q), data, c)[0], data, c)
+            out[c] = total * line_at(data, c).natural_length
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        blocks[:] = 0.0
+        if definite:  # what it takes from the law is nothing of it
+            return
+        for c in range(cells.shape[0]):
+            line = line_at(data, c)
+            for q in range(points):
+                p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
+                state, yields = plastic(e, state_of(x, data, c, q), data, c)
+                elastic, slope = line.ea * max(e, 0.0), 0.0
+                if yields >= 0.0:
+                    slope = line.ea * yields / (line.ea + yields)
+                elif e >= state:
+                    slope = line.ea
+                if e >= 0.0:
+                    slope -= line.ea
+                along = weights[q] * slope / line.natural_length
+                across = weights[q] * (line.ea * max(e - state, 0.0) - elastic) * inverse
+                p = (p0 * inverse, p1 * inverse, p2 * inverse)
+                for a in range(nodes):
+                    for b in range(nodes):
+                        d = flat[q * nodes + a] * flat[q * nodes + b]
+                        for i in range(3):
+                            for j in range(3):
+                                blocks[c, 3 * a + i, 3 * b + j] += d * (along - across) * p[i] * p[j]
+                            blocks[c, 3 * a + i, 3 * b + i] += d * across
+
+    @kernel(RELAX)
+    def relax(h, x, cells, data, before, lost_energy):
+        for c in range(cells.shape[0]):
+            lost_energy[c], row = 0.0, int(data[c, first])
+            for q in range(points if h > 0.0 else 0):
+                e = strain(x, cells, data, c, q, nodes, flat)[4]
+                x[row + q // 3, q % 3] = plastic(e, state_of(x, data, c, q), data, c)[0]
+
+    @kernel(ENERGY)
+    def length_force(t, x, cells, data, out):
+        by_law_alone(t, x, cells, data, out)
+        for c in range(cells.shape[0]):
+            ea = line_at(data, c).ea
+            for q in range(points):
+                e = strain(x, cells, data, c, q, nodes, flat)[4]
+                p = plastic(e, state_of(x, data, c, q), data, c)[0]
+                stretch, elastic = max(e - p, 0.0), max(e, 0.0)
+                more = stretch * (0.5 * stretch - (1.0 + e)) - elastic * (0.5 * elastic - (1.0 + e))
+                out[c] += weights[q] * (lost(p, data, c) + ea * more)
+
+    @kernel(ENERGY)
+    def strains(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            for q in range(points):
+                e = strain(x, cells, data, c, q, nodes, flat)[4]
+                out[c * points + q] = plastic(e, state_of(x, data, c, q), data, c)[0]
+
+    return force, kept, stiffness, gone, relax, length_force, strains
+
+
+def of(net):
+    """The kernels for the curve and the element of a net."""
+    element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
+    corners = sum(name.startswith("plastic_force_") for name in net.line_data.dtype.names)
+    return kernels(net.law, net.law_record, net.line_data.column(ROW), corners, *element)
+
+
+def plastic_strain(net, x):
+    """Plastic strain at each quadrature point of each element at displacement x, shape (cells, points)."""
+    strain_there = np.empty((len(net.cells), len(net.weights)))
+    of(net)[6](0.0, x, net.cells, net.line_data.matrix, strain_there.ravel())
+    return strain_there
+
+
+def length_force(net):
+    """The kernel of ∂E/∂L of each element [N], plastic strain included."""
+    return of(net)[5]
+
+
+@dataclass(frozen=True)
+class PlasticLines:
+    """Yield of the lines of a cable with ``law = "elastic-plastic"``.
+
+    Parameters
+    ----------
+    cable : refweb.net.cable.Cable
+        The cable.
+    """
+
+    cable: Cable
+
+    def add_internal(self, net):
+        """The net with rows for plastic strains behind all others, and numbers of the curves by element."""
+        curves, numbers = yield_curves(self.cable, net.web), net.line_data
+        width, count = -(-len(net.weights) // 3), len(net.cells)
+        numbers = numbers.with_column(ROW, float(len(net.points)) + width * np.arange(count))
+        for i in range(curves.shape[1]):
+            numbers = numbers.with_column(f"plastic_strain_{i}", curves[net.line, i, 0])
+            numbers = numbers.with_column(f"plastic_force_{i}", net.area * curves[net.line, i, 1])
+        more = np.zeros((width * count, 3))
+        return replace(
+            net,
+            line_data=numbers,
+            points=np.vstack([net.points, more]),
+            mass=np.append(net.mass, more[:, 0]),
+            spins=net.spins + len(more),
+            internal=len(more),
+        )
+
+    def on(self, net):
+        """Terms of the tension that lines do not have by their law, and of the energy that is lost."""
+        force, kept, stiffness, gone, relax, *_ = of(net)
+        tension = ForceTerm(
+            name="plastic",
+            cells=net.cells,
+            data=None,
+            force=force,
+            energy=kept,
+            tangent=Tangent(stiffness),
+            balance=Balance("strain_energy", internal=True),
+            adds_tension=True,
+        )
+        none = np.zeros(0, dtype=np.int64)
+        lost = ForceTerm(
+            name="plastic",
+            cells=net.cells,
+            data=None,
+            force=no_force,
+            energy=gone,
+            balance=Balance("plastic_energy", internal=True),
+            internal=InternalVariables(none, none, np.zeros(0), relax, 0, self),
+        )
+        return [tension, lost]
+
+    def plastic_strain(self, net, x):
+        """Plastic strain at each quadrature point of each element, see `plastic_strain`."""
+        return plastic_strain(net, x)
+
+    def strain(self, net, x):
+        """Strain at each quadrature point of each element, shape (cells, points)."""
+        return elasticity.strains(net, x)
+
+    def taken_on(self, net, x):
+        """Displacement of all rows with the plastic strains that it asks for, from those of before in x."""
+        x = x.copy()
+        states = np.zeros((len(net.cells), 3 * (net.internal // len(net.cells))))
+        states[:, : len(net.weights)] = plastic_strain(net, x)
+        x[len(x) - net.internal :] = states.reshape(-1, 3)
+        return x
+
+    def settled(self, net, x):
+        """Displacement of all rows with the plastic strains of new lines there."""
+        x = np.zeros(net.points.shape) if x is None else x.copy()
+        x[len(x) - net.internal :] = 0.0
+        return self.taken_on(net, x)

@@ -1,0 +1,88 @@
+"""Keys of lines that yield: yield stress, and hardening, a number or a curve of stress over plastic strain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..accepted import accepts, any_of
+from ..errors import InputError
+from ..messages import short
+from ..tables import LARGEST, field, real, rows
+from .groups import givers
+
+LAW = "elastic-plastic"
+KEYS = ("yield_stress", "hardening")
+
+
+def hardening_key() -> Any:
+    """A modulus of hardening, or points (plastic strain, stress); None by default."""
+    number, listed = real(at_least=0, unit="Pa").metadata["read"], rows(2, increasing=True).metadata["read"]
+
+    @accepts(any_of(number.accepts, listed.accepts))
+    def read(name, value):
+        if not (isinstance(value, (list, tuple)) or hasattr(value, "tolist")):
+            return number(name, value)
+        return listed(name, value)
+
+    return field(read, default=None)
+
+
+def _check_points(points, where):
+    """Refuse a curve of hardening that is none."""
+    if len(points) < 2 or points[0][0] != 0.0 or not points[0][1] > 0.0:
+        raise InputError(f"{where}hardening must have two points or more, the first [0, yield stress], > 0 [Pa]")
+    for i in range(1, len(points)):
+        if points[i][1] < points[i - 1][1]:
+            raise InputError(
+                f"{where}hardening[{i}][1] = {points[i][1]:g} must be ≥ {points[i - 1][1]:g} [Pa]: lines do not soften"
+            )
+
+
+def check_yield(cable):
+    """Refuse keys of yield where the law has none, and a law that needs them without."""
+    tables = {"": cable, **{f"groups.{short(name)}: ": group for name, group in cable.groups.items()}}
+    for where, table in tables.items():
+        law = table.law or cable.law
+        for key in KEYS:
+            if law != LAW and getattr(table, key) is not None:
+                raise InputError(f'{where}{key} has no meaning with law = "{law}": leave it out, or give law = "{LAW}"')
+        if law != LAW:
+            continue
+        inherits = cable if cable.law == LAW else table
+        hardening = inherits.hardening if table.hardening is None else table.hardening
+        stress = inherits.yield_stress if table.yield_stress is None else table.yield_stress
+        if isinstance(table.hardening, tuple):
+            _check_points(table.hardening, where)
+        if isinstance(hardening, tuple) and stress is not None:
+            raise InputError(f"{where}yield_stress = {stress:g} and the points of hardening both say it: leave one out")
+        if not isinstance(hardening, tuple) and stress is None:
+            raise InputError(f'{where}law = "{LAW}" needs yield_stress = ... [Pa], or hardening = [[0, stress], ...]')
+
+
+def yield_curves(cable, web):
+    """Yield stress over plastic strain of each line, shape (lines, points, 2); of lines that do not yield without end.
+
+    Shorter curves go on along their last slope.
+    """
+    given, tables = givers(web.groups, cable.groups, len(web.lines)), [cable, *cable.groups.values()]
+    none = np.full(len(web.lines), -1)
+    of_keys = [given.get(key, none) for key in ("law", *KEYS)]
+    curves = []
+    for numbers in zip(*of_keys, strict=True):
+        law, stress, hardening = (
+            getattr(tables[1 + number], key) for number, key in zip(numbers, ("law", *KEYS), strict=True)
+        )
+        if law != LAW:
+            curves.append(((0.0, LARGEST), (1.0, LARGEST)))
+        elif isinstance(hardening, tuple):
+            curves.append(hardening)
+        else:
+            curves.append(((0.0, stress), (1.0, stress + (hardening or 0.0))))
+    count, made = max(map(len, curves)), []
+    for curve in curves:
+        (p0, y0), (p1, y1) = curve[-2:]
+        more = [(p1 + k * (p1 - p0), y1 + k * (y1 - y0)) for k in range(1, 1 + count - len(curve))]
+        made.append([*curve, *more])
+    return np.array(made)

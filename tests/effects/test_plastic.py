@@ -1,0 +1,209 @@
+"""Lines that yield: paths by hand, a brake, loops, three bars, statics by load steps, every method, and starts."""
+
+import nets
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.ida import Ida
+from refweb.effects.plastic import PlasticLines
+from refweb.errors import InputError
+from refweb.net.plastic_keys import yield_curves
+from refweb.results.state import State
+
+AREA, MODULUS, STRESS, HARDENING = 1e-4, 1e7, 1e5, 1e6
+"""A [m²], E, yield stress and hardening [Pa]: yields at a strain of 1 % with 10 N."""
+LAW = dict(law="elastic-plastic", modulus=MODULUS, area=AREA, yield_stress=STRESS, hardening=HARDENING)
+CURVE = dict(law="elastic-plastic", modulus=MODULUS, area=AREA, hardening=[(0, 1e5), (0.01, 1.4e5), (0.03, 1.5e5)])
+
+
+def rope(effects=(), mass=1.0, law=LAW):
+    """A line from a support to a mass that moves along it."""
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]).web()
+    cable, supported = refweb.Cable(**law, density=0.0), np.ones((2, 3), dtype=bool)
+    supported[1, 0] = False
+    effects = [PlasticLines(cable), refweb.PointMass(node=1, mass=mass), *effects]
+    return nets.system(web, cable, effects, False, supported)
+
+
+def by_hand(strains, curve):
+    """(Tension, plastic strain, work lost) along a path of strains, by bisection and trapezoids of the curve."""
+    p, lost, path = 0.0, 0.0, []
+
+    def stress(p):
+        last = curve[-1][1] + (p - curve[-1][0]) * (curve[-1][1] - curve[-2][1]) / (curve[-1][0] - curve[-2][0])
+        return last if p > curve[-1][0] else np.interp(p, *np.transpose(curve))
+
+    for e in strains:
+        if MODULUS * (e - p) > stress(p):
+            low, high = p, e
+            for _ in range(80):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if MODULUS * (e - middle) > stress(middle) else (low, middle)
+            parts = np.unique([p, low, *(c for c, _ in curve if p < c < low)])
+            lost += np.trapezoid([stress(c) for c in parts], parts)
+            p = low
+        path.append((AREA * MODULUS * max(e - p, 0.0), p, AREA * lost))
+    return np.array(path)
+
+
+@pytest.mark.parametrize("law", [LAW, CURVE, LAW | {"hardening": 0.0}])
+def test_ten_cycles_of_a_line_by_hand(law):
+    """Loaded and unloaded, each time further: tension, plastic strain and area of the loops, by statics and motion."""
+    ends = [e for n in range(10) for e in (0.006 * (n + 1), 0.002 * n - 0.001)]
+    table = [(0.0, 0.0, 0.0, 0.0), *((1.0 + i, e, 0.0, 0.0) for i, e in enumerate(ends))]
+    motion = refweb.Motion(node=1, displacement=table)
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0])
+    cable = refweb.Cable(**law, density=1.0)
+    exact = by_hand(ends, yield_curves(cable, web.web())[0].tolist())
+    assert exact[-2, 1] > 0.03
+    observe = [refweb.Observe(name="lost", quantity="plastic_energy")]
+    scene = refweb.Scene(
+        web=web, cable=cable, effects=[motion], observe=observe, accuracy=refweb.Accuracy(error="none"),
+        solve=refweb.Dynamic(duration=len(ends), step_size=2e-3), output=refweb.Output(interval=1.0, frames=1),
+    )  # fmt: skip
+    run = refweb.run(scene)
+    found = np.array([[state.tension[0], state.plastic_strain[0]] for _, state in run.frames[1:]])
+    np.testing.assert_allclose(found, exact[:, :2], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(run.history["lost"][1:], exact[:, 2], rtol=1e-9)
+    static = scene.replace(
+        solve=refweb.Static(load_steps=[1.0 + i for i in range(len(ends))]), output=refweb.Output(), observe=observe
+    )
+    rest = refweb.run(static)
+    np.testing.assert_allclose([step["results"]["lost"].value for step in rest.steps], exact[:, 2], rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
+def test_a_brake_stops_a_mass(method):
+    """A line that pays out at constant force: the way is m v²/2F, and the elastic stretch; the rest is lost."""
+    mass, speed = 2.0, 1.5
+    force = STRESS * AREA
+    system = rope(mass=mass, law=LAW | {"hardening": 0.0})
+    v = np.zeros((system.rows, 3))
+    v[1, 0] = speed
+    solver = method(system, **({"safety": 0.02} if method is CentralDifference else {"rtol": 1e-7}))
+    run = solver.start(None, v)
+    stretch = force / (MODULUS * AREA)  # the mass comes to it with less energy, and stops after the rest
+    way = stretch + (0.5 * mass * speed**2 - 0.5 * force * stretch) / force
+    frequency = np.sqrt(MODULUS * AREA / mass)
+    first = np.arcsin(stretch * frequency / speed) / frequency
+    stop = first + np.sqrt(speed**2 - (stretch * frequency) ** 2) * mass / force
+    solver.advance(run, [0.5 * stop, stop])
+    # Explicit steps are of order 1 at the kink.
+    np.testing.assert_allclose(run.x[1, 0], way, rtol=5e-4 if method is CentralDifference else 2e-5)
+    assert abs(run.v[1, 0]) < 1e-4 * speed
+    energies = {term.balance.column: system.energy_of(term, 0.0, run.x).sum() for term in system.terms[:0:-1]}
+    np.testing.assert_allclose(energies["plastic_energy"], force * (way - stretch), rtol=5e-4)
+    solver.advance(run, [1.2 * stop])
+    assert run.drift < 1e-4
+
+
+@pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
+@pytest.mark.parametrize("law", [LAW, CURVE])
+def test_a_mass_that_bounces_on_a_line_that_yields(method, law):
+    """Against a program of its own, with p = p(largest strain), and a pull that brings it back."""
+    mass, pull = 1.0, 4.0
+    system = rope([refweb.Load(node=1, force=(pull, 0, 0))], mass, law)
+    points = yield_curves(refweb.Cable(**law, density=0.0), system.net.web)[0].tolist()
+    grid = np.linspace(0.0, 0.4, 40001)  # plastic strain over the largest strain
+    table = np.zeros(len(grid))
+    for k in range(len(points) - 1):
+        (p0, y0), (p1, y1) = points[k], points[k + 1]
+        slope = (y1 - y0) / (p1 - p0)
+        ahead = p0 + (MODULUS * (grid - p0) - y0) / (MODULUS + slope)
+        last = k == len(points) - 2
+        table = np.where(ahead > p0, ahead if last else np.minimum(ahead, p1), table)
+
+    def rates(t, y):
+        p = np.interp(max(y[2], y[0]), grid, table)
+        rising = max(y[1], 0.0) if y[0] >= y[2] else 0.0
+        return [y[1], (pull - AREA * MODULUS * max(y[0] - p, 0.0)) / mass, rising]
+
+    end = 0.9
+    exact = solve_ivp(rates, (0.0, end), [0.0, 1.0, 0.0], rtol=1e-9, atol=1e-12, max_step=2e-4).y[:, -1]
+    v = np.zeros((system.rows, 3))
+    v[1, 0] = 1.0
+    solver = method(system, **({"safety": 0.01} if method is CentralDifference else {"rtol": 1e-7}))
+    run, before = solver.start(None, v), 0.0
+    for t in np.linspace(0.0, end, 31)[1:]:
+        solver.advance(run, [t])
+        state = State(system, run.time, run.x.copy(), run.v)
+        assert state.element_tension[0] >= 0.0 and state.plastic_strain[0] >= before - 1e-12
+        before = state.plastic_strain[0]
+    expected = [*exact[:2], np.interp(exact[2], grid, table)]
+    np.testing.assert_allclose([run.x[1, 0], run.v[1, 0], before], expected, rtol=0, atol=2e-4)
+    assert run.drift < 1e-4
+
+
+def test_three_bars_of_which_one_yields():
+    """Three lines side by side on one node: beyond its yield the weak one bears no more; unloaded, it goes slack."""
+    points = [[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 0]]
+    web = refweb.Inline(
+        points=points, lines=[[0, 3], [1, 3], [2, 3]], supports=[0, 1, 2], groups={"weak": [1]}
+    )  # fmt: skip
+    cable = refweb.Cable(
+        law="tension-only", modulus=MODULUS, area=AREA, density=1.0,
+        groups={"weak": dict(law="elastic-plastic", yield_stress=STRESS)},
+    )  # fmt: skip
+    load = refweb.Load(node=3, force=(0.0, 0.0, -1.0), factor=[(0.0, 0.0), (100.0, 100.0), (200.0, 0.0)])
+    observe = [refweb.Observe(name=f"T{line}", quantity="tension", line=line) for line in range(3)]
+    stiffness, limit = MODULUS * AREA, STRESS * AREA
+    stretch = (70.0 - limit) / (2.0 * stiffness)  # at the largest load
+    p = stretch - limit / stiffness
+    weak = [20.0 / 3.0, limit, limit, limit, (50.0 - 2.0 * stiffness * p) / 3.0, 0.0]
+    for kind in ("newton", "relaxation"):
+        solve = refweb.Static(load_steps=[20.0, 30.0, 50.0, 70.0, 150.0, 190.0], method=kind)
+        run = refweb.run(refweb.Scene(web=web, cable=cable, effects=[load], observe=observe, solve=solve))
+        found = np.array([[step["results"][f"T{line}"].value for line in range(3)] for step in run.steps])
+        loads = np.array([20.0, 30.0, 50.0, 70.0, 50.0, 10.0])
+        other = (loads - weak) / 2.0
+        np.testing.assert_allclose(found, np.column_stack([other, weak, other]), rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("method", ["central-difference", pytest.param("cvode", marks=pytest.mark.slow)])
+def test_a_net_catches_a_mass(method, tmp_path):
+    """It absorbs energy that elastic lines give back, the book closes, and resumed and started runs are the same."""
+    scene = refweb.Scene(
+        web=refweb.Window(mesh="square", rows=4, columns=4, side=0.25),
+        cable=refweb.Cable(law="elastic-plastic", modulus=1e7, area=1e-5, density=500.0, yield_stress=1e5),
+        effects=[refweb.PointMass(node="centre", mass=0.5), refweb.Velocity(node="centre", value=(0.0, 0.0, 2.0))],
+        observe=[refweb.Observe(name="lost", quantity="plastic_energy")],
+        solve=refweb.Dynamic(duration=0.2, method=method),
+        output=refweb.Output(interval=0.01, frames=5),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+    whole, resumed = nets.whole_and_resumed(scene, tmp_path)
+    exact = method == "central-difference"
+    np.testing.assert_allclose(resumed.state.x, whole.state.x, rtol=0, atol=0 if exact else 1e-5)
+    assert whole.solver["energy_drift"] < 2e-3
+    lost = whole.history["lost"]
+    assert (np.diff(lost) >= -1e-12).all() and lost[-1] > 0.5 * 1.0  # of 1 J
+    total = whole.history["total_energy"]
+    np.testing.assert_allclose(total, total[0], rtol=3e-3)
+    ahead = scene.replace(solve=refweb.Dynamic(duration=0.01, start=str(tmp_path / "whole"), method=method))
+    first = refweb.run(ahead).frames[0][1]
+    np.testing.assert_array_equal(first.plastic_strain, whole.state.plastic_strain)
+    import meshio
+
+    last = sorted((tmp_path / "whole" / "frames").glob("web_*.vtu"))[-1]
+    np.testing.assert_allclose(meshio.read(last).cell_data["plastic_strain"][0], whole.state.plastic_strain)
+
+
+def test_refusals():
+    with pytest.raises(InputError, match=r'yield_stress has no meaning with law = "smooth"'):
+        refweb.Cable(modulus=1.0, area=1.0, density=1.0, yield_stress=1.0)
+    with pytest.raises(InputError, match=r'law = "elastic-plastic" needs yield_stress'):
+        refweb.Cable(law="elastic-plastic", modulus=1.0, area=1.0, density=1.0)
+    with pytest.raises(InputError, match=r"both say it"):
+        refweb.Cable(**CURVE, yield_stress=1.0, density=1.0)
+    with pytest.raises(InputError, match=r"hardening\[1\]\[1\] = 1 must be ≥ 2"):
+        refweb.Cable(**{**CURVE, "hardening": [(0, 2.0), (1, 1.0)]}, density=1.0)
+    viscous = refweb.Viscous(arms=[(1.0, 1.0)])
+    web = refweb.Window(mesh="square", rows=2, columns=2, side=0.5)
+    with pytest.raises(InputError, match=r"\[cable\] viscous cannot stand beside"):
+        refweb.Scene(web=web, cable=refweb.Cable(**LAW, density=1.0, viscous=viscous)).build()
+    with pytest.raises(InputError, match=r'\[damping\] time = 1 \[s\] cannot stand beside law = "elastic-plastic"'):
+        refweb.Scene(web=web, cable=refweb.Cable(**LAW, density=1.0), effects=[refweb.Damping(time=1.0)]).build()
