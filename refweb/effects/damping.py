@@ -18,6 +18,7 @@ when it snaps taut, and central differences are of order 1 across this jump.
 from __future__ import annotations
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +28,9 @@ from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
 from ..tables import Table, real, table
 from .base import LINE_OUT, POWER, Balance, ForceTerm, Tangent, Timing, VelocityForce, column, refuse_flows
 from .line_kernels import gradient, line_at, pull_together, strain
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 
 @functools.cache
@@ -210,18 +214,18 @@ class Damping(Table):
     rate: float = real(default=0.0, at_least=0, unit="1/s")
     bodies: float = real(default=0.0, at_least=0, unit="1/s")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a damping that damps nothing."""
         if not (self.time or self.rate or self.bodies):
             raise InputError(
                 "time = 0 [s], rate = 0 [1/s] and bodies = 0 [1/s]: one of them must be > 0, or leave the table out"
             )
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with τ in one more column of line data."""
         return net.with_column("damping_time", self.time) if self.time else net
 
-    def on(self, net):
+    def on(self, net: Net) -> list[ForceTerm]:
         """The terms of all lines, whose tension is that with damping, of all nodes with mass, and of free bodies."""
         terms, free = [], [body.row for body in net.bodies if not body.prescribed]
         if self.bodies and not free:

@@ -27,13 +27,16 @@ a corner of a triangle, both of its nodes are on that as well, and ``ring-N`` is
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
 from ..tables import Table, choice, integer, real, table
 from .web import Web
+
+if TYPE_CHECKING:
+    from os import PathLike
 
 MESHES = ("triangle", "square", "hexagon")
 #: Rows and columns of the paper's three webs (section 3.2).
@@ -218,7 +221,7 @@ class Paper(Table):
     mesh: str = choice(*MESHES)
     cable_length: float = real(above=0, unit="m")
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `refweb.net.web.Web`.
 
         Notes
@@ -278,7 +281,7 @@ class Window(Table):
     height: float | None = real(default=None, above=0, unit="m")
     side: float = real(above=0, unit="m")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse sizes at which nothing hangs together, and more than a million cells."""
         for name, size in (("rows", "height"), ("columns", "width")):
             cells, length = getattr(self, name), getattr(self, size)
@@ -294,7 +297,7 @@ class Window(Table):
             raise InputError(f"rows × columns = {rows * columns} must be ≤ {_MOST_CELLS}")
 
     @property
-    def counts(self):
+    def counts(self) -> tuple[int, int]:
         """Numbers of rows and of columns, those given or the nearest to height and width."""
         counts = []
         (per_column, more_columns), (per_row, more_rows) = EXTENT[self.mesh]
@@ -307,7 +310,7 @@ class Window(Table):
             counts.append(given)
         return tuple(counts)
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `refweb.net.web.Web`; its cells count the sectors between links as `Paper` does."""
         rows, columns = self.counts
         return _window(self.mesh, rows, columns, self.side, "window")
@@ -354,7 +357,7 @@ class Layers(Table):
     layers: int = integer(at_least=1)
     cell_area: float = real(above=0, unit="m²")
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `refweb.net.web.Web`; refused above a million cells."""
         n = self.layers
         cells = _cells(self.mesh, n)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from .csv_files import NAMES
 from .faces import CORNERS, decided, group_names
 from .groups import members
 from .web import Web
+
+if TYPE_CHECKING:
+    from os import PathLike
 
 INNER = {"line": 0, "line3": 1, "line4": 2}
 """Nodes between the ends of cells that are lines, of which a web takes the ends."""
@@ -95,16 +99,16 @@ class File(Table):
     path: str = text()
     lines: str | None = text(default=None)
     edges: bool | None = boolean(default=None)
-    columns: dict | None = field(_columns, default=None)
+    columns: dict[str, Any] | None = field(_columns, default=None)
     first: int | None = integer(default=None, at_least=0)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse columns that a web does not have."""
         for key in self.columns or ():
             if key not in NAMES:
                 raise InputError(f"columns.{key} is no column of a web, {nearest(key, NAMES)}")
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `Web`; ``base`` is the folder that a relative path starts from."""
         folder, csv = Path(base or "."), Path(self.path).suffix.lower() == ".csv"
         if csv != (self.lines is not None):

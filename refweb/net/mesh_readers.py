@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,8 +50,8 @@ class Block(NamedTuple):
 
     kind: str
     cells: np.ndarray
-    data: dict
-    members: dict = {}
+    data: dict[str, Any]
+    members: dict[str, Any] = {}
 
 
 class Mesh(NamedTuple):
@@ -76,12 +76,12 @@ class Mesh(NamedTuple):
     """
 
     points: np.ndarray
-    blocks: list
-    point_data: dict
+    blocks: list[Any]
+    point_data: dict[str, Any]
     remedy: str
-    groups: dict | None = None
-    names: dict = {}
-    supports: list = []
+    groups: dict[str, Any] | None = None
+    names: dict[str, Any] = {}
+    supports: list[Any] = []
 
     @property
     def lines(self):

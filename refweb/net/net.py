@@ -9,14 +9,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .laws.law import record_of, together
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+    from scipy.sparse import csr_array
+
     from .laws.line_data import LineData
+    from .rigid_body import RigidBody
     from .web import Web
 
 
@@ -83,116 +89,116 @@ class Net:
     """
 
     web: Web
-    laws: tuple
-    points: np.ndarray
-    mass: np.ndarray
-    element_mass: np.ndarray
-    cells: np.ndarray
-    line: np.ndarray
+    laws: tuple[Any, ...]
+    points: NDArray[np.float64]
+    mass: NDArray[np.float64]
+    element_mass: NDArray[np.float64]
+    cells: NDArray[np.int32]
+    line: NDArray[np.int64]
     line_data: LineData
-    area: np.ndarray
-    strength: np.ndarray
-    gradients: np.ndarray
-    weights: np.ndarray
+    area: NDArray[np.float64]
+    strength: NDArray[np.float64]
+    gradients: NDArray[np.float64]
+    weights: NDArray[np.float64]
     nodes: int
-    places: np.ndarray
+    places: NDArray[np.int64]
     subdivide: int = 1
     quasi_static: bool = False
     cable_mass: float = 0.0
-    consistent_minus_lumped: np.ndarray | None = None
-    bodies: tuple = ()
+    consistent_minus_lumped: NDArray[np.float64] | None = None
+    bodies: tuple[RigidBody, ...] = ()
     spins: int = 0
-    factors: tuple = ()
-    flows: tuple = ()
+    factors: tuple[Any, ...] = ()
+    flows: tuple[Any, ...] = ()
     end: float = math.inf
-    allowed_share: np.ndarray | None = None
-    point_mass: np.ndarray | None = None
-    kept: tuple = ()
+    allowed_share: NDArray[np.float64] | None = None
+    point_mass: NDArray[np.float64] | None = None
+    kept: tuple[Any, ...] = ()
 
     @property
-    def allowed(self):
+    def allowed(self) -> NDArray[np.float64]:
         """Stress of each element that is allowed [Pa], infinite where it has no strength, shape (cells,)."""
         return self.strength if self.allowed_share is None else self.strength * self.allowed_share
 
     @property
-    def law(self):
+    def law(self) -> Any:
         """The law of all lines for compiled kernels: the one law, or a `refweb.net.laws.law.Mixed`."""
         return together(self.laws, self.line_data.dtype)
 
     @property
-    def law_record(self):
+    def law_record(self) -> np.dtype[Any]:
         """Dtype by which kernels of the law read the numbers of an element."""
         return record_of(self.law.columns, self.line_data.dtype)
 
     @cached_property
-    def law_index(self):
+    def law_index(self) -> NDArray[np.int64]:
         """Number of the law of each element in ``laws``, shape (cells,)."""
         several = len(self.laws) > 1
         return self.line_data.law.astype(np.int64) if several else np.zeros(len(self.cells), dtype=np.int64)
 
-    def law_is(self, attribute):
+    def law_is(self, attribute: str) -> NDArray[np.bool_]:
         """True for each element whose law has an attribute of `refweb.net.laws.law.TensionLaw`, shape (cells,)."""
         return np.array([getattr(law, attribute) for law in self.laws])[self.law_index]
 
     @cached_property
-    def forming(self):
+    def forming(self) -> NDArray[np.bool_]:
         """True for each element with a law of form finding, shape (cells,)."""
         return self.law_is("forming")
 
     @property
-    def curve_scale(self):
+    def curve_scale(self) -> NDArray[np.float64] | None:
         """Inverse of the last strain of the curve of each element [1], 0 without a curve; None where there is none."""
-        if "last_strain" not in self.line_data.dtype.names:
+        if "last_strain" not in (self.line_data.dtype.names or ()):
             return None
         last = self.line_data.last_strain
         return np.where(last > 0.0, 1.0 / np.where(last > 0.0, last, 1.0), 0.0)
 
     @property
-    def axial(self):
+    def axial(self) -> NDArray[np.float64]:
         """Size of EA of each element [N], of what stands in its place for laws of form finding, shape (cells,)."""
         return np.abs(self.line_data.ea)
 
     @property
-    def heavy(self):
+    def heavy(self) -> NDArray[np.int64]:
         """Rows with a mass, which a moment of inertia is not."""
         return np.flatnonzero(self.mass[: len(self.mass) - self.spins])
 
     @property
-    def carried(self):
+    def carried(self) -> list[int]:
         """Rows that bodies carry which are not fixed, a list: their nodes, and their own where it is off an axle."""
         off_axle = [body.row for body in self.bodies if body.pivot is not None]
         return off_axle + [node for body in self.bodies if not body.fixed for node in body.carried]
 
     @property
-    def order(self):
+    def order(self) -> int:
         """Order of the elements."""
         return self.cells.shape[1] - 1
 
-    def with_column(self, name, values):
+    def with_column(self, name: str, values: float | NDArray[np.float64]) -> Net:
         """The net with one more field in ``line_data``; ``values`` are one number or one for each element."""
         return replace(self, line_data=self.line_data.with_column(name, values))
 
     @property
-    def broken(self):
+    def broken(self) -> NDArray[np.int64]:
         """Elements that are broken, which have no stiffness, shape (k,)."""
         return np.flatnonzero(self.line_data.ea == 0.0)
 
-    def middle_of(self, lines):
+    def middle_of(self, lines: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int64]:
         """Element at the middle of each of some lines, or the one behind it, shape (lines,)."""
         return np.asarray(lines, dtype=np.int64) * self.subdivide + self.subdivide // 2
 
     @property
-    def natural_length(self):
+    def natural_length(self) -> NDArray[np.float64]:
         """Natural length of each element [m], shape (cells,)."""
         return self.line_data.natural_length
 
     @property
-    def slackness(self):
+    def slackness(self) -> NDArray[np.float64]:
         """Strain at or below which an element is slack, shape (cells,): ε0, which is 0 for laws without it."""
         return self.line_data.slackness
 
     @cached_property
-    def bars(self):
+    def bars(self) -> csr_array:
         """Quadrature points as bars of natural length w L and stiffness EA/(w L), whose vectors are ``bars @ x``.
 
         A `scipy.sparse.csr_array` of shape (cells × points, rows), with w dN/dξ as entries; the bars of a cell follow
@@ -207,34 +213,34 @@ class Net:
         return csr_array((entries, columns.ravel(), starts), shape=(points * len(self.cells), len(self.points)))
 
     @property
-    def bar_lengths(self):
+    def bar_lengths(self) -> NDArray[np.float64]:
         """Natural length of each bar [m], shape (bars,)."""
         return (self.natural_length[:, None] * self.weights).ravel()
 
-    def per_bar(self, values):
+    def per_bar(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of elements for each bar, shape (bars,)."""
         return np.repeat(values, len(self.weights))
 
-    def bar_vectors(self, x):
+    def bar_vectors(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Vector of each bar [m] at the displacement x, shape (bars, 3)."""
         return self.bars @ self.points + self.bars @ x
 
     @property
-    def unit_tension(self):
+    def unit_tension(self) -> NDArray[np.float64]:
         """Stiffness of an element of unit length under unit tension and nothing else, shape (3 nodes, 3 nodes)."""
         unit = np.einsum("q,qa,qb->ab", self.weights, self.gradients, self.gradients)
         return np.kron(unit, np.eye(3))
 
     @property
-    def along(self):
+    def along(self) -> NDArray[np.int64]:
         """Places in a cell's nodes from its first end to its second: ``cells[:, along]`` follows the line."""
         return np.argsort(self.places)
 
-    def line_between(self, nodes):
+    def line_between(self, nodes: Sequence[int]) -> int:
         """Number of the line that an element between two nodes belongs to."""
         return int(self.line[np.isin(self.cells, nodes).all(axis=1).argmax()])
 
-    def find(self, selection, name="node"):
+    def find(self, selection: Any, name: str = "node") -> NDArray[np.int64]:
         """Rows of a selection of nodes; "all" has the nodes that order and subdivision add, see `Web.find`."""
         every = selection == "all" or (isinstance(selection, (list, tuple)) and "all" in selection)
         numbers = self.web.find(selection, name)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from ..errors import InputError
 from ..tables import Several, Table, choice, integer, real, table, vector
 from .web import Web
+
+if TYPE_CHECKING:
+    from os import PathLike
 
 _PARALLEL = 1e-9
 """Sine of the angle below which two directions are parallel."""
@@ -55,7 +58,7 @@ class SingleCable(Table):
     length: float | None = real(default=None, above=0, unit="m")
     sag: Several = vector(default=None)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse ends at one place, a direction that is none, and one line that is longer than the distance."""
         with np.errstate(over="ignore"):
             distance = np.linalg.norm(np.subtract(self.end, self.start))
@@ -75,7 +78,7 @@ class SingleCable(Table):
         size = np.linalg.norm(aside)
         return aside / size if size > _PARALLEL else None
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `Web`, nodes numbered from start to end."""
         n, start, end = self.elements, np.array(self.start), np.array(self.end)
         distance = np.linalg.norm(end - start)

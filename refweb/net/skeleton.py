@@ -13,10 +13,18 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from .rigid_body import Grown
 
 POINT, SEGMENT, ARC = 0.0, 1.0, 2.0
 """Kinds of a part."""
@@ -33,14 +41,18 @@ MOST = 3000
 """Largest number of edges of a surface."""
 
 
-def points(places, thickness):
+def points(places: NDArray[np.float64] | Sequence[Sequence[float]], thickness: float) -> NDArray[Any]:
     """Parts that are points (n, 3), an array of `PART`."""
     parts = np.zeros(len(places), PART)
     parts["kind"], parts["thickness"], parts["start"] = POINT, thickness, places
     return parts
 
 
-def edges(places, pairs, thickness):
+def edges(
+    places: NDArray[np.float64] | Sequence[Sequence[float]],
+    pairs: Sequence[Sequence[int]] | NDArray[np.int64],
+    thickness: float,
+) -> NDArray[Any]:
     """Parts that are the lines between pairs (n, 2) of points (n, 3), an array of `PART`.
 
     Each point belongs to the first line that ends there.
@@ -54,7 +66,7 @@ def edges(places, pairs, thickness):
     return parts
 
 
-def rim(radius, height, thickness):
+def rim(radius: float, height: float, thickness: float) -> NDArray[Any]:
     """Parts of a circle about the third axis, an array of 2 `ARCS` of `PART`."""
     parts = np.zeros(2 * ARCS, PART)
     parts["kind"], parts["thickness"] = ARC, thickness
@@ -64,7 +76,7 @@ def rim(radius, height, thickness):
     return parts
 
 
-def of_box(grown):
+def of_box(grown: Grown) -> NDArray[Any]:
     """Parts of a box that has grown, a `refweb.net.rigid_body.Grown`: also of a point or a line."""
     corners = np.array(list(itertools.product(*([-c, c] if c > 0.0 else [0.0] for c in grown.core))))
     pairs = [
@@ -75,7 +87,7 @@ def of_box(grown):
     return edges(corners, pairs, grown.radius) if pairs else points(corners, grown.radius)
 
 
-def of_cylinder(grown):
+def of_cylinder(grown: Grown) -> NDArray[Any]:
     """Parts of a cylinder about the third axis that has grown: its rims, and what fills it, for sides that cross.
 
     That is the capsule inside on the axis of a long one, or the thickest rim of a flat one, and rims of half that
@@ -99,7 +111,7 @@ def of_cylinder(grown):
     return np.concatenate(parts)
 
 
-def of_surface(corners, triangles):
+def of_surface(corners: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[Any]:
     """Parts of a surface of triangles (t, 3), outward, of corners (n, 3): its edges that stand out, by `FLAT`.
 
     Edges of one triangle, where parts of a solid pass into each other, do not stand out.

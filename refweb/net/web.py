@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import chain
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from ..errors import InputError
 from ..messages import nearest, quote
 from ..tables import Several, node_number
 from .groups import by_place, members
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 SELECTIONS = ("centre", "rim", "corners", "all")
 _TIE = 1e-9  # two distances are equal if they differ by less than this part of the web's size
@@ -69,7 +73,7 @@ class Web:
     broken: Several = ()
     notes: Several = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         points = np.array(self.points, dtype=np.float64, order="C")
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError(f"points of shape {points.shape} must have the shape (nodes, 3)")
@@ -112,17 +116,17 @@ class Web:
             object.__setattr__(self, "cells", len(lines) - len(points) + self.components()[0])
 
     @property
-    def cable_length(self):
+    def cable_length(self) -> float:
         """Sum of the natural lengths [m]."""
         return float(self.natural_length.sum())
 
     @property
-    def area(self):
+    def area(self) -> float:
         """Area of the bounding box [m²]: the product of its two largest sides, for a flat web those in x and y."""
         return float(np.sort(np.ptp(self.points, axis=0))[1:].prod())
 
     @property
-    def centre(self):
+    def centre(self) -> int:
         """Number of the node nearest the origin, of a cable nearest half its length; ties go to lowest y, then x."""
         size = np.ptp(self.points, axis=0).max()
         if self.kind == "cable":
@@ -136,7 +140,7 @@ class Web:
         return int(near[0])
 
     @property
-    def corners(self):
+    def corners(self) -> NDArray[np.int64]:
         """Numbers of the hull's vertices, sorted, shape (k,); refused unless the web lies in z = 0."""
         from scipy.spatial import ConvexHull, QhullError
 
@@ -155,11 +159,11 @@ class Web:
         return np.sort(hull[turn > _TIE]).astype(np.int64)
 
     @property
-    def bare(self):
+    def bare(self) -> NDArray[np.int64]:
         """Numbers of the nodes that no line uses, sorted, shape (k,)."""
         return np.flatnonzero(np.bincount(self.lines.ravel(), minlength=len(self.points)) == 0)
 
-    def components(self):
+    def components(self) -> tuple[int, NDArray[np.int32]]:
         """Number of connected parts and the part each node belongs to, shape (nodes,)."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
@@ -168,7 +172,7 @@ class Web:
         graph = coo_array((np.ones(len(self.lines), dtype=np.int8), tuple(self.lines.T)), shape=(n, n))
         return connected_components(graph, directed=False)
 
-    def find(self, selection, name="node"):
+    def find(self, selection: Any, name: str = "node") -> NDArray[np.int64]:
         """Node numbers of a selection.
 
         Parameters
@@ -194,7 +198,7 @@ class Web:
             numbers = [self._find_one(name, selection)]
         return np.array(list(dict.fromkeys(chain(*numbers))), dtype=np.int64)
 
-    def find_around(self, selection):
+    def find_around(self, selection: Any) -> NDArray[np.int64]:
         """Find nodes, as `find`, in their order around: nodes of one name counterclockwise around their middle."""
         numbers = self.find(selection)
         if not isinstance(selection, str) or len(numbers) < 3:
@@ -204,7 +208,7 @@ class Web:
         turn = np.copysign(1.0, normal[np.abs(normal).argmax()] * np.linalg.det([first, second, normal]))
         return numbers[np.argsort(turn * np.arctan2(away @ second, away @ first), kind="stable")]
 
-    def find_lines(self, selection, name="lines"):
+    def find_lines(self, selection: Any, name: str = "lines") -> NDArray[np.int64]:
         """Line numbers of a selection.
 
         Parameters
@@ -264,7 +268,7 @@ def _first(bad):
     return np.flatnonzero(bad)[:1].tolist()
 
 
-def in_range(name, numbers, count):
+def in_range(name: str, numbers: Any, count: int) -> NDArray[np.int64]:
     """Numbers as int64; refuse those that are not 0 … count − 1."""
     numbers = np.asarray(numbers)
     if numbers.size and numbers.dtype.kind not in "iu":

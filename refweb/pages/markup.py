@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import json
 from html import escape
+from typing import Any
 
 
 class Html(str):
@@ -22,7 +23,7 @@ def html(content):
     return content if isinstance(content, Html) else Html(escape(str(content)))
 
 
-def tag(name, content: str | list | tuple = "", **attributes):
+def tag(name, content: str | list[Any] | tuple[Any, ...] = "", **attributes):
     """An element around its content; ``class_`` is the attribute class, and _ in a name of others stands for -."""
     given = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(str(value))}"' for key, value in attributes.items())
     return Html(f"<{name}{given}>{html(content)}</{name}>")

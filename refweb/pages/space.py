@@ -11,7 +11,7 @@ colour bar.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,12 +47,12 @@ class Space(NamedTuple):
         Numbers of the frames that are there, and of those that cannot be read.
     """
 
-    head: dict
+    head: dict[str, Any]
     text: str
     error: float
     extent: float
-    numbers: list
-    missing: list
+    numbers: list[Any]
+    missing: list[Any]
 
 
 def space_of(record, peak=None, limit=None, progress=None):

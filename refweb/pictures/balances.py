@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,8 +37,8 @@ class EnergyBalance(NamedTuple):
         Energy at the start plus work [J]; it equals ``top`` if the energy balance closes.
     """
 
-    parts: dict
-    smallest: dict
+    parts: dict[str, Any]
+    smallest: dict[str, Any]
     top: np.ndarray
     given: np.ndarray
 
@@ -196,7 +196,7 @@ class MomentumBalancePlot(NamedTuple):
     """
 
     momentum: np.ndarray
-    impulses: dict
+    impulses: dict[str, Any]
 
     @property
     def given(self):

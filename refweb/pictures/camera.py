@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ class View:
 
     axes: np.ndarray
     centre: np.ndarray
-    half: tuple
+    half: tuple[Any, ...]
     perspective: bool
 
     @classmethod

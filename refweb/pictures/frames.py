@@ -11,7 +11,7 @@ import io
 import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -58,10 +58,10 @@ class Frame(NamedTuple):
     paths: np.ndarray
     origin: np.ndarray
     tree: bool
-    fields: dict
+    fields: dict[str, Any]
     slack: np.ndarray
     supports: np.ndarray
-    bodies: dict
+    bodies: dict[str, Any]
     ends: np.ndarray
     lifted: np.ndarray
     swing: np.ndarray | None
@@ -126,7 +126,7 @@ class Listed(NamedTuple):
     """A frame of ``web.pvd``: its time, and the path of each of its meshes by name."""
 
     time: float
-    paths: dict
+    paths: dict[str, Any]
 
 
 def listed(folder):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ class Balls:
     """Markers: centres [m], shape (balls, 3); one colour in 0…1; radius [m]."""
 
     centres: np.ndarray
-    colour: tuple
+    colour: tuple[Any, ...]
     radius: float
 
 
@@ -34,4 +35,4 @@ class Surface:
 
     points: np.ndarray
     triangles: np.ndarray
-    colour: tuple
+    colour: tuple[Any, ...]

@@ -70,7 +70,7 @@ def plotter_of(size, off_screen=False):
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), lighting="none")
-    plotter.background_color = "white"
+    plotter.set_background("white")
     for position, intensity in LIGHTS:
         plotter.add_light(pyvista.Light(position=position, intensity=intensity, light_type="camera light"))
     return plotter

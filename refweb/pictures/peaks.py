@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..results.observables.observe import observes_of
 
@@ -31,7 +31,7 @@ class Largest(NamedTuple):
     line: int | None
     time: float | None
     source: str = ""
-    within: tuple | None = None
+    within: tuple[Any, ...] | None = None
 
     def times(self, factor, source):
         """The same with all values times a factor."""

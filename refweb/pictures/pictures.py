@@ -12,6 +12,7 @@ import functools
 import io
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +28,12 @@ from .polygons import polygons
 from .record import of_folder, of_solution
 from .stage import DARK, PALE, Look, Seen, Stage, limits_of
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from os import PathLike
+
+    from matplotlib.figure import Figure
+
 SIZE = (1600, 1000)
 """Of a picture [pixel]."""
 LABELS = ("lines",)
@@ -35,7 +42,17 @@ MOST_SCALED = 1e6
 """Largest factor on displacements."""
 
 
-def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, view=None, out=None, labels=None):
+def picture(
+    source: SolutionData | str | PathLike[str],
+    frame: int | None = None,
+    time: float | None = None,
+    field: str | None = None,
+    range: Sequence[float] | str | None = None,
+    scale: float = 1.0,
+    view: Sequence[float] | str | None = None,
+    out: str | PathLike[str] | None = None,
+    labels: str | None = None,
+) -> Figure:
     """Draw one frame of a run.
 
     Parameters

@@ -7,7 +7,7 @@ import tomllib
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,11 +55,11 @@ class Record(NamedTuple):
 
     name: str
     kind: str
-    summary: dict
-    scene: dict
-    times: dict
+    summary: dict[str, Any]
+    scene: dict[str, Any]
+    times: dict[int, float]
     frame: Callable[[int], Frame]
-    table: Callable[[], tuple]
+    table: Callable[[], tuple[Any, ...]]
 
     @property
     def title(self):

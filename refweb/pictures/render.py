@@ -83,7 +83,7 @@ class Renderer:
 
         while self._child is not None or self._kinds:
             if self._child is None:
-                self._start(*self._kinds.pop(0))
+                self._child = self._start(*self._kinds.pop(0))
             try:
                 return self._child.submit(images, model).result(SECONDS_PER_FRAME)
             except (OSError, BrokenExecutor, TimeoutError) as error:
@@ -93,7 +93,7 @@ class Renderer:
         return None
 
     def _start(self, window, display):
-        """Start a child."""
+        """Start a child, an executor of one process."""
         from loky import ProcessPoolExecutor
 
         from .opengl import open_off_screen
@@ -101,7 +101,7 @@ class Renderer:
         environment = {} if display else {"DISPLAY": "", "WAYLAND_DISPLAY": ""}
         if window:
             environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
-        self._child = ProcessPoolExecutor(1, initializer=open_off_screen, initargs=self._job, env=environment)
+        return ProcessPoolExecutor(1, initializer=open_off_screen, initargs=self._job, env=environment)
 
     def _end(self):
         if self._child is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class Ink(NamedTuple):
     """Style of one of several curves: colour, style of lines, marker."""
 
     colour: str
-    style: str | tuple
+    style: str | tuple[Any, ...]
     marker: str
 
     @classmethod
@@ -54,7 +54,7 @@ class Panel(NamedTuple):
         Notes below the sheet, each once.
     """
 
-    draw: Callable
+    draw: Callable[..., Any]
     along: str
     height: float = TALL
     notes: tuple[str, ...] = ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class Look(NamedTuple):
     """
 
     field: str
-    limits: tuple
+    limits: tuple[Any, ...]
     scale: float = 1.0
     view: object = None
     remark: str = ""
@@ -84,7 +84,7 @@ class Seen(NamedTuple):
 
     points: np.ndarray
     supports: np.ndarray
-    bodies: dict
+    bodies: dict[str, Any]
     origin: np.ndarray
     moved: float
     tree: bool
@@ -92,7 +92,7 @@ class Seen(NamedTuple):
     broken: bool
     lower: float
     upper: float
-    masses: tuple = ()
+    masses: tuple[Any, ...] = ()
 
     @classmethod
     def of(cls, frame, field):
@@ -156,8 +156,8 @@ class Stage:
     """
 
     options: Look
-    views: list
-    rectangles: list
+    views: list[Any]
+    rectangles: list[Any]
     radius: float
     origin: np.ndarray
     middle: np.ndarray

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,9 +37,9 @@ class Rows(NamedTuple):
         Names of columns.
     """
 
-    summary: dict
-    rows: list
-    columns: list
+    summary: dict[str, Any]
+    rows: list[Any]
+    columns: list[Any]
 
     @property
     def results(self):

@@ -18,7 +18,7 @@ import socket
 import tempfile
 import warnings
 import zipfile
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..errors import InputError, SolverError
 from ..messages import one_line
@@ -45,20 +45,20 @@ class Job(NamedTuple):
     """
 
     key: str
-    given: dict
+    given: dict[str, Any]
     folder: str | None
     file: str
     keeps: str
-    home: tuple
-    files: dict
+    home: tuple[Any, ...]
+    files: dict[str, Any]
 
 
 class Outcome(NamedTuple):
     """Outcome of a case: cells of its row, the content of its ``run.json``, its result folder as an archive."""
 
     key: str
-    cells: dict
-    summary: dict | None = None
+    cells: dict[str, Any]
+    summary: dict[str, Any] | None = None
     archive: bytes | None = None
 
 

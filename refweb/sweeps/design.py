@@ -7,7 +7,7 @@ import itertools
 import json
 import pathlib
 import warnings
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,18 +43,18 @@ class Case(NamedTuple):
         Its scene as a file would have it.
     """
 
-    values: dict
+    values: dict[str, Any]
     group: int
     draw: int
     part: str = ""
     key: str = ""
-    given: dict | None = None
+    given: dict[str, Any] | None = None
 
 
 class Base(NamedTuple):
     """The scene that cases differ from: what a file says, the folder that paths in it start at, and its name."""
 
-    given: dict
+    given: dict[str, Any]
     folder: pathlib.Path | None
     file: str
 

@@ -7,12 +7,15 @@ import os
 import pathlib
 import tomllib
 from dataclasses import field as plain_field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError, in_file, refused_at
 from ..messages import nearest, quote, short
 from ..tables import Several, Table, boolean, checked, choice, field, integer, numbers_list, real, table, text
+
+if TYPE_CHECKING:
+    from os import PathLike
 
 SHIPPED_STUDIES = pathlib.Path(__file__).parent / "shipped"
 """Folder of the studies shipped with refweb."""
@@ -32,7 +35,7 @@ class Range(NamedTuple):
     count: int | None
     log: bool
 
-    def at(self, share):
+    def at(self, share: float) -> float:
         """The number at a share of the way, 0 to 1."""
         if share in (0.0, 1.0):
             return self.high if share else self.low
@@ -45,24 +48,24 @@ class Distribution(NamedTuple):
     """A distribution of scipy, by name, and its parameters."""
 
     name: str
-    keys: tuple
+    keys: tuple[Any, ...]
 
     @property
-    def frozen(self):
+    def frozen(self) -> Any:
         """Frozen distribution of `scipy.stats`, with its parameters."""
         from scipy import stats
 
         return getattr(stats, self.name)(**dict(self.keys))
 
     @property
-    def discrete(self):
+    def discrete(self) -> bool:
         """True if its values are whole numbers."""
         from scipy import stats
 
         return isinstance(getattr(stats, self.name), stats.rv_discrete)
 
 
-def read_parameters(name, given):
+def read_parameters(name: str, given: Any) -> dict[str, Any]:
     """Parameters of a study by path: a list of cases, a `Range` or a `Distribution`."""
     if not isinstance(given, dict) or not given:
         raise InputError(f'{name} = {quote(given)} must be a table of values by path, "solve.duration" = [0.1, 0.2]')
@@ -145,7 +148,7 @@ def _distribution(value):
     return distribution
 
 
-def parameters():
+def parameters() -> Any:
     """Values that vary, by path."""
     number = {"type": "number"}
     ranged = {"type": "object", "properties": {"from": number, "to": number}, "additionalProperties": True}
@@ -157,7 +160,7 @@ def parameters():
     return field(read)
 
 
-def texts_by_name():
+def texts_by_name() -> Any:
     """Texts by name."""
 
     @accepts(by_name({"type": "string"}))
@@ -228,33 +231,33 @@ class Study(Table):
     """
 
     scene: str = text()
-    parameters: dict = parameters()
+    parameters: dict[str, Any] = parameters()
     title: str = text(default="study", limit=200)
     sample: str = choice(*DESIGNS, *SAMPLES, default="grid")
     count: int | None = integer(default=None, at_least=1, at_most=MOST_CASES)
     seed: int = integer(default=0, at_least=0, at_most=2**63 - 1)
     skip: str | None = text(default=None)
     keep: str = choice("none", "json", "all", default="none")
-    conditions: dict = texts_by_name()
+    conditions: dict[str, Any] = texts_by_name()
     quantiles: Several = numbers_list(default=(0.05, 0.5, 0.95))
     confidence: float = real(default=0.95, above=0, below=1)
     indices: bool = boolean(default=False)
     folder: pathlib.Path | None = plain_field(default=None, compare=False, metadata={"read": lambda name, value: value})
 
     @property
-    def listed(self):
+    def listed(self) -> dict[str, list[Any]]:
         """Parameters that are lists, and in designs ranges, with all their values."""
         return {path: _values(values) for path, values in self.parameters.items() if path not in self.drawn}
 
     @property
-    def drawn(self):
+    def drawn(self) -> dict[str, Range | Distribution]:
         """Parameters of which samples are taken."""
         sampled = self.sample in SAMPLES
         return {
             p: values for p, values in self.parameters.items() if sampled and isinstance(values, Range | Distribution)
         }
 
-    def check(self):
+    def check(self) -> None:
         """Refuse what does not fit together."""
         for q in self.quantiles:
             if not 0.0 < q < 1.0:
@@ -295,7 +298,7 @@ class Study(Table):
             text = ", ".join(f"{path} has {number}" for path, number in lengths.items())
             raise InputError(f'sample = "zip" needs as many values of each parameter: {text}')
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """The study as plain TOML values."""
         given = {key: value for key, value in super().to_dict().items() if key not in ("folder", "parameters")}
         return {key: value for key, value in given.items() if value != {}} | {
@@ -320,12 +323,12 @@ def _plain(parameter):
     return [list(x) if isinstance(x, tuple) else x for x in parameter]
 
 
-def shipped():
+def shipped() -> dict[str, pathlib.Path]:
     """Paths of the studies shipped with refweb, by name."""
     return {path.stem: path for path in sorted(SHIPPED_STUDIES.glob("*.toml"))}
 
 
-def is_study(source):
+def is_study(source: Any) -> bool:
     """True for a study file, and for the name of a shipped study that no file and no shipped scene has."""
     path = pathlib.Path(source)
     if not os.path.isfile(path):  # False of a name that no file can have
@@ -337,7 +340,7 @@ def is_study(source):
     return "web" not in given and {"scene", "parameters"} <= given.keys()
 
 
-def load(source) -> Study:
+def load(source: str | PathLike[str]) -> Study:
     """The study of a TOML file, or of the name of a study shipped with refweb.
 
     Raises

@@ -16,6 +16,8 @@ from .design import groups
 from .study import Study
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas
 
 
@@ -49,21 +51,21 @@ class Sweep:
     """
 
     study: Study
-    cases: list
+    cases: list[Any]
     title: str
-    rows: list = field(default_factory=list)
-    columns: list = field(default_factory=list)
-    chances: list = field(default_factory=list)
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    columns: list[str] = field(default_factory=list)
+    chances: list[dict[str, Any]] = field(default_factory=list)
     status: str = "running"
     message: str = ""
-    warnings: list = field(default_factory=list)
-    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "compile_s": 0.0})
+    warnings: list[str] = field(default_factory=list)
+    cost: dict[str, Any] = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "compile_s": 0.0})
     path: pathlib.Path | None = None
-    versions: dict = field(default_factory=versions)
-    reasons: list = field(default_factory=list)
+    versions: dict[str, str] = field(default_factory=versions)
+    reasons: list[str] = field(default_factory=list)
 
     @property
-    def count(self):
+    def count(self) -> dict[str, int]:
         """Number of rows of each status, a dict."""
         counts = dict.fromkeys(("solved", "failed", "refused", "lost", "skipped", "waiting"), 0)
         for row in self.rows:
@@ -80,7 +82,7 @@ class Sweep:
             names = names_of_case if names is None else names & names_of_case
         return names or set()
 
-    def gather(self, known):
+    def gather(self, known: dict[str, dict[str, Any]]) -> None:
         """Let ``rows`` be those of all cases, of what is known by their keys, and find what they say together."""
         self.rows = [row_of(self.study, case, known) for case in self.cases]
         self.columns = columns_of(self.study, self.rows)
@@ -97,7 +99,7 @@ class Sweep:
 
         return pandas.DataFrame(self.rows, columns=self.columns)
 
-    def values(self, name) -> Any:
+    def values(self, name: str) -> Any:
         """A result, or a parameter by its path, of all cases, an array; NaN where there is none."""
         import numpy as np
 
@@ -112,7 +114,7 @@ class Sweep:
         plain = all(cell is None or isinstance(cell, int | float) for cell in cells)
         return np.array([np.nan if cell is None else cell for cell in cells], dtype=float if plain else object)
 
-    def summary(self):
+    def summary(self) -> dict[str, Any]:
         """The content of ``run.json``, a dict of plain values; ``kind`` is "sweep"."""
         return {
             "kind": "sweep",
@@ -132,12 +134,12 @@ class Sweep:
             "warnings": self.warnings,
         }
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         text = ", ".join(f"{number} {status}" for status, number in self.count.items())
         return f'<Sweep of "{self.title}": {len(self.cases)} cases, {text or "none run"}>'
 
 
-def row_of(study, case, known):
+def row_of(study: Study, case: Any, known: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """The row of a case: its values, and what is known by its key."""
     values = {path: case.values[path] for path in study.parameters}
     if case.given is None:
@@ -146,13 +148,13 @@ def row_of(study, case, known):
     return {"case": case.key, **values, **{k: v for k, v in known_row.items() if k != "case" and k not in values}}
 
 
-def columns_of(study, rows):
+def columns_of(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
     """All columns in their order."""
     middle = dict.fromkeys([*study.parameters, *(name for row in rows for name in row)])
     return [*FIRST, *(name for name in middle if name not in (*FIRST, *LAST)), *LAST]
 
 
-def finite(given):
+def finite(given: Any) -> Any:
     """Plain values without infinite numbers, which JSON does not have."""
     if isinstance(given, dict):
         return {key: finite(value) for key, value in given.items()}

@@ -15,6 +15,7 @@ import time
 import tomllib
 from collections import Counter
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, in_file
 from ..messages import quote, short
@@ -31,16 +32,19 @@ from .study import Study, load
 from .study_result import Sweep, columns_of, row_of
 from .workers import Given, Processes, through
 
+if TYPE_CHECKING:
+    from os import PathLike
+
 
 def sweep(
-    scene,
-    parameters=None,
-    out=None,
-    executor=None,
-    workers=None,
-    progress: bool | Callable | None = True,
-    announce=None,
-    **options,
+    scene: Scene | Study | str | PathLike[str],
+    parameters: dict[str, Any] | None = None,
+    out: str | PathLike[str] | None = None,
+    executor: Any = None,
+    workers: int | None = None,
+    progress: bool | Callable[..., Any] | None = True,
+    announce: Callable[[Sweep], object] | None = None,
+    **options: Any,
 ) -> Sweep:
     """Run a scene with many values.
 

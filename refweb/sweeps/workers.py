@@ -57,7 +57,8 @@ class Processes:
 
     def __init__(self, count=None):
         self.parallel = count or cores()
-        self._pool = self._alive = None
+        self._pool: Any = None
+        self._alive: Any = None
 
     def submit(self, job):
         """Hand out a job; a `concurrent.futures.Future`."""

@@ -66,7 +66,8 @@ class Carried:
     """
 
     def __init__(self, net, terms):
-        self.turns, self._terms, self._entries, self._spun = RigidRotations.of(net), terms, [], None
+        self.turns, self._terms = RigidRotations.of(net), terms
+        self._entries, self._spun = [], []  # made once there is a pattern
         turns, nodes = self.turns, self.turns.carried[:, 0]
         self._cells = [
             _Cell(i, int(at), term.cells[at], turns)
@@ -94,7 +95,7 @@ class Carried:
 
     def _arrange(self, pattern, free):
         """Find where entries stand in the pattern of a system, which has `cells`."""
-        if self._spun is not None:
+        if self._spun:
             return
         number = np.full(3 * max(3 + self.turns.rows.max(), 1 + free.max(initial=0) // 3), -1)
         number[free] = np.arange(len(free))

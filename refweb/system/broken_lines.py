@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import copy
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 class Breaks(NamedTuple):
@@ -32,7 +35,7 @@ class Breaks(NamedTuple):
     places: np.ndarray = np.zeros((0, 3))
     widths: np.ndarray = np.zeros(0)
 
-    def and_then(self, *more):
+    def and_then(self, *more: NDArray[Any]) -> Breaks:
         """These and more, which are given as the fields are."""
         return Breaks(*(np.concatenate([before, after]) for before, after in zip(self, more, strict=True)))
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import copy
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,11 +27,27 @@ from ..net.rotation import turn_by
 from .forces import Forces, PerCell
 from .start import initial_velocity, laid
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ..effects.natural_lengths import NaturalLengths
+    from ..net.laws.line_data import LineData
+    from ..net.net import Net
+    from ..net.rigid_body import RigidBody
+    from .contact_forces import ContactForces
+    from .factorization import Library
+    from .links import Links
+    from .mass import Mass
+    from .sparsity import Pattern
+    from .unsupported_parts import Part
+
 MOST_TURN = 0.5
 """Largest angle by which a step of statics turns a body [rad]."""
 
 
-def parts_of(effects, net):
+def parts_of(effects: Sequence[Any], net: Net) -> list[Any]:
     """Terms, motions, constraints and limits of effects on a net, in their order, a list."""
     parts = [effect.on(net) for effect in effects if hasattr(effect, "on")]
     return [item for part in parts for item in (part if isinstance(part, list) else [part])]
@@ -69,33 +86,37 @@ class System:
         quaternions: so it is in statics.
     """
 
-    def __init__(self, net, effects, supported, factorization="auto"):
+    def __init__(
+        self, net: Net, effects: Sequence[Any], supported: NDArray[np.bool_], factorization: str = "auto"
+    ) -> None:
         for effect in sorted(effects, key=lambda effect: hasattr(effect, "on")):  # bodies before what makes them turn
             if hasattr(effect, "extend"):
                 net = effect.extend(net)
         net = with_rotations(net)
-        self.net, self.effects = net, effects
-        self.rows = len(net.points)
+        self.net: Net = net
+        self.effects: Sequence[Any] = effects
+        self.rows: int = len(net.points)
         acting = parts_of(effects, net)
         if any(body.axle and body.axle.torque for body in net.bodies):
             from ..effects.axle import torques
 
             acting += torques(net)
-        self.terms = [a for a in acting if isinstance(a, ForceTerm)]
-        self.drives = [a for a in acting if isinstance(a, PrescribedMotion)]
-        self.constraints = [a for a in acting if isinstance(a, Constraint)]
-        self.weakness = next((a for a in acting if isinstance(a, BreakLimits)), None)
+        self.terms: list[ForceTerm] = [a for a in acting if isinstance(a, ForceTerm)]
+        self.drives: list[PrescribedMotion] = [a for a in acting if isinstance(a, PrescribedMotion)]
+        self.constraints: list[Constraint] = [a for a in acting if isinstance(a, Constraint)]
+        self.weakness: BreakLimits | None = next((a for a in acting if isinstance(a, BreakLimits)), None)
         if sum(term.over_lines and term.balance.power is not None for term in self.terms) > 1:
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
-        self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
+        bodies = np.zeros((self.rows - len(supported), 3), dtype=bool)
+        self.supported: NDArray[np.bool_] = np.vstack([supported, bodies])
         for body in net.bodies:
             self.supported[body.row] = self.supported[body.base] = body.fixed or bool(body.axle)
         for drive in self.drives:
             self.supported[drive.cells[:, 0]] = True
-        self.angles = net.quasi_static and self.turning
+        self.angles: bool = net.quasi_static and self.turning
         if self.angles:
             self.supported[[body.turn for body in net.bodies if body.turn is not None]] = True
-        self.carried = np.zeros(self.rows, dtype=bool)
+        self.carried: NDArray[np.bool_] = np.zeros(self.rows, dtype=bool)
         self.carried[net.carried] = True
         self.supported[self.carried] = True
         self._factorization = factorization
@@ -103,47 +124,47 @@ class System:
             _ = self.library  # which refuses it where it is not installed
         self.arrange()
 
-    def arrange(self):
+    def arrange(self) -> None:
         """Find what follows from what is supported and acts."""
-        self.free = np.flatnonzero(~self.supported)
+        self.free: NDArray[np.int64] = np.flatnonzero(~self.supported)
         self._zero = np.zeros((self.rows, 3))
         self._at_time = None  # the last time that lengths were asked for, and `line_data` then, which stays as it is
 
     @cached_property
-    def library(self):
+    def library(self) -> Library:
         """Library that factorizes its symmetric matrices, a `refweb.system.factorization.Library`."""
         from .factorization import Library
 
         return Library(self._factorization)
 
     @property
-    def fixed(self):
+    def fixed(self) -> NDArray[np.bool_]:
         """Components of places that supports hold, axles, or prescribed motion, shape (rows, 3)."""
         fixed = self.supported & ~self.carried[:, None]
         fixed[self.rows - self.net.spins :] = False
         return fixed
 
     @property
-    def factorized_by(self):
+    def factorized_by(self) -> str | None:
         """The library that has factorized and the reason, in words; None where none has."""
         return self.library.why if "library" in self.__dict__ else None
 
-    def remarks(self):
+    def remarks(self) -> list[Finding]:
         """Findings on the factorizations."""
         remarks = self.library.remarks if "library" in self.__dict__ else []
         return [Finding("slow-library", text, "solve") for text in remarks]
 
     @cached_property
-    def laid(self):
+    def laid(self) -> NDArray[np.float64] | None:
         """Displacement at the start [m], shape (rows, 3); None where the web starts as it is."""
         return laid(self)
 
-    def initial_velocity(self):
+    def initial_velocity(self) -> NDArray[np.float64]:
         """Velocities at the start [m/s], shape (rows, 3): those of the effects and bodies."""
         return initial_velocity(self)
 
     @property
-    def lines(self):
+    def lines(self) -> ForceTerm | None:
         """The `ForceTerm` of the lines by their law; None where they have no tension."""
         return next((term for term in self.terms if term.over_lines), None)
 
@@ -153,7 +174,7 @@ class System:
         return [f for f in self.terms if f.tangent.stiffness is not None or f.velocity.damping is not None]
 
     @cached_property
-    def pattern(self):
+    def pattern(self) -> Pattern:
         """The fixed `refweb.system.sparsity.Pattern` of the tangent."""
         from .sparsity import Pattern
 
@@ -162,7 +183,7 @@ class System:
         return Pattern(self.rows, self.free, [f.cells for f in self._in_tangent], self.library, also)
 
     @cached_property
-    def carriers(self):
+    def carriers(self) -> Any:
         """The `refweb.system.attached_nodes.Carried` of bodies that carry nodes; None where none does.
 
         At rest the `refweb.system.resting_bodies.RestingBodies` of those that turn.
@@ -178,7 +199,7 @@ class System:
         return Carried(self.net, self._in_tangent)
 
     @cached_property
-    def levers(self):
+    def levers(self) -> NDArray[np.float64]:
         """Length of each row [m], shape (rows,), by which moments and rotations compare with forces and places.
 
         1 of what is no rotation.
@@ -189,38 +210,38 @@ class System:
                 levers[body.spin] = max([body.extent, *np.linalg.norm(body.points, axis=1)])
         return levers
 
-    def sizes(self, force):
+    def sizes(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Size of the force on each row [N], of a moment that over its lever, shape (rows,)."""
         sizes = np.linalg.norm(force, axis=1)
         return sizes / self.levers if self.net.spins else sizes
 
     @property
-    def resting(self):
+    def resting(self) -> list[RigidBody]:
         """Free bodies whose places are unknowns, and at rest those that turn about axles, a list."""
         on_axles = [
             body for body in self.net.bodies if self.angles and body.axle and not self.supported[body.spin].all()
         ]
         return [body for body in self.net.bodies if body in on_axles or not self.supported[body.row].all()]
 
-    def moved(self, x, step):
+    def moved(self, x: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
         """Displacement [m] behind a step of all rows, both of shape (rows, 3); bodies turn by rotation vectors."""
         y = x + step
         if self.angles:
             turn_by(x, y, np.zeros_like(y), self.carriers.turns)
         return y
 
-    def rows_of(self, p):
+    def rows_of(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
         """A step of the unknowns as one of all rows, shape (rows, 3)."""
         step = np.zeros((self.rows, 3))
         step.ravel()[self.free] = p
         return step
 
-    def largest_share(self, p):
+    def largest_share(self, p: NDArray[np.float64]) -> float:
         """Largest share, up to 1, of a step of the unknowns that keeps a tangent meaningful.
 
         It turns no body by more than `MOST_TURN`, and takes none that touches the web farther than half its thickness.
         """
-        share, step = 1.0, self.rows_of(p) if self.resting else None
+        share, step = 1.0, self.rows_of(p)
         for body in self.resting:
             turn = 0.0 if body.turn is None else float(np.linalg.norm(step[body.spin])) / MOST_TURN
             shift = float(np.linalg.norm(step[body.row])) / (0.5 * body.thickness) if self.contact else 0.0
@@ -228,13 +249,13 @@ class System:
         return share
 
     @cached_property
-    def mass(self):
+    def mass(self) -> Mass:
         """The `refweb.system.mass.Mass`."""
         from .mass import Mass
 
         return Mass(self.net, self.free, self.pattern, self._lines_in_tangent)
 
-    def mass_at(self, x):
+    def mass_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of M of the unknowns [kg] at displacement x; of rotations of bodies their inertia there [kg m²]."""
         return self.carriers.tensors(self.mass.values, self, x) if self.angles else self.mass.values
 
@@ -244,30 +265,30 @@ class System:
         return next((i for i, term in enumerate(self._in_tangent) if term.over_lines), None)
 
     @cached_property
-    def unsupported_parts(self):
+    def unsupported_parts(self) -> list[Part]:
         """Parts of the net that can be carried off, a list of `refweb.system.unsupported_parts.Part`."""
         from .unsupported_parts import find_parts
 
         return find_parts(self)
 
-    def per_cell(self):
+    def per_cell(self) -> PerCell:
         """`PerCell` of new arrays; those of terms over the lines are one."""
         lines = np.zeros((len(self.net.cells), max([2, *(f.columns for f in self.terms if f.over_lines)])))
         arrays = [lines if f.over_lines else np.zeros((len(f.cells), f.columns)) for f in self.terms]
         return PerCell(arrays, lines, self.tension_column)
 
     @property
-    def tension_column(self):
+    def tension_column(self) -> int:
         """Column of what the lines observe that has their whole tension."""
         return DAMPED_TENSION if any(f.over_lines and f.balance.power is not None for f in self.terms) else TENSION
 
-    def blocks(self):
+    def blocks(self) -> list[NDArray[np.float64]]:
         """New arrays for `stiffness` and `damping` to fill, shape (cells, 3 arity, 3 arity) each."""
         sizes = [(len(f.cells), 3 * f.cells.shape[1]) for f in self._in_tangent]
         return [np.empty((count, size, size)) for count, size in sizes]
 
     @property
-    def working(self):
+    def working(self) -> NDArray[np.int64]:
         """Sign of each term: 1 if its power counts as work, −1 if its power is energy lost, else 0."""
         signs = {"work": 1, "dissipated_energy": -1}
         return np.array(
@@ -275,7 +296,7 @@ class System:
         )
 
     @property
-    def corners(self):
+    def corners(self) -> NDArray[np.float64]:
         """Times at which a table of time has a corner [s], increasing."""
         times = [t for term in self.terms for t in term.timing.times]
         times += [t for drive in self.drives for t in drive.times]
@@ -283,20 +304,20 @@ class System:
         return np.unique(np.array(times, dtype=float))
 
     @cached_property
-    def lengths(self):
+    def lengths(self) -> NaturalLengths:
         """The `refweb.effects.natural_lengths.NaturalLengths` that change with time."""
         from ..effects.natural_lengths import NaturalLengths
 
         return NaturalLengths.of(self.net)
 
     @cached_property
-    def material_flow(self):
+    def material_flow(self) -> Any:
         """The `refweb.system.material_flow.MaterialFlow` of masses that follow reels."""
         from .material_flow import MaterialFlow
 
         return MaterialFlow(self)
 
-    def line_data(self, t):
+    def line_data(self, t: float) -> LineData:
         """`Net.line_data` with the natural lengths of time t."""
         if not self.net.factors:
             return self.net.line_data
@@ -309,11 +330,11 @@ class System:
             self._at_time = known = t, numbers
         return known[1]
 
-    def natural_length(self, t):
+    def natural_length(self, t: float) -> NDArray[np.float64]:
         """Natural length of each element at time t [m], shape (elements,)."""
         return self.line_data(t).natural_length
 
-    def at(self, t):
+    def at(self, t: float) -> System:
         """The system as it stands at time t: its natural lengths and masses are those of that time, and stay."""
         if not self.net.factors:
             return self
@@ -324,7 +345,7 @@ class System:
             view.__dict__.pop("mass", None)
         return view
 
-    def with_line_data(self, numbers):
+    def with_line_data(self, numbers: LineData) -> System:
         """The same system with other numbers of its lines, a `refweb.net.laws.line_data.LineData`."""
         changed = copy.copy(self)
         changed.net = replace(self.net, line_data=numbers)
@@ -332,7 +353,7 @@ class System:
         changed.__dict__.pop("lengths", None)
         return changed
 
-    def with_effects(self, effects):
+    def with_effects(self, effects: dict[str, Any]) -> System:
         """The same system with other numbers of some effects, by the name of their terms: these have the same cells."""
         changed, terms = copy.copy(self), {}
         for name, effect in effects.items():
@@ -340,17 +361,17 @@ class System:
         changed.terms = [next(terms[term.name]) if term.name in terms else term for term in self.terms]
         return changed
 
-    def data_of(self, term, t):
+    def data_of(self, term: ForceTerm, t: float) -> NDArray[np.float64]:
         """Numbers of the cells of a term at time t, shape (cells, columns)."""
-        return self.line_data(t).matrix if term.over_lines else term.data
+        return self.line_data(t).matrix if term.data is None else term.data
 
-    def length_force(self, t, x):
+    def length_force(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """∂E/∂L of each element [N], shape (elements,): with the change of L the work of reels."""
         force = np.empty(len(self.net.cells))
         length_force(self.net)(t, x, self.net.cells, self.line_data(t).matrix, force)
         return force
 
-    def drive(self, t, x, v=None):
+    def drive(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None) -> None:
         """Write displacements [m] and velocities [m/s] that are prescribed, at time t, or a body's into x and v."""
         v = np.zeros_like(x) if v is None else v
         for d in self.drives:
@@ -358,11 +379,13 @@ class System:
         if self.carriers:
             self.carriers.update_attached_nodes(x, v)
 
-    def force(self, t, x, v=None):
+    def force(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Force on every row [N], supports included, shape (rows, 3)."""
         return self.forces(t, x, v)[0]
 
-    def forces(self, t, x, v=None, per_cell=None):
+    def forces(
+        self, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None, per_cell: PerCell | None = None
+    ) -> Forces:
         """The `Forces` at displacement x and velocity v, by default at rest; written to a `per_cell`, where given."""
         v, per_cell = self._zero if v is None else v, self.per_cell() if per_cell is None else per_cell
         f = np.zeros((self.rows, 3))
@@ -372,26 +395,30 @@ class System:
             self.carriers.add_forces_to_bodies(x, f)
         return Forces(f, per_cell)
 
-    def force_of(self, term, t, x, v=None):
+    def force_of(
+        self, term: ForceTerm, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
         """Force on every row of one term [N]."""
         f, out = np.zeros((self.rows, 3)), np.zeros((len(term.cells), max(term.columns, 2)))
         term.force(t, x, self._zero if v is None else v, f, term.cells, self.data_of(term, t), out)
         return f
 
-    def outer_force(self, t, x=None, v=None):
+    def outer_force(
+        self, t: float, x: NDArray[np.float64] | None = None, v: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
         """Force on every row [N] of all but what the net does to itself, by default on the web as it is, at rest."""
         x = self._zero if x is None else x
         outer = [self.force_of(term, t, x, v) for term in self.terms if not term.balance.internal]
         return sum(outer, np.zeros((self.rows, 3)))
 
     @cached_property
-    def links(self):
+    def links(self) -> Links:
         """The `refweb.system.links.Links` of what keeps distances."""
         from .links import Links
 
         return Links(self)
 
-    def balance(self, t, x, v):
+    def balance(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64]) -> Forces:
         """`Forces` with those of links; on supports less those that consistent mass takes to move.
 
         The reaction of supports is its negative.
@@ -403,11 +430,11 @@ class System:
             force -= np.where(self.supported, self.mass.passed_on(self.mass.moved_by(force)), 0.0)
         return Forces(force, per_cell)
 
-    def row_name(self, row):
+    def row_name(self, row: int) -> str:
         """Name of a row in messages: a node by its number, a body by its name."""
         return f"node {row}" if row < self.net.nodes else f'body "{row_names(self.net.bodies)[row - self.net.nodes]}"'
 
-    def energy_of(self, term, t, x):
+    def energy_of(self, term: ForceTerm, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Energy of each cell of one term [J]."""
         out = np.zeros(len(term.cells))
         if term.energy is None:
@@ -415,11 +442,19 @@ class System:
         term.energy(t, x, term.cells, self.data_of(term, t), out)
         return out
 
-    def energy(self, t, x):
+    def energy(self, t: float, x: NDArray[np.float64]) -> float:
         """Total potential Π [J]: that of the lines and of all loads."""
         return sum(self.energy_of(f, t, x).sum() for f in self.terms)
 
-    def stiffness(self, t, x, v=None, definite=False, only=None, blocks=None):
+    def stiffness(
+        self,
+        t: float,
+        x: NDArray[np.float64],
+        v: NDArray[np.float64] | None = None,
+        definite: bool = False,
+        only: Sequence[ForceTerm] | None = None,
+        blocks: list[NDArray[np.float64]] | None = None,
+    ) -> NDArray[np.float64]:
         """Values of K = −∂f/∂x [N/m] in the fixed pattern.
 
         ``definite`` leaves out what is negative; ``only`` are the terms to take, by default all; ``blocks`` are
@@ -439,27 +474,27 @@ class System:
         return values
 
     @property
-    def symmetric(self):
+    def symmetric(self) -> bool:
         """True if K and C are symmetric."""
         felt = any(body.pivot is not None or body.carried for body in self.net.bodies if not body.prescribed)
         return all(map(self.is_symmetric, self.terms)) and (self.angles or not felt)
 
-    def is_symmetric(self, term):
+    def is_symmetric(self, term: ForceTerm) -> bool:
         """Tell if what a term has of K is symmetric: by rotation vectors all that a potential has is."""
         return term.tangent.symmetric or (self.angles and term.energy is not None)
 
     @cached_property
-    def turning(self):
+    def turning(self) -> bool:
         """True if there are bodies whose orientation counts."""
         return any(body.turn is not None for body in self.net.bodies)
 
     @property
-    def conservative(self):
+    def conservative(self) -> bool:
         """True if every force has a potential."""
         return self.symmetric and all(f.energy is not None for f in self.terms)
 
     @property
-    def dead(self):
+    def dead(self) -> bool:
         """True if the only internal forces are the tensions of the lines, and all others are dead loads.
 
         Where bodies are free it is not so: what they carry turns with them.
@@ -471,35 +506,37 @@ class System:
         return all(f.tangent.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
 
     @property
-    def convex(self):
+    def convex(self) -> bool:
         """True if the potential is convex and the loads are dead: `refweb.statics.duality_bound` then bounds errors."""
         net = self.net
         negative = net.forming & (net.line_data.ea <= 0.0)
         return bool((net.law_is("convex") & ~negative).all()) and self.dead
 
     @property
-    def contact(self):
+    def contact(self) -> bool:
         """True if the web may touch bodies."""
         return any(term.contact.with_lines for term in self.terms)
 
     @cached_property
-    def contact_forces(self):
+    def contact_forces(self) -> ContactForces:
         """The `refweb.system.contact_forces.ContactForces` on its bodies."""
         from .contact_forces import ContactForces
 
         return ContactForces(self)
 
     @property
-    def rotating(self):
+    def rotating(self) -> list[ForceTerm]:
         """Terms of the forces of inertia in a frame that turns, none where none does."""
         return [term for term in self.terms if term.frame.angular_velocity is not None]
 
     @property
-    def orbit_radius(self):
+    def orbit_radius(self) -> float | None:
         """Radius of the orbit that the web is in [m], None where it is in none."""
         return next((f.frame.orbit_radius for f in self.terms if f.frame.orbit_radius is not None), None)
 
-    def damping(self, t, x, v, blocks=None):
+    def damping(
+        self, t: float, x: NDArray[np.float64], v: NDArray[np.float64], blocks: list[NDArray[np.float64]] | None = None
+    ) -> NDArray[np.float64] | None:
         """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity.
 
         ``blocks`` are `blocks` to write to, which a loop keeps.
@@ -516,7 +553,7 @@ class System:
             self.carriers.add_damping(values, self, x, v, blocks)
         return values
 
-    def across_lines(self, tension):
+    def across_lines(self, tension: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of the stiffness of lines as built across themselves, by a tension in each [N], shape (elements,).
 
         Free bodies have that of the mean line beside what lines hold of them, so that it is definite.
@@ -533,6 +570,6 @@ class System:
             self.carriers.add_across(values, self, self._lines_in_tangent, blocks)
         return values
 
-    def assemble_lines(self, blocks):
+    def assemble_lines(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values in the fixed pattern of one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""
         return self.pattern.assemble_one(self._lines_in_tangent, blocks)

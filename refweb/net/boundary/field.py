@@ -149,7 +149,7 @@ class Field:
 
     numbers: np.ndarray
     spacing: float
-    counts: tuple
+    counts: tuple[Any, ...]
     error: float
     thickness: float
     offset: float

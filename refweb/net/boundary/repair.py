@@ -17,7 +17,7 @@ manifold3d it gives all, and leaves gaps: between two boxes 1e-6 m apart the dep
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -67,10 +67,10 @@ class Repaired(NamedTuple):
 
     points: np.ndarray
     triangles: np.ndarray
-    boundary: tuple
+    boundary: tuple[Any, ...]
     moments: Moments
     winding: Winding
-    remarks: tuple
+    remarks: tuple[Any, ...]
 
 
 def repaired(points, triangles, cells):

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ...tables import Several
 from ..rigid_body import Grown, Shape, axes_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
 
 GRID = 48
 """Number of cells of the grid along the longest side, where none is given and no wall is too thin for it."""
@@ -56,8 +61,8 @@ class Solid(NamedTuple):
     inertia: np.ndarray
     field: Any
     convex: bool
-    remarks: tuple
-    felt: tuple | None = None
+    remarks: tuple[Any, ...]
+    felt: tuple[Any, ...] | None = None
     winding: Any = None
     error: float | None = None
 
@@ -68,7 +73,7 @@ class Filled(Shape):
     solid: Any
     axes: Several
 
-    def grown(self):
+    def grown(self) -> Grown:
         """No core: the box that it fills about its centre, within its error, and where its field's numbers stand."""
         field = self.solid.field
         size = tuple((np.abs(self.solid.points).max(axis=0) + field.error).tolist())
@@ -77,35 +82,35 @@ class Filled(Shape):
         )
 
     @property
-    def extent(self):
+    def extent(self) -> float:
         """Largest distance from its centre to its surface, within its error [m]."""
         return float(np.linalg.norm(self.solid.points, axis=1).max()) + self.solid.field.error
 
-    def frame(self):
+    def frame(self) -> NDArray[np.float64]:
         """Unit vectors of the axes of the file."""
         return axes_of(self.axes)
 
-    def volume(self):
+    def volume(self) -> float:
         """Its volume [m³]."""
         return self.solid.volume
 
-    def inertia(self, mass):
+    def inertia(self, mass: float) -> NDArray[np.float64]:
         """Tensor of inertia of a uniform mass about its centre [kg m²], along its axes, shape (3, 3)."""
         return mass / self.solid.volume * self.solid.inertia
 
-    def depth(self):
+    def depth(self) -> Any:
         """Kernel of the depth that its field has."""
         from ..boundary.field import depth
 
         return depth
 
-    def skeleton(self):
+    def skeleton(self) -> NDArray[Any] | None:
         """Its edges that stand out."""
         from ..skeleton import of_surface
 
         return of_surface(self.solid.points, self.solid.triangles)
 
-    def touched(self, thickness):
+    def touched(self, thickness: float) -> Grown:
         """Its field, or for what is thicker than that reaches a wider one, with `WIDE` cells along all it fills."""
         field, grown = self.solid.field, self.grown()
         if thickness <= field.margin:
@@ -122,11 +127,11 @@ class Filled(Shape):
             wide[thickness] = field_of(points, triangles, cells, around, field, self.solid.winding)
         return grown._replace(field=wide[thickness].address)
 
-    def boundary(self):
+    def boundary(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Its triangles."""
         return self.solid.points, self.solid.triangles
 
-    def remarks(self):
+    def remarks(self) -> tuple[str, ...]:
         """Remarks on repairs of its file, and on walls that are thickened."""
         return *self.solid.remarks, *self._on_thin_walls()
 
@@ -144,7 +149,7 @@ class Filled(Shape):
         """Corners and triangles of the boundary that its field is made of."""
         return self.solid.felt or (self.solid.points, self.solid.triangles)
 
-    def texts(self):
+    def texts(self) -> Iterator[str]:
         """Texts on its size, its centre of mass in the file, and the error of its field at the surface."""
         solid, field = self.solid, self.solid.field
         centre = ", ".join(f"{x:.4g}" for x in solid.centre)
@@ -153,7 +158,7 @@ class Filled(Shape):
         yield f"surface within {self.error:.1e} m on a grid of {grid} points"
 
     @property
-    def error(self):
+    def error(self) -> float | None:
         """Largest distance of the surface that lines feel from that of the file [m]."""
         return self.solid.field.error if self.solid.error is None else self.solid.error
 

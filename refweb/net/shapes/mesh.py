@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -57,16 +58,16 @@ class Mesh(Filled):
     axes: Several = rows(3, default=None)
     grid: int | None = integer(default=None, at_least=8, at_most=4096)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse axes that are not two at right angles."""
         self.frame()
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """The table as plain TOML values, the file with its folder."""
         return {**super().to_dict(), "file": str(Path(self.file).absolute())}
 
     @functools.cached_property
-    def solid(self):
+    def solid(self) -> Any:
         """The `Solid`.
 
         Raises
@@ -84,7 +85,7 @@ class Mesh(Filled):
         except OSError as error:
             raise InputError(f"file = {quote(self.file)}: cannot be read: {error.strerror or error}") from None
 
-    def settle(self):
+    def settle(self) -> None:
         """Read the file."""
         _ = self.solid
 

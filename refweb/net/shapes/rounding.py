@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ...errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 ROUNDING = 0.02
 """Radius of edges, where none is given, over the smallest size."""
@@ -13,9 +18,10 @@ def edge_radius(rounding, sizes):
     return rounding or ROUNDING * min(sizes)
 
 
-def shrunk(sizes, edge):
+def shrunk(sizes: Sequence[float], edge: float) -> tuple[float, float, float]:
     """Half sizes [m] of the core that edges of a radius leave."""
-    return tuple(max(0.5 * size - edge, 0.0) for size in sizes)
+    x, y, z = (max(0.5 * size - edge, 0.0) for size in sizes)
+    return x, y, z
 
 
 def check_rounding(rounding, sizes):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from ...errors import InputError
 from ...messages import quote
 from ...tables import Several, integer, real, rows, table, text
 from .filled import GRID, MOST, Filled, Solid, field_in
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 DEEP = 0.25
 """Depth of the ground below its lowest place, where none is given, over its longest side."""
@@ -60,16 +64,16 @@ class Terrain(Filled):
     axes: Several = rows(3, default=None)
     grid: int | None = integer(default=None, at_least=8, at_most=4096)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse axes that are not two at right angles."""
         self.frame()
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """The table as plain TOML values, the file with its folder."""
         return {**super().to_dict(), "heights": str(Path(self.heights).absolute())}
 
     @functools.cached_property
-    def solid(self):
+    def solid(self) -> Any:
         """The `Solid`, about the origin of the file.
 
         Raises
@@ -91,7 +95,7 @@ class Terrain(Filled):
         except OSError as error:
             raise InputError(f"heights = {quote(self.heights)}: cannot be read: {error.strerror or error}") from None
 
-    def skeleton(self):
+    def skeleton(self) -> NDArray[Any] | None:
         """Its edges that stand out, or none where there are too many: other bodies touch it by theirs."""
         from ..skeleton import PART
 
@@ -100,7 +104,7 @@ class Terrain(Filled):
         except InputError:
             return np.zeros(0, PART)
 
-    def settle(self):
+    def settle(self) -> None:
         """Read the file."""
         _ = self.solid
 
