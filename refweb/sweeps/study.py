@@ -1,4 +1,4 @@
-"""Studies: a scene, the values in it that vary, how they are chosen, and the results that are asked for."""
+"""Studies: the table of a study file, with a scene, its varying values, their sampling and conditions on results."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SHIPPED_STUDIES = pathlib.Path(__file__).parent / "shipped"
 """Folder of the studies shipped with refweb."""
 DESIGNS = ("grid", "zip")
-"""Ways to put lists and ranges together."""
+"""Ways to combine lists and ranges."""
 SAMPLES = ("random", "sobol", "halton", "latin-hypercube")
 """Ways to take samples of ranges and distributions."""
 MOST_CASES = 1_000_000
@@ -28,7 +28,7 @@ MOST_CASES = 1_000_000
 
 
 class Range(NamedTuple):
-    """Numbers from ``low`` to ``high``, ``count`` of them (None: as many as there are samples), or their logarithms."""
+    """``count`` numbers from ``low`` to ``high`` (None: one for each sample), equally far apart or in equal ratios."""
 
     low: float
     high: float
@@ -36,7 +36,7 @@ class Range(NamedTuple):
     log: bool
 
     def at(self, share: float) -> float:
-        """The number at a share of the way, 0 to 1."""
+        """The number at a fraction of the range, 0 to 1."""
         if share in (0.0, 1.0):
             return self.high if share else self.low
         if self.log:
@@ -76,7 +76,7 @@ _KEYS = {"from", "to", "count", "spacing", "distribution"}
 
 
 def _flat(given, above=""):
-    """(path, value): dotted keys without quotes are tables in tables to TOML."""
+    """Pairs of path and value; TOML reads dotted keys without quotes as nested tables."""
     for key, value in given.items():
         path = f"{above}.{key}" if above else str(key)
         if isinstance(value, dict) and value and all(isinstance(item, dict | list) for item in value.values()):
@@ -188,29 +188,30 @@ class Study(Table):
         }``, with equal ratios for ``spacing = "log"``; or ``{ distribution, ... }`` with the names of scipy.stats for
         distributions and their parameters.
     title : str
-        Title, by default the name of the file. Results go to a folder of that name.
+        Title, by default the name of the file. Results are written to a folder of that name.
     sample : {"grid", "zip", "random", "sobol", "halton", "latin-hypercube"}
-        Every value with every other; the first ones together, then the second ones; or samples, independent ones
-        or evenly spread, of all ranges and distributions at once, each of them with every combination of the lists.
+        "grid" combines every value with every other; "zip" the first values of all parameters, then the second ones.
+        The others take samples of all ranges and distributions together, independent or evenly spread, for every
+        combination of the lists.
     count : int, optional
         Number of samples.
     seed : int
         Seed of the samples.
     skip : str, optional
-        A condition on the parameters: cases of which it holds are not run.
+        A condition on the parameters; a case for which it is true is not run.
     keep : {"none", "json", "all"}
-        Data that are kept of each run: its row alone, also its ``run.json``, or its whole result folder.
+        Data of each run to keep: its row only, also its ``run.json``, or its whole result folder.
     conditions : dict
-        Conditions on results and parameters by name, of which the share of the cases is told, and of samples the
-        probability. Arithmetic in them carries ± along. A case that ± leaves undecided is neither true nor false: such
-        cases are counted apart, and the share has a lower and an upper value.
+        Conditions on results and parameters by name. The result is the share of cases for which a condition is true,
+        for samples its probability. ± is taken through the arithmetic of a condition. A case that ± leaves undecided is
+        neither true nor false: such cases are counted apart, and the share has a lower and an upper value.
     quantiles : sequence of float
-        Of samples: quantiles that are told of each result.
+        Quantiles of each result, for samples.
     confidence : float
         Level of the confidence intervals.
     indices : bool
-        Of samples by "sobol": whether to find Sobol's indices, which say how much of the spread comes from which
-        parameter. That takes count × (number of ranges and distributions + 2) cases instead of count.
+        True to compute Sobol's indices, the parts of the spread due to each parameter, for samples by "sobol". This
+        takes count × (number of ranges and distributions + 2) cases instead of count.
 
     Raises
     ------
@@ -246,19 +247,19 @@ class Study(Table):
 
     @property
     def listed(self) -> dict[str, list[Any]]:
-        """Parameters that are lists, and in designs ranges, with all their values."""
+        """Parameters with a list of values, and in "grid" and "zip" ranges, with all values."""
         return {path: _values(values) for path, values in self.parameters.items() if path not in self.drawn}
 
     @property
     def drawn(self) -> dict[str, Range | Distribution]:
-        """Parameters of which samples are taken."""
+        """Parameters that are sampled."""
         sampled = self.sample in SAMPLES
         return {
             p: values for p, values in self.parameters.items() if sampled and isinstance(values, Range | Distribution)
         }
 
     def check(self) -> None:
-        """Refuse what does not fit together."""
+        """Refuse keys that do not fit together."""
         for q in self.quantiles:
             if not 0.0 < q < 1.0:
                 raise InputError(f"quantiles = {q:g} must be between 0 and 1")
@@ -329,7 +330,7 @@ def shipped() -> dict[str, pathlib.Path]:
 
 
 def is_study(source: Any) -> bool:
-    """True for a study file, and for the name of a shipped study that no file and no shipped scene has."""
+    """True for a study file, and for the name of a shipped study if no file and no shipped scene has that name."""
     path = pathlib.Path(source)
     if not os.path.isfile(path):  # False of a name that no file can have
         return path.name.removesuffix(".toml") in shipped() and len(path.parts) == 1

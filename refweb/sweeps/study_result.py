@@ -1,4 +1,4 @@
-"""Results of a study as a value: its rows, their statistics, and its ``run.json``."""
+"""Results of a study in memory: its rows, their statistics, and the content of its ``run.json``."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class Sweep:
     title : str
         Title of the scene.
     status : {"running", "solved", "failed", "interrupted"}
-        How it ended: "solved" where every case has a row, also where that says why it failed.
+        Status of the study: "solved" if every case has a row, also a row with the reason of a failure.
     message : str
-        Why it has not ended, else empty.
+        Reason for which it has not ended, else empty.
     warnings : list of str
         Warnings on the results.
     cost : dict of str to float
-        Times of this start of the study [s], ``cpu_s`` without its workers; ``cases_cpu_s`` of all rows, and
-        ``cases_compile_s``, the part of compiling.
+        Times of the last start of the study [s], ``cpu_s`` without its workers; ``cases_cpu_s`` is the CPU time of all
+        rows, and ``cases_compile_s`` its part for compiling.
     path : pathlib.Path, optional
         Its folder.
     """
@@ -74,7 +74,7 @@ class Sweep:
 
     @functools.cached_property
     def _not_negative(self):
-        """Names of what is not negative in any case, whatever its parameters are."""
+        """Names of results that cannot be negative in any case."""
         tables, names = ("observe", "cable", "damping"), None
         cases = {json.dumps([case.given.get(key) for key in tables]): case for case in self.cases if case.given}
         for case in cases.values():
@@ -83,7 +83,7 @@ class Sweep:
         return names or set()
 
     def gather(self, known: dict[str, dict[str, Any]]) -> None:
-        """Let ``rows`` be those of all cases, of what is known by their keys, and find what they say together."""
+        """Set ``rows`` of all cases from the known rows by key, and compute their statistics."""
         self.rows = [row_of(self.study, case, known) for case in self.cases]
         self.columns = columns_of(self.study, self.rows)
         self.chances = chances(
@@ -94,13 +94,13 @@ class Sweep:
         }
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a `pandas.DataFrame`, which refweb does not bring."""
+        """The rows as a `pandas.DataFrame`; pandas must be installed."""
         import pandas
 
         return pandas.DataFrame(self.rows, columns=self.columns)
 
     def values(self, name: str) -> Any:
-        """A result, or a parameter by its path, of all cases, an array; NaN where there is none."""
+        """Values of a result, or of a parameter by its path, in all cases, an array; NaN for a missing value."""
         import numpy as np
 
         from ..errors import InputError
@@ -140,7 +140,7 @@ class Sweep:
 
 
 def row_of(study: Study, case: Any, known: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """The row of a case: its values, and what is known by its key."""
+    """The row of a case: its values and the known row of its key."""
     values = {path: case.values[path] for path in study.parameters}
     if case.given is None:
         return {"case": "", "status": "skipped", **values, "message": f"skip: {study.skip}"}
@@ -155,7 +155,7 @@ def columns_of(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def finite(given: Any) -> Any:
-    """Plain values without infinite numbers, which JSON does not have."""
+    """Plain values with None for infinite numbers, which JSON does not have."""
     if isinstance(given, dict):
         return {key: finite(value) for key, value in given.items()}
     if isinstance(given, list | tuple):

@@ -4,8 +4,8 @@ A `System` concatenates the terms of its effects once and has the interface of o
 ``x`` is the displacement of each row from its reference position, shape (rows, 3); a solver sees only the system.
 
 Where effects prescribe natural lengths, the numbers of the lines are a function of time, `System.line_data`: every
-force and energy asks for those of its own t, and `System.at` is the system as it stands at one time. The net is as
-built throughout. A loop of kernels, which cannot ask, keeps an array of its own and sets lengths in that.
+force and energy uses the numbers of its time t, and `System.at` returns the system with the numbers of one time. The
+net itself keeps its lengths as built. A loop of kernels cannot call Python, and keeps its own array of lengths.
 
 Values are written to arrays of the caller, by default new ones, so that threads may share a system.
 """
@@ -76,14 +76,14 @@ class System:
     constraints : list of refweb.effects.base.Constraint
         One per effect that keeps distances; no force of the system holds them.
     weakness : refweb.effects.base.Weakness or None
-        Limits of elements that may break; None if no element breaks.
+        Limits of elements that may break; None if none may.
     carried : ndarray of bool, shape (rows,)
-        Nodes that free bodies carry: those move with these.
+        True for nodes that free bodies carry and that move with them.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     angles : bool
-        True if unknowns of bodies that turn are rotation vectors, see `refweb.system.resting_bodies`, and not
-        quaternions: so it is in statics.
+        True if the unknowns of rotation of bodies are rotation vectors, as in statics, see
+        `refweb.system.resting_bodies`; False for quaternions.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class System:
         self.arrange()
 
     def arrange(self) -> None:
-        """Find what follows from what is supported and acts."""
+        """Set the attributes that follow from supports and terms."""
         self.free: NDArray[np.int64] = np.flatnonzero(~self.supported)
         self._zero = np.zeros((self.rows, 3))
         self._at_time = None  # the last time that lengths were asked for, and `line_data` then, which stays as it is
@@ -139,14 +139,14 @@ class System:
 
     @property
     def fixed(self) -> NDArray[np.bool_]:
-        """Components of places that supports hold, axles, or prescribed motion, shape (rows, 3)."""
+        """True for components of position that supports, axles or prescribed motion fix, shape (rows, 3)."""
         fixed = self.supported & ~self.carried[:, None]
         fixed[self.rows - self.net.spins :] = False
         return fixed
 
     @property
     def factorized_by(self) -> str | None:
-        """The library that has factorized and the reason, in words; None where none has."""
+        """Name of the library that has factorized and the reason, a text; None before a factorization."""
         return self.library.why if "library" in self.__dict__ else None
 
     def remarks(self) -> list[Finding]:
@@ -156,7 +156,7 @@ class System:
 
     @cached_property
     def laid(self) -> NDArray[np.float64] | None:
-        """Displacement at the start [m], shape (rows, 3); None where the web starts as it is."""
+        """Displacement at the start [m], shape (rows, 3); None if the web starts in its position as built."""
         return laid(self)
 
     def initial_velocity(self) -> NDArray[np.float64]:
@@ -165,12 +165,12 @@ class System:
 
     @property
     def lines(self) -> ForceTerm | None:
-        """The `ForceTerm` of the lines by their law; None where they have no tension."""
+        """The `ForceTerm` of the tension of lines; None if they have no tension."""
         return next((term for term in self.terms if term.over_lines), None)
 
     @property
     def _in_tangent(self):
-        """Terms with a stiffness or a damping: those of the pattern, in its order."""
+        """Terms with a stiffness or a damping, in the order of the pattern."""
         return [f for f in self.terms if f.tangent.stiffness is not None or f.velocity.damping is not None]
 
     @cached_property
@@ -184,9 +184,9 @@ class System:
 
     @cached_property
     def carriers(self) -> Any:
-        """The `refweb.system.attached_nodes.Carried` of bodies that carry nodes; None where none does.
+        """The `refweb.system.attached_nodes.Carried` of bodies that carry nodes; None if none does.
 
-        At rest the `refweb.system.resting_bodies.RestingBodies` of those that turn.
+        In statics the `refweb.system.resting_bodies.RestingBodies` of bodies that turn.
         """
         if self.angles:
             from .resting_bodies import RestingBodies
@@ -200,9 +200,9 @@ class System:
 
     @cached_property
     def levers(self) -> NDArray[np.float64]:
-        """Length of each row [m], shape (rows,), by which moments and rotations compare with forces and places.
+        """Lever of each row [m], shape (rows,), which compares moments and rotations with forces and displacements.
 
-        1 of what is no rotation.
+        It is 1 for rows that are no rotation.
         """
         levers = np.ones(self.rows)
         for body in self.net.bodies:
@@ -211,7 +211,7 @@ class System:
         return levers
 
     def sizes(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Size of the force on each row [N], of a moment that over its lever, shape (rows,)."""
+        """Magnitude of the force on each row [N], for a moment over its lever, shape (rows,)."""
         sizes = np.linalg.norm(force, axis=1)
         return sizes / self.levers if self.net.spins else sizes
 
@@ -224,7 +224,7 @@ class System:
         return [body for body in self.net.bodies if body in on_axles or not self.supported[body.row].all()]
 
     def moved(self, x: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacement [m] behind a step of all rows, both of shape (rows, 3); bodies turn by rotation vectors."""
+        """Displacement [m] after a step of all rows, both of shape (rows, 3); bodies turn by rotation vectors."""
         y = x + step
         if self.angles:
             turn_by(x, y, np.zeros_like(y), self.carriers.turns)
@@ -239,7 +239,8 @@ class System:
     def largest_share(self, p: NDArray[np.float64]) -> float:
         """Largest share, up to 1, of a step of the unknowns that keeps a tangent meaningful.
 
-        It turns no body by more than `MOST_TURN`, and takes none that touches the web farther than half its thickness.
+        It turns no body by more than `MOST_TURN`, and moves no body that may touch the web by more than half its
+        thickness.
         """
         share, step = 1.0, self.rows_of(p)
         for body in self.resting:
@@ -256,30 +257,30 @@ class System:
         return Mass(self.net, self.free, self.pattern, self._lines_in_tangent)
 
     def mass_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of M of the unknowns [kg] at displacement x; of rotations of bodies their inertia there [kg m²]."""
+        """Values of M of the unknowns [kg] at displacement x; for rotations of bodies their inertia at x [kg m²]."""
         return self.carriers.tensors(self.mass.values, self, x) if self.angles else self.mass.values
 
     @property
     def _lines_in_tangent(self):
-        """Number of the lines among the terms of the pattern; None where they have no tension."""
+        """Number of the term of lines in the pattern; None if lines have no tension."""
         return next((i for i, term in enumerate(self._in_tangent) if term.over_lines), None)
 
     @cached_property
     def unsupported_parts(self) -> list[Part]:
-        """Parts of the net that can be carried off, a list of `refweb.system.unsupported_parts.Part`."""
+        """Parts of the net without support along an axis, a list of `refweb.system.unsupported_parts.Part`."""
         from .unsupported_parts import find_parts
 
         return find_parts(self)
 
     def per_cell(self) -> PerCell:
-        """`PerCell` of new arrays; those of terms over the lines are one."""
+        """A `PerCell` of new arrays; terms over the lines share one array."""
         lines = np.zeros((len(self.net.cells), max([2, *(f.columns for f in self.terms if f.over_lines)])))
         arrays = [lines if f.over_lines else np.zeros((len(f.cells), f.columns)) for f in self.terms]
         return PerCell(arrays, lines, self.tension_column)
 
     @property
     def tension_column(self) -> int:
-        """Column of what the lines observe that has their whole tension."""
+        """Column of the output of lines with their whole tension."""
         return DAMPED_TENSION if any(f.over_lines and f.balance.power is not None for f in self.terms) else TENSION
 
     def blocks(self) -> list[NDArray[np.float64]]:
@@ -354,7 +355,7 @@ class System:
         return changed
 
     def with_effects(self, effects: dict[str, Any]) -> System:
-        """The same system with other numbers of some effects, by the name of their terms: these have the same cells."""
+        """The same system with other effects on the same cells, a dict by the names of their terms."""
         changed, terms = copy.copy(self), {}
         for name, effect in effects.items():
             terms[name] = iter(parts_of([effect], self.net))
@@ -366,13 +367,13 @@ class System:
         return self.line_data(t).matrix if term.data is None else term.data
 
     def length_force(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """∂E/∂L of each element [N], shape (elements,): with the change of L the work of reels."""
+        """∂E/∂L of each element [N], shape (elements,); times the change of L it is the work of reels."""
         force = np.empty(len(self.net.cells))
         length_force(self.net)(t, x, self.net.cells, self.line_data(t).matrix, force)
         return force
 
     def drive(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None) -> None:
-        """Write displacements [m] and velocities [m/s] that are prescribed, at time t, or a body's into x and v."""
+        """Write prescribed displacements [m] and velocities [m/s] of time t, and carried nodes, into x and v."""
         v = np.zeros_like(x) if v is None else v
         for d in self.drives:
             d.kernel(t, x, v, self._zero, d.cells, d.data, self._zero)
@@ -386,7 +387,7 @@ class System:
     def forces(
         self, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None, per_cell: PerCell | None = None
     ) -> Forces:
-        """The `Forces` at displacement x and velocity v, by default at rest; written to a `per_cell`, where given."""
+        """The `Forces` at displacement x and velocity v, by default at rest; written to a `per_cell` if given."""
         v, per_cell = self._zero if v is None else v, self.per_cell() if per_cell is None else per_cell
         f = np.zeros((self.rows, 3))
         for term, out in zip(self.terms, per_cell, strict=True):
@@ -406,20 +407,20 @@ class System:
     def outer_force(
         self, t: float, x: NDArray[np.float64] | None = None, v: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """Force on every row [N] of all but what the net does to itself, by default on the web as it is, at rest."""
+        """Force on every row [N] of all terms that are not internal, by default on the web as built, at rest."""
         x = self._zero if x is None else x
         outer = [self.force_of(term, t, x, v) for term in self.terms if not term.balance.internal]
         return sum(outer, np.zeros((self.rows, 3)))
 
     @cached_property
     def links(self) -> Links:
-        """The `refweb.system.links.Links` of what keeps distances."""
+        """The `refweb.system.links.Links` of the constraints."""
         from .links import Links
 
         return Links(self)
 
     def balance(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64]) -> Forces:
-        """`Forces` with those of links; on supports less those that consistent mass takes to move.
+        """The `Forces` with those of links, on supports minus the inertia forces of consistent mass.
 
         The reaction of supports is its negative.
         """
@@ -443,7 +444,7 @@ class System:
         return out
 
     def energy(self, t: float, x: NDArray[np.float64]) -> float:
-        """Total potential Π [J]: that of the lines and of all loads."""
+        """Total potential energy Π of lines and loads [J]."""
         return sum(self.energy_of(f, t, x).sum() for f in self.terms)
 
     def stiffness(
@@ -457,8 +458,8 @@ class System:
     ) -> NDArray[np.float64]:
         """Values of K = −∂f/∂x [N/m] in the fixed pattern.
 
-        ``definite`` leaves out what is negative; ``only`` are the terms to take, by default all; ``blocks`` are
-        `blocks` to write to, which a loop keeps.
+        ``definite`` asks for the positive semidefinite part; ``only`` are the terms to include, by default all;
+        ``blocks`` are `blocks` to write to, which a loop may use again.
         """
         v, blocks = self._zero if v is None else v, self.blocks() if blocks is None else blocks
         for term, block in zip(self._in_tangent, blocks, strict=True):
@@ -480,7 +481,7 @@ class System:
         return all(map(self.is_symmetric, self.terms)) and (self.angles or not felt)
 
     def is_symmetric(self, term: ForceTerm) -> bool:
-        """Tell if what a term has of K is symmetric: by rotation vectors all that a potential has is."""
+        """Tell if the part of a term in K is symmetric; with rotation vectors it is for each term with a potential."""
         return term.tangent.symmetric or (self.angles and term.energy is not None)
 
     @cached_property
@@ -497,7 +498,7 @@ class System:
     def dead(self) -> bool:
         """True if the only internal forces are the tensions of the lines, and all others are dead loads.
 
-        Where bodies are free it is not so: what they carry turns with them.
+        With free bodies it is False, since forces on carried nodes turn with them.
         """
         if self.resting:
             return False
@@ -526,18 +527,18 @@ class System:
 
     @property
     def rotating(self) -> list[ForceTerm]:
-        """Terms of the forces of inertia in a frame that turns, none where none does."""
+        """Terms of inertia forces in a rotating frame, a list."""
         return [term for term in self.terms if term.frame.angular_velocity is not None]
 
     @property
     def orbit_radius(self) -> float | None:
-        """Radius of the orbit that the web is in [m], None where it is in none."""
+        """Radius of the orbit of the web [m]; None without an orbit."""
         return next((f.frame.orbit_radius for f in self.terms if f.frame.orbit_radius is not None), None)
 
     def damping(
         self, t: float, x: NDArray[np.float64], v: NDArray[np.float64], blocks: list[NDArray[np.float64]] | None = None
     ) -> NDArray[np.float64] | None:
-        """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity.
+        """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None if no force depends on velocity.
 
         ``blocks`` are `blocks` to write to, which a loop keeps.
         """
@@ -554,9 +555,9 @@ class System:
         return values
 
     def across_lines(self, tension: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of the stiffness of lines as built across themselves, by a tension in each [N], shape (elements,).
+        """Values of the stiffness of lines from a tension in each element alone [N], shape (elements,), as built.
 
-        Free bodies have that of the mean line beside what lines hold of them, so that it is definite.
+        Free bodies get the stiffness of the mean line as well, so that the matrix is definite.
         """
         force = tension / self.net.natural_length
         blocks = self.net.unit_tension * force[:, None, None]
@@ -571,5 +572,5 @@ class System:
         return values
 
     def assemble_lines(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values in the fixed pattern of one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""
+        """Values in the fixed pattern from one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""
         return self.pattern.assemble_one(self._lines_in_tangent, blocks)
