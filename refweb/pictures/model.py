@@ -1,4 +1,4 @@
-"""Models, lists of what is drawn of a frame: tubes, balls and surfaces."""
+"""Elements of a model, the list of all that is drawn of a frame: tubes, balls and surfaces."""
 
 from __future__ import annotations
 

@@ -1,10 +1,9 @@
-"""Tubes, balls and surfaces seen through cameras, as images by pyvista off screen.
+"""Images of models by pyvista off screen, in a child process; input are models, views and sizes.
 
-VTK 9.7, which pyvista draws by, needs libEGL, libOSMesa or a display. Where a server has none of them it ends the
-process by a segmentation fault, with each kind of window. A `Renderer` therefore renders in a child process, see
-`refweb.pictures.opengl`, which it keeps for all frames of a film, tries each kind of off-screen window in turn and
-gives None if none works; `refweb.pictures.polygons` then draws the same model through the same
-`refweb.pictures.camera.View`.
+VTK 9.7, the library below pyvista, needs libEGL, libOSMesa or a display. On a server without any of them it ends the
+process with a segmentation fault. A `Renderer` therefore renders in a child process, see `refweb.pictures.opengl`,
+which it keeps for all frames of a film. It tries each kind of off-screen window in turn and returns None if none works.
+`refweb.pictures.polygons` then draws the same model with the same `refweb.pictures.camera.View`.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from typing import Any
 from .model import FINE
 
 SECONDS_PER_FRAME = 120.0
-"""Longest that a child may take for an image, the first of which starts it [s]."""
+"""Longest time of a child for an image, with its start [s]."""
 
 
 def windows():
-    """Kinds of window to try, as (VTK class or None for its default, whether it may use the display)."""
+    """Kinds of window to try: VTK class, or None for the default, and True if it may use the display."""
     if not sys.platform.startswith("linux"):
         return [(None, True)]
     display = [("vtkXOpenGLRenderWindow", True)] if os.environ.get("DISPLAY") else []
@@ -61,7 +60,7 @@ class Renderer:
     views, sizes
         As for `images`.
     sides : int
-        Of a tube.
+        Sides of a tube.
     """
 
     def __init__(self, views, sizes, sides=FINE):
