@@ -1,4 +1,4 @@
-"""Webs that are given node by node and line by line in the scene."""
+"""Webs given node by node and line by line in the scene."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Nets: the rows of the unknowns, their mass, and the lines between them, on which effects act.
+"""Nets: the rows of the unknowns, their mass, and the elements of lines, on which effects act.
 
-`refweb.net.discretisation` makes a net of a web; effects add rows, mass and numbers of elements to it, and leave
-what is there alone.
+`refweb.net.discretisation` makes a net from a web. A net is never changed: effects return copies with more rows, mass
+and numbers of elements.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class Net:
         Tension laws of the lines, classes of `refweb.net.laws.law.TensionLaw`. Where there are several, the number of
         that of each element stands in ``line_data.law``.
     points : ndarray, shape (rows, 3)
-        Reference positions [m]: the web's nodes, those that order and subdivision add, line by line and along each
-        line, then bodies.
+        Reference positions [m]: nodes of the web, nodes of order and subdivision, line by line and along each line,
+        then bodies.
     mass : ndarray, shape (rows,)
         Lumped mass [kg].
     element_mass : ndarray, shape (cells,)
@@ -51,17 +51,18 @@ class Net:
     line_data : refweb.net.laws.line_data.LineData
         Numbers of each element.
     factors : tuple
-        Factors of reels and heat on natural lengths, which are multiplied: (elements, table of (t, factor)).
+        Factors of reels and temperature on natural lengths, which are multiplied: pairs of elements and table of (t,
+        factor).
     flows : tuple of refweb.effects.mass_flow.MassFlow
         Masses that follow factors of reels; ``mass`` is that of factors of 1.
     end : float
-        Time at which a run ends at the latest [s], or its last load step.
+        Latest end of a run [s], or its last load step.
     area, strength : ndarray, shape (cells,)
         Cross section [m²] and strength [Pa].
     allowed_share : ndarray, shape (cells,), optional
-        Knot factor over safety factor: the share of the strength that is allowed; None where it is 1 of all.
+        Knot factor over safety factor, the allowed share of the strength; None if it is 1 everywhere.
     point_mass : ndarray, shape (nodes,), optional
-        Part of ``mass`` that point masses have added [kg]; None where there are none.
+        Point masses in ``mass`` [kg]; None if there are none.
     kept : tuple of refweb.net.laws.curve.Curve
         Curves whose addresses stand in ``line_data``: they live as long as the net.
     gradients : ndarray, shape (points, nodes per cell)
@@ -75,17 +76,17 @@ class Net:
     subdivide : int
         Elements per line.
     quasi_static : bool
-        True where time is the load step of statics.
+        True in statics, in which time is the load step.
     cable_mass : float
-        Mass of the lines alone [kg].
+        Mass of the lines [kg].
     consistent_minus_lumped : ndarray, shape (cells, nodes per cell, nodes per cell), optional
-        Consistent mass less the lumped one of each element [kg], its rows of sum 0; None where mass is lumped.
+        Consistent minus lumped mass of each element [kg], with rows of sum 0; None for lumped mass.
     bodies : tuple of refweb.net.rigid_body.RigidBody
         Bodies, whose rows follow those of the nodes.
     spins : int
-        Number of rows at the end that are rotations of bodies, with a moment of inertia [kg m²] in place of mass: of
-        one without orientation its rotation vector [rad] and its angular velocity [rad/s], of one with an orientation
-        two rows, see `refweb.net.rotation`.
+        Number of rows at the end for rotations of bodies, with a moment of inertia [kg m²] in place of mass. A body
+        whose orientation has no effect has one row, with rotation vector [rad] and angular velocity [rad/s]; another
+        body has two rows, see `refweb.net.rotation`.
     """
 
     web: Web
@@ -117,7 +118,7 @@ class Net:
 
     @property
     def allowed(self) -> NDArray[np.float64]:
-        """Stress of each element that is allowed [Pa], infinite where it has no strength, shape (cells,)."""
+        """Allowed stress of each element [Pa], infinite without strength, shape (cells,)."""
         return self.strength if self.allowed_share is None else self.strength * self.allowed_share
 
     @property
@@ -155,17 +156,17 @@ class Net:
 
     @property
     def axial(self) -> NDArray[np.float64]:
-        """Size of EA of each element [N], of what stands in its place for laws of form finding, shape (cells,)."""
+        """Magnitude of EA of each element [N], or of its substitute in laws of form finding, shape (cells,)."""
         return np.abs(self.line_data.ea)
 
     @property
     def heavy(self) -> NDArray[np.int64]:
-        """Rows with a mass, which a moment of inertia is not."""
+        """Rows with a mass, without rows of rotation."""
         return np.flatnonzero(self.mass[: len(self.mass) - self.spins])
 
     @property
     def carried(self) -> list[int]:
-        """Rows that bodies carry which are not fixed, a list: their nodes, and their own where it is off an axle."""
+        """Rows carried by bodies that are not fixed, a list: attached nodes, and bodies that are off their axles."""
         off_axle = [body.row for body in self.bodies if body.pivot is not None]
         return off_axle + [node for body in self.bodies if not body.fixed for node in body.carried]
 
@@ -180,11 +181,11 @@ class Net:
 
     @property
     def broken(self) -> NDArray[np.int64]:
-        """Elements that are broken, which have no stiffness, shape (k,)."""
+        """Broken elements, which have no stiffness, shape (k,)."""
         return np.flatnonzero(self.line_data.ea == 0.0)
 
     def middle_of(self, lines: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int64]:
-        """Element at the middle of each of some lines, or the one behind it, shape (lines,)."""
+        """Element at the middle of each of some lines, or next to it, shape (lines,)."""
         return np.asarray(lines, dtype=np.int64) * self.subdivide + self.subdivide // 2
 
     @property
@@ -194,15 +195,16 @@ class Net:
 
     @property
     def slackness(self) -> NDArray[np.float64]:
-        """Strain at or below which an element is slack, shape (cells,): ε0, which is 0 for laws without it."""
+        """Strain up to which an element is slack, shape (cells,): ε0, or 0 for laws without it."""
         return self.line_data.slackness
 
     @cached_property
     def bars(self) -> csr_array:
-        """Quadrature points as bars of natural length w L and stiffness EA/(w L), whose vectors are ``bars @ x``.
+        """Matrix whose product with positions x gives the vectors of bars, one bar for each quadrature point.
 
-        A `scipy.sparse.csr_array` of shape (cells × points, rows), with w dN/dξ as entries; the bars of a cell follow
-        each other. Bars with tensions along unit vectors, S of shape (bars, 3), pull the rows by ``-bars.T @ S``.
+        A bar has the natural length w L and the stiffness EA/(w L). The matrix is a `scipy.sparse.csr_array` of shape
+        (cells × points, rows) with entries w dN/dξ; the bars of a cell follow each other. Tensions of bars as vectors
+        S, shape (bars, 3), give the forces ``-bars.T @ S`` on the rows.
         """
         from scipy.sparse import csr_array
 
@@ -227,21 +229,21 @@ class Net:
 
     @property
     def unit_tension(self) -> NDArray[np.float64]:
-        """Stiffness of an element of unit length under unit tension and nothing else, shape (3 nodes, 3 nodes)."""
+        """Geometric stiffness of an element of unit length under unit tension, shape (3 nodes, 3 nodes)."""
         unit = np.einsum("q,qa,qb->ab", self.weights, self.gradients, self.gradients)
         return np.kron(unit, np.eye(3))
 
     @property
     def along(self) -> NDArray[np.int64]:
-        """Places in a cell's nodes from its first end to its second: ``cells[:, along]`` follows the line."""
+        """Order of the nodes of a cell from its first to its second end: ``cells[:, along]`` follows the line."""
         return np.argsort(self.places)
 
     def line_between(self, nodes: Sequence[int]) -> int:
-        """Number of the line that an element between two nodes belongs to."""
+        """Number of the line of an element between two nodes."""
         return int(self.line[np.isin(self.cells, nodes).all(axis=1).argmax()])
 
     def find(self, selection: Any, name: str = "node") -> NDArray[np.int64]:
-        """Rows of a selection of nodes; "all" has the nodes that order and subdivision add, see `Web.find`."""
+        """Rows of a selection of nodes, see `Web.find`; "all" includes nodes of order and subdivision."""
         every = selection == "all" or (isinstance(selection, (list, tuple)) and "all" in selection)
         numbers = self.web.find(selection, name)
         return np.arange(self.nodes) if every else numbers

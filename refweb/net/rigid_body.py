@@ -1,4 +1,4 @@
-"""Rigid bodies: rows of the unknowns after those of the web's nodes, and what a shape has to say.
+"""Rigid bodies: rows of the unknowns after those of the nodes, and the interface of shapes.
 
 How to write a body shape
 -------------------------
@@ -31,15 +31,15 @@ A shape is a class whose fields are its keys in ``[[body]]``. All that lies behi
             corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
             return 0.5 * self.drawn * corners, np.array([[0, 1, 2], [0, 2, 3]])
 
-A body is convex. Its depth is the distance from its surface there, and concave, with a gradient that nowhere jumps: the
-force is the slope of an energy. That is why edges are rounded, and a body is a core and the radius by which it has
-grown on all sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core is a box, whose half sizes may be 0, or
-round about its axis, ``depth`` and ``boundary`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is
-a capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move and turn
-sets ``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its
-centre. One that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as
-`refweb.net.shapes.filled` has. By its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`, it touches other
-bodies; where they are to touch, one without is refused. Scenes know it by an entry point of your package; in a script
+A body is convex. Its depth is the distance from its surface near the surface, and concave, with a continuous gradient:
+the force is the gradient of an energy. Therefore edges are rounded. A body is a core and a radius of growth on all
+sides, ``grown.radius`` and ``grown.core`` in a kernel. For a core that is a box, whose half sizes may be 0, or round
+about its axis, `Shape` has ``depth`` and ``boundary``: ``Grown(radius, (0.0, 0.0, length / 2))`` is a capsule. For
+other cores ``farthest`` may give the surface, whose triangles face outward. A shape that may move and turn sets ``free
+= True``; without such a core it defines its ``volume()`` and the tensor ``inertia(mass)`` about its centre. A shape
+that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, see `refweb.net.shapes.filled`. A
+body touches other bodies by its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`; contact of bodies
+refuses a shape without one. An entry point of your package makes it known to scenes; in a script
 ``refweb.register("shape", "wall", Wall)`` does the same. One that refweb ships is a line in `refweb.registry.SHAPES`::
 
     [project.entry-points."refweb.shapes"]
@@ -77,11 +77,11 @@ class Grown(NamedTuple):
     round : bool
         True if the core is a cylinder about the third axis, with the first number as radius; False for a box.
     fine : float
-        Length on which the surface may turn [m], of a body that need not be convex; 0 of a convex one.
+        Length on which the surface may turn [m] for a body that need not be convex; 0 for a convex body.
     thick : float
-        Least distance from its middle to its surface [m], where that does not follow from the core.
+        Least distance from its middle to its surface [m], if it does not follow from the core.
     field : float
-        Where the numbers of a field stand in memory, of a body that has one.
+        Address of the numbers of a field, for a body with a field.
     """
 
     radius: float
@@ -107,9 +107,9 @@ class Shape(Table):
     ground : bool
         True for ground, whose size gives no limit of the penetration.
     error : float, optional
-        Largest distance of the surface that lines feel from the one that is meant [m], where these differ.
+        Largest distance of the surface of contact from the given surface [m], if they differ.
     directions : tuple of str
-        Keys that say where its axes are.
+        Keys of the directions of its axes.
     """
 
     free = False
@@ -124,11 +124,11 @@ class Shape(Table):
         raise NotImplementedError
 
     def settle(self) -> None:
-        """Read what is in files, and refuse what cannot be; called when a net is made."""
+        """Read files, and refuse invalid content; called when a net is made."""
 
     @property
     def extent(self) -> float:
-        """Largest distance from its centre to its surface as a web sees it [m]."""
+        """Largest distance from its centre to its surface for contact with a web [m]."""
         radius, core, *_ = self.grown()
         return radius + float(np.linalg.norm(core))
 
@@ -137,7 +137,7 @@ class Shape(Table):
         return np.eye(3)
 
     def remarks(self) -> Iterable[str]:
-        """Warnings of what it was made of, each a text."""
+        """Texts of warnings on its input."""
         return ()
 
     def texts(self) -> Iterable[str]:
@@ -157,20 +157,20 @@ class Shape(Table):
         return inertia(self.grown(), mass)
 
     def refuse_turning(self, angular_velocity: Sequence[float]) -> None:
-        """Refuse an angular velocity [rad/s] that it cannot have."""
+        """Refuse an impossible angular velocity [rad/s]."""
 
     def depth(self) -> Any:
-        """Kernel of its depth, as `refweb.net.grown_core.depth`, which is that of boxes and of round cores."""
+        """Kernel of its depth, by default `refweb.net.grown_core.depth` for boxes and round cores."""
         from .grown_core import depth
 
         return depth
 
     def skeleton(self) -> NDArray[Any] | None:
-        """Parts by which it touches other bodies, as `refweb.net.skeleton` makes them; None: it touches none."""
+        """Parts by which it touches other bodies, from `refweb.net.skeleton`; None if it touches none."""
         return None
 
     def touched(self, thickness: float) -> Grown:
-        """The `Grown` that parts of other bodies feel which are so thick at most [m]."""
+        """The `Grown` for contact with parts of other bodies up to a thickness [m]."""
         return self.grown()
 
     def farthest(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -186,7 +186,7 @@ class Shape(Table):
 
 
 ON_AXLE = 1e-12
-"""Share of coordinates below which the distance of a body from its axle is rounding."""
+"""Distance of a body from its axle that counts as rounding, over its coordinates."""
 
 
 class Axle(NamedTuple):
@@ -241,21 +241,21 @@ class RigidBody:
     turns : bool
         True if its rotation is followed.
     spin : int, optional
-        Its row of rotation, where it has one.
+        Its first row of rotation, if it has one.
     turn : int, optional
-        The second one, where its orientation counts, see `refweb.net.rotation`.
+        Its second row of rotation, if its orientation counts, see `refweb.net.rotation`.
     carried : tuple of int
-        Nodes that it carries, whose mass its own has.
+        Nodes that it carries; its mass includes theirs.
     points : ndarray, shape (carried, 3)
-        Where it does, along its axes from its row [m].
+        Positions of the carried nodes, along its axes from its row [m].
     offset : ndarray, shape (3,)
-        Centre of its shape, along its axes from its row [m]: that is the centre of mass of all.
+        Centre of its shape, along its axes from its row [m]; the row is the centre of mass with carried nodes.
     pivot : int, optional
-        Row of the point of the axle that its row turns about, where that does not lie on the axle itself.
+        Row of the point of the axle about which its row turns, if its row is off the axle.
     arm : ndarray, shape (3,)
-        Vector from there to its row at the start [m]; 0 without one.
+        Vector from that point to its row at the start [m]; 0 without a pivot.
     mass : float
-        Its mass [kg], where it turns about an axle.
+        Its mass [kg], for a body on an axle.
     """
 
     name: str
@@ -280,12 +280,12 @@ class RigidBody:
 
     @property
     def prescribed(self) -> bool:
-        """True if nothing that acts on it moves it: it is fixed, or moves as tables say."""
+        """True if forces do not move it: it is fixed, or tables move it."""
         return self.fixed or self.moved
 
     @property
     def base(self) -> int:
-        """Row that its rotation is about: its own, or that of a point of its axle."""
+        """Row of the centre of its rotation: its own, or that of a point of its axle."""
         return self.row if self.pivot is None else self.pivot
 
     @property
@@ -305,14 +305,14 @@ class RigidBody:
 
     @property
     def extent(self) -> float:
-        """Largest distance from its row to its surface as a web sees it [m]; infinite for a ring."""
+        """Largest distance from its row to its surface for contact with a web [m]; infinite for a ring."""
         return self.shape.extent + float(np.linalg.norm(self.offset))
 
     @property
     def tumbles(self) -> bool:
         """True if its orientation counts: a free body that is no ring, nor a sphere with one moment of inertia.
 
-        Of a body that carries nodes it does, and of one that tables move or that turns about an axle.
+        It also counts for a body that carries nodes, and for one that tables move or that turns about an axle.
         """
         if self.moved or self.axle:
             return True
@@ -321,9 +321,9 @@ class RigidBody:
 
     @property
     def moment(self) -> float:
-        """Moment of inertia that stands in place of mass [kg m²]: the largest, or that of a ring about its normal.
+        """Moment of inertia in place of mass [kg m²]: the largest one, or that of a ring about its normal.
 
-        About an axle it is that, and without a meaning where tables move the body.
+        On an axle it is the moment about the axle; for a body that tables move it has no meaning.
         """
         if self.moved:
             return 1.0
@@ -335,7 +335,7 @@ class RigidBody:
 
     @property
     def moment_about_centre(self) -> float:
-        """`moment` without the mass at its arm from an axle: that about the direction of the axle through the row."""
+        """`moment` about the direction of the axle through the row: without the mass times the squared arm."""
         if self.moved or not self.axle:
             return self.moment
         direction = self.axes @ self.axle.direction
@@ -345,7 +345,7 @@ class RigidBody:
     def mobility(self) -> NDArray[np.float64]:
         """Moment of inertia times the inverse of the inertia tensor, along its axes, shape (3, 3).
 
-        About an axle it turns whatever moment acts: the part along the axle counts.
+        On an axle only the part along the axle remains.
         """
         if self.moved:
             return np.eye(3)
@@ -388,14 +388,14 @@ class RigidBody:
 
 
 def row_names(bodies: Sequence[RigidBody]) -> list[str]:
-    """Names of the rows behind those of the nodes: of bodies, of points of axles, and of rotations, with a dot."""
+    """Names of the rows after the nodes: of bodies, and, with a dot, of points of axles and rotations."""
     rows = ([f"{b.name}.spin", f"{b.name}.turn"][: 1 + (b.turn is not None)] for b in bodies if b.spin is not None)
     pivots = [f"{body.name}.axle" for body in bodies if body.pivot is not None]
     return [body.name for body in bodies] + pivots + [name for names in rows for name in names]
 
 
 def with_rotations(net: Net) -> Net:
-    """The net with the rows of rotation of its bodies behind all others."""
+    """The net with the rows of rotation of its bodies after all others."""
     if net.spins or not any(body.turns for body in net.bodies):
         return net
     net = _with_pivots(net)
@@ -416,7 +416,7 @@ def with_rotations(net: Net) -> Net:
 
 
 def _with_pivots(net):
-    """The net with a row for the point of each axle that the row of its body turns about."""
+    """The net with a row for the point of each axle about which the row of a body turns."""
     bodies, pivots = [], []
     for body in net.bodies:
         if body.axle:
@@ -433,7 +433,7 @@ def _with_pivots(net):
 
 
 def of_size_one(vector: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """A vector over the power of 2 above its largest component: its square is neither 0 nor infinite."""
+    """A vector over a power of 2 near its largest component, so that its square is neither 0 nor infinite."""
     vector = np.asarray(vector, dtype=float)
     return np.ldexp(vector, -np.frexp(np.abs(vector).max())[1])
 
@@ -467,7 +467,7 @@ def axes_about(name: str, axis: Any) -> NDArray[np.float64]:
 
 
 def axes_of(axes: Any) -> NDArray[np.float64]:
-    """Unit vectors, shape (3, 3), along two at right angles and across; those of x, y and z for None."""
+    """Unit vectors, shape (3, 3), along two given ones at right angles and their cross product; x, y, z for None."""
     if axes is None:
         return np.eye(3)
     if len(axes) != 2:

@@ -19,7 +19,7 @@ _PARALLEL = 1e-9
 
 @table
 class SingleCable(Table):
-    """Single cable with both ends fixed, of lines of equal natural length.
+    """Single cable with both ends fixed, divided into lines of equal natural length.
 
     Groups of lines: ``anchors``, the first and the last; ``inner``, all others; one line alone is ``rim``, see
     `refweb.net.groups`.
@@ -59,7 +59,7 @@ class SingleCable(Table):
     sag: Several = vector(default=None)
 
     def check(self) -> None:
-        """Refuse ends at one place, a direction that is none, and one line that is longer than the distance."""
+        """Refuse equal ends, an invalid direction, and a single line that is longer than the distance."""
         with np.errstate(over="ignore"):
             distance = np.linalg.norm(np.subtract(self.end, self.start))
         if not 0 < distance < np.inf:
@@ -96,7 +96,7 @@ class SingleCable(Table):
 
 
 def _arc(n, distance, length):
-    """Inner vertices of n equal chords on a circular arc: positions along and aside the line between its ends [m].
+    """Inner vertices of n equal chords on a circular arc: coordinates along and across the line of its ends [m].
 
     Half the angle φ of a chord solves sin nφ/sin φ = n·distance/length, which decreases from n to 0 on (0, π/n).
     """

@@ -1,4 +1,4 @@
-"""A web is nodes, lines between them and the lines' natural lengths."""
+"""Webs: nodes, lines between them and their natural lengths, and the selection of nodes and lines by name."""
 
 from __future__ import annotations
 
@@ -33,23 +33,22 @@ class Web:
     natural_length : ndarray of shape (lines,), optional
         Natural length of each line [m], by default the distance of its end nodes.
     rim : ndarray of shape (k,)
-        Nodes that the web's own rule supports, sorted.
+        Nodes that the generator of the web supports, sorted.
     kind : {"paper", "window", "layers", "cable", "inline", "file"}
-        The rule that made the web.
+        Generator of the web.
     cells : int, optional
         Number of meshes, by default lines − nodes + components.
     names : dict of str to tuple of int
         The user's names for nodes.
     groups : sequence of str or dict of str to sequence of int, optional
-        Group of each line, "" for none, or the lines of each group, which may share lines. As an attribute the lines of
-        each group, a dict of increasing int64 arrays, with those of `refweb.net.groups` that the web's own supports
-        make.
+        Group of each line, "" for none, or the lines of each group, which may share lines. The attribute is a dict of
+        increasing int64 arrays of the lines of each group, with the groups by supports of `refweb.net.groups`.
     length_given : bool, optional
         True if natural lengths are separate data, not distances; by default True if ``natural_length`` is given.
     broken : sequence of int
-        Lines that are broken and carry nothing, as an attribute increasing int64.
+        Lines that are broken and carry nothing; the attribute is an increasing int64 array.
     notes : sequence of refweb.findings.Finding
-        Remarks on how it was read from a file.
+        Findings on the reading of its file.
 
     Raises
     ------
@@ -122,12 +121,12 @@ class Web:
 
     @property
     def area(self) -> float:
-        """Area of the bounding box [m²]: the product of its two largest sides, for a flat web those in x and y."""
+        """Area of the bounding box [m²]: the product of its two largest sides, in x and y for a flat web."""
         return float(np.sort(np.ptp(self.points, axis=0))[1:].prod())
 
     @property
     def centre(self) -> int:
-        """Number of the node nearest the origin, of a cable nearest half its length; ties go to lowest y, then x."""
+        """Number of the node nearest the origin, for a cable its middle; among equal ones with least y, then x."""
         size = np.ptp(self.points, axis=0).max()
         if self.kind == "cable":
             near = np.unique([len(self.lines) // 2, (len(self.lines) + 1) // 2])
@@ -199,7 +198,7 @@ class Web:
         return np.array(list(dict.fromkeys(chain(*numbers))), dtype=np.int64)
 
     def find_around(self, selection: Any) -> NDArray[np.int64]:
-        """Find nodes, as `find`, in their order around: nodes of one name counterclockwise around their middle."""
+        """Find nodes, as `find`; nodes of one name in counterclockwise order around their middle."""
         numbers = self.find(selection)
         if not isinstance(selection, str) or len(numbers) < 3:
             return numbers
@@ -226,7 +225,7 @@ class Web:
         Raises
         ------
         InputError
-            For a number out of range, or a name that is that of no line.
+            For a number out of range, or a name without lines.
         """
         if isinstance(selection, (list, tuple, np.ndarray)):
             numbers = [self._find_lines(f"{name}[{i}]", part) for i, part in enumerate(selection)]

@@ -21,7 +21,7 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """One of the records in a plot.
+    """Record in a plot, with its name and style.
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ class Box(Shape):
     rounding: float | None = real(default=None, above=0, unit="m")
 
     def check(self) -> None:
-        """Refuse sizes that are not > 0, axes that are not two at right angles and a rounding that is too large."""
+        """Refuse sizes that are not > 0, axes that are not at right angles, and a rounding that is too large."""
         if min(self.size) <= 0.0:
             raise InputError(f"size = {list(self.size)} must be > 0 [m]")
         self.frame()

@@ -1,4 +1,4 @@
-"""Capsules: a straight line that has grown."""
+"""Capsules: straight lines grown by a radius."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Capsule(Shape):
     radius : float
         Its radius [m], > 0.
     length : float
-        Distance of the centres of its half spheres [m], > 0; from end to end it is longer by two radii.
+        Distance of the centres of its half spheres [m], > 0; the total length is larger by two radii.
     axis : sequence of 3 float
         Its axis; not with ``orientation``.
 
@@ -59,5 +59,5 @@ class Capsule(Shape):
         return of_box(self.grown())
 
     def frame(self) -> NDArray[np.float64]:
-        """Unit vectors of its axes, its own third."""
+        """Unit vectors of its axes; its own axis is third."""
         return axes_about("axis", self.axis)

@@ -69,7 +69,7 @@ class Cylinder(Shape):
         return of_cylinder(self.grown())
 
     def frame(self) -> NDArray[np.float64]:
-        """Unit vectors of its axes, its own third."""
+        """Unit vectors of its axes; its own axis is third."""
         return axes_about("axis", self.axis)
 
     def farthest(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Planes: the ground behind them has no end."""
+"""Planes: half spaces of ground."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def depth(p, grown):
 class Plane(Shape):
     """All that lies behind a plane through the position, such as level ground; it is fixed.
 
-    Where the stiffness of contact is left out it is chosen for an overlap of 2 % of the shortest line, since a plane
-    has no size. Nothing passes through it, however deep.
+    If the stiffness of contact is not given, it is chosen for an overlap of 2 % of the shortest line, since a plane has
+    no size. Nothing passes through it at any depth.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Plane(Shape):
         return axes_about("normal", self.normal)
 
     def grown(self) -> Grown:
-        """A box without end."""
+        """An infinite box."""
         return Grown(0.0, (math.inf, math.inf, math.inf))
 
     def depth(self) -> Any:
@@ -69,7 +69,7 @@ class Plane(Shape):
         return depth
 
     def skeleton(self) -> NDArray[Any] | None:
-        """No parts: it touches other bodies by theirs."""
+        """No parts: other bodies touch it with their parts."""
         from ..skeleton import PART
 
         return np.zeros(0, PART)

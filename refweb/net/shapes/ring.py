@@ -1,4 +1,4 @@
-"""Rings: rigid circles, which webs in their plane touch as the disc inside."""
+"""Rings: rigid circles; a web in the plane of a ring touches it as a disc."""
 
 from __future__ import annotations
 
@@ -17,14 +17,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 TUBE = 0.04
-"""Thickness of the tube that a ring is drawn as, over its radius."""
+"""Thickness of the tube that is drawn for a ring, over its radius."""
 
 
 @table
 class Ring(Shape):
-    """A ring; along its normal, its third direction, it has no ends.
-
-    It keeps its plane: it turns about its normal only.
+    """A ring; it is infinite along its normal, its third direction. It keeps its plane: it turns about its normal only.
 
     Parameters
     ----------

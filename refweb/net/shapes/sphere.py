@@ -1,4 +1,4 @@
-"""Spheres: a point that has grown."""
+"""Spheres: points grown by a radius."""
 
 from __future__ import annotations
 
