@@ -22,7 +22,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     (
         "compiled",
         "*",
-        "Kernels: what compiles them, keeps their machine code on disk and hands records to them by one pointer.",
+        "Kernels: their compilation, machine code on disk, and records that they read by one pointer.",
     ),
     ("the ground floor", "accepted errors findings messages tables kernels memory settings registry", ""),
     ("net.laws", "*", "Tension laws of lines: stress, tangent and energy over strain; they know nothing of nets."),
