@@ -278,11 +278,6 @@ def depth_in_hull(points, point):
     return -float((hull.equations[:, :3] @ point + hull.equations[:, 3]).max())
 
 
-def in_hull(points, point):
-    """Tell if a position is in the convex hull of points; the hull of points in a plane has no inside."""
-    return depth_in_hull(points, point) > 0.0
-
-
 def side_of_mouth(outline, nodes, centre):
     """Distance of a centre from the plane of a mouth [m], negative where the mean of all nodes is on the other side.
 
