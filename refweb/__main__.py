@@ -73,7 +73,7 @@ def main(arguments=None):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # overflow: what it leads to is found and named
             warnings.filterwarnings("ignore", message="Glyph")  # a title in a script the font of pictures lacks
-            status = _print_versions() if arguments.version else load(COMMANDS[arguments.command]).run(arguments)
+            status = _print_versions() if arguments.version else load(COMMANDS[str(arguments.command)]).run(arguments)
         sys.stdout.flush()
     except InputError as error:
         print(f"refweb: {error}", file=sys.stderr)

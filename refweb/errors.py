@@ -1,14 +1,21 @@
 """Errors: refused input, and failures of solvers."""
 
+from __future__ import annotations
+
 import contextlib
+from typing import TYPE_CHECKING
 
 from .messages import one_line
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from contextlib import AbstractContextManager
 
 
 class InputError(ValueError):
     """Input that refweb refuses; the message is one line with the value, the limit and the remedy."""
 
-    def __init__(self, message):
+    def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
 
 
@@ -32,7 +39,7 @@ class EnergyDriftError(IntegrationError):
 
     code = "balance-drift"
 
-    def __init__(self, message, drift=float("inf")):
+    def __init__(self, message: str, drift: float = float("inf")) -> None:
         super().__init__(message)
         self.drift = drift
 
@@ -45,13 +52,13 @@ class PenetrationError(SolverError):
 
     code = "deep-contact"
 
-    def __init__(self, message, stiffness):
+    def __init__(self, message: str, stiffness: dict[str, float]) -> None:
         super().__init__(message)
         self.stiffness = stiffness
 
 
 @contextlib.contextmanager
-def refused_at(location):
+def refused_at(location: str) -> Iterator[None]:
     """Begin what is refused inside with its place, such as ``[web]`` or ``net.toml:``."""
     try:
         yield
@@ -59,6 +66,6 @@ def refused_at(location):
         raise InputError(f"{location} {error}") from None
 
 
-def in_file(name):
+def in_file(name: str) -> AbstractContextManager[None]:
     """Begin what is refused inside with the name of the scene file; ``name`` is empty where there is none."""
     return refused_at(f"{name}:" if name else "")

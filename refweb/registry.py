@@ -14,7 +14,14 @@ from __future__ import annotations
 import functools
 import importlib
 import re
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from importlib.metadata import EntryPoint
+
+    from .settings import Dynamic
+    from .system.system import System
 
 WEBS = {
     "paper": "refweb.net.lattices:Paper",
@@ -137,14 +144,14 @@ class Method(NamedTuple):
     """
 
     integrator: str
-    keys: tuple
+    keys: tuple[Any, ...]
 
     @property
-    def knob(self):
+    def knob(self) -> str:
         """Name of the key that trades accuracy for time."""
         return self.keys[0]
 
-    def integrator_of(self, solve, system, *looked_at, **keys):
+    def integrator_of(self, solve: Dynamic, system: System, *looked_at: Any, **keys: Any) -> Any:
         """Its integrator with those of its keys that a `refweb.Dynamic` gives, or with others in their place.
 
         ``looked_at`` are probes, sums and events, see `refweb.dynamics.integrators.integrator.Integrator`.
@@ -229,13 +236,13 @@ EXPORTS = (
 """Names that ``refweb.NAME`` offers besides webs and effects."""
 
 
-def exports():
+def exports() -> dict[str, str]:
     """Modules of the names of the package: classes of webs and effects, and `EXPORTS`."""
     shipped = (*EXPORTS, *WEBS.values(), *EFFECTS.values())
     return {reference.split(":")[1]: reference for reference in shipped if isinstance(reference, str)}
 
 
-def load(reference) -> Any:
+def load(reference: Any) -> Any:
     """Object that a ``"module:name"`` or a ``"module"`` stands for; what is registered stands for itself."""
     if not isinstance(reference, str):
         return reference
@@ -244,7 +251,7 @@ def load(reference) -> Any:
     return getattr(loaded, name) if name else loaded
 
 
-def name_of(table, value):
+def name_of(table: dict[str, Any], value: Any) -> str | None:
     """Name under which the class of a value stands in a table, None where it is not in it."""
     reference = _reference(type(value))
     return next((name for name, known in table.items() if _reference(known) == reference), None)
@@ -269,7 +276,7 @@ class Kind(NamedTuple):
         Regular expression of its names.
     """
 
-    table: dict
+    table: dict[str, Any]
     base: str
     pattern: str
 
@@ -397,7 +404,7 @@ def _method(name, integrator):
 
 
 @functools.cache
-def installed():
+def installed() -> dict[tuple[str, str], tuple[EntryPoint, ...]]:
     """Entry points that installed packages have, a dict of tuples by kind and name."""
     from importlib.metadata import entry_points
 
@@ -413,7 +420,7 @@ def _kind_of(table):
     return next((kind for kind, entry in KINDS.items() if entry.table is table), "")
 
 
-def known(table, name):
+def known(table: dict[str, Any], name: Any) -> bool:
     """Tell if a name is in a table, or comes into it by an entry point.
 
     Raises
@@ -426,7 +433,7 @@ def known(table, name):
     return name in table
 
 
-def knows_class_of(table, value):
+def knows_class_of(table: dict[str, Any], value: Any) -> bool:
     """Tell if the class of a value is in a table, or comes into it by an entry point of the package that it is from."""
     for (kind, name), entries in installed().items() if name_of(table, value) is None else ():
         package = type(value).__module__.partition(".")[0]
@@ -453,12 +460,12 @@ def _load_entry(kind, name, entries):
         PACKAGES[packages[0]] = entries[0].dist.version
 
 
-def possible(table):
+def possible(table: dict[str, Any]) -> list[str]:
     """Names in a table, and those that entry points can bring into it."""
     return [*dict.fromkeys([*table, *(name for kind, name in installed() if kind == _kind_of(table))])]
 
 
-def registered_packages():
+def registered_packages() -> set[str]:
     """Packages of all that `register` and entry points have added, a set of names."""
     entries = (value for entry in KINDS.values() for value in entry.table.values() if not isinstance(value, str))
     values = (entry.integrator if isinstance(entry, Method) else entry for entry in entries)
@@ -466,7 +473,7 @@ def registered_packages():
     return {module.partition(".")[0] for module in modules}
 
 
-def load_installed(*kinds):
+def load_installed(*kinds: str) -> list[str]:
     """Load all entry points of some kinds, by default of all; return a message for each that cannot be."""
     from .errors import InputError
 
@@ -484,7 +491,9 @@ FILES = {"web": ("path", "lines"), "cable": ("stress", "tension"), "body": ("fil
 """Keys of tables of a scene that are paths of files."""
 
 
-def with_files(given, change, tables=tuple(FILES)):
+def with_files(
+    given: dict[str, Any], change: Callable[[str], Any], tables: Sequence[str] = tuple(FILES)
+) -> dict[str, Any]:
     """A copy of the dict of a scene with ``folder(path)`` for each path of a file in some tables."""
 
     def placed(table, keys):
@@ -504,9 +513,9 @@ def with_files(given, change, tables=tuple(FILES)):
     return {**given, **changed}
 
 
-def with_fold(given):
+def with_fold(given: dict[str, Any]) -> dict[str, Any]:
     """The dict of a scene in which what ``[web]`` says of a fold, ``fold`` or ``positions``, is the table of a fold."""
-    web = given.get("web")
+    web: Any = given.get("web")
     said = [key for key in ("fold", "positions") if isinstance(web, dict) and key in web]
     if not said:
         return given
@@ -519,7 +528,7 @@ def with_fold(given):
     return {**given, "web": rest, "fold": fold if isinstance(fold, dict) else {"kind": fold}}
 
 
-def paths_of(given):
+def paths_of(given: dict[str, Any]) -> list[str]:
     """Paths of the files that the dict of a scene names."""
     paths = []
     with_files(given, paths.append)

@@ -6,6 +6,7 @@ import itertools
 import pathlib
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +23,12 @@ from .results.solution import as_history
 from .scene import Scene
 from .solution import Solution, scene_of, summary_of
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from os import PathLike
+
+    from .system.system import System
+
 STIFFENINGS = 8
 """Largest number of times that a run is repeated with a stiffer contact."""
 MOST_TIMES = 200
@@ -29,7 +36,12 @@ MOST_TIMES = 200
 
 
 def run(
-    scene, out=None, force=False, progress: bool | Callable | None = True, announce=None, checkpoint=(None, None)
+    scene: Scene | str | PathLike[str],
+    out: str | PathLike[str] | None = None,
+    force: bool = False,
+    progress: bool | Callable[..., Any] | None = True,
+    announce: Callable[[Scene, System], object] | None = None,
+    checkpoint: tuple[Any, Any] = (None, None),
 ) -> Solution:
     """Solve a scene.
 
@@ -77,7 +89,14 @@ def run(
                 system = scene.build()
 
 
-def trust(scene, budget=None, out=None, force=False, progress: bool | Callable | None = True, announce=None):
+def trust(
+    scene: Scene | str | PathLike[str],
+    budget: float | None = None,
+    out: str | PathLike[str] | None = None,
+    force: bool = False,
+    progress: bool | Callable[..., Any] | None = True,
+    announce: Callable[[Scene, System], object] | None = None,
+) -> Solution:
     """Find all parts of the error of each result of a scene, and its verdict.
 
     Parameters
@@ -118,7 +137,11 @@ def trust(scene, budget=None, out=None, force=False, progress: bool | Callable |
     return solution
 
 
-def resume(folder, progress: bool | Callable | None = True, announce=None) -> Solution:
+def resume(
+    folder: str | PathLike[str],
+    progress: bool | Callable[..., Any] | None = True,
+    announce: Callable[[Scene, System], object] | None = None,
+) -> Solution:
     """Continue a dynamic run that was killed or interrupted or failed, from its last checkpoint.
 
     Central differences come to what the undisturbed run comes to, bit for bit; CVODE and IDA start again there, and
@@ -253,7 +276,7 @@ def _before(kept, summary, system, versions):
         yield Finding("resumed", f"resumed with {changes}: what follows may differ in its last digits", "", NOTE)
 
 
-def simulation_of(scene, system, solution, kept=None):
+def simulation_of(scene: Scene, system: System, solution: Solution, kept: Any = None) -> Any:
     """Make the simulation of a scene; refuse with an `InputError` a scene that its solver cannot take."""
     with in_file(scene.file):
         if scene.solve.kind == "static":
@@ -265,7 +288,7 @@ def simulation_of(scene, system, solution, kept=None):
         return Simulation(scene, system, solution, kept)
 
 
-def notices(scene, system):
+def notices(scene: Scene, system: System) -> Iterator[Finding]:
     """Findings on a scene before it is solved."""
     if system.net.web.kind == "file":
         from .net.mesh_file import remarks

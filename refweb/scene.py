@@ -33,9 +33,15 @@ from .settings import START_STATES, Accuracy, Dynamic, Head, Output, Static, Sup
 from .tables import Several, Table, table
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from os import PathLike
+
     from .net.cable import Cable
     from .net.web import Web
+    from .results.observables.observe import Observe
     from .results.throw import Throw
+    from .solution import Solution
+    from .system.system import System
 
 CLASSES_OF_PARTS = {
     "cable": ("Cable",),
@@ -118,9 +124,9 @@ class Scene:
     seed: int = 0
     folder: pathlib.Path | None = field(default=None, compare=False)
     file: str = field(default="", compare=False)
-    chosen: tuple = field(default=(), compare=False)
+    chosen: tuple[str, ...] = field(default=(), compare=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         head = Head(title=self.title, seed=self.seed)
         for key in ("title", "seed"):
             object.__setattr__(self, key, getattr(head, key))
@@ -168,7 +174,7 @@ class Scene:
             raise InputError(f"[output] interval = {interval:g} makes {rows}, at most {MAX_HISTORY_ROWS}")
 
     @staticmethod
-    def load(source, values=None):
+    def load(source: str | PathLike[str], values: dict[str, Any] | None = None) -> Scene:
         """The scene of a TOML file, or of the name of a scene shipped with refweb.
 
         Parameters
@@ -203,7 +209,7 @@ class Scene:
             return Scene.from_dict(given, path.resolve().parent, name)
 
     @staticmethod
-    def from_dict(given, folder=None, file=""):
+    def from_dict(given: dict[str, Any], folder: str | PathLike[str] | None = None, file: str = "") -> Scene:
         """The scene of the dict that a TOML file is read to; relative paths start at ``folder``.
 
         ``file`` is the name that begins the messages of `build`.
@@ -239,7 +245,7 @@ class Scene:
                 effects += _each(key, kind, given[key]) if kind.several else [kind.read(f"[{key}]", given[key])]
         return Scene(**parts, effects=tuple(effects))
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """The scene as the dict of its TOML file, defaults filled in and paths absolute."""
         if not isinstance(self.web, Table):
             raise InputError("[web] is a Web made in Python: a scene file cannot hold it; use refweb.Inline")
@@ -280,19 +286,19 @@ class Scene:
         return of_scene({"web": content, **self._tables()}, self.title)
 
     @property
-    def observables(self):
+    def observables(self) -> tuple[Observe, ...]:
         """The observables, or the default ones."""
         from .results.observables.observe import default
 
         return tuple(self.observe) or default()
 
     @property
-    def start_folder(self):
+    def start_folder(self) -> pathlib.Path | None:
         """The result folder that a dynamic scene starts from, None where it starts from none."""
         start = getattr(self.solve, "start", "web")
         return None if start in START_STATES else (self.folder or pathlib.Path()).joinpath(start).resolve()
 
-    def replace(self, **changes):
+    def replace(self, **changes: Any) -> Scene:
         """A scene that differs in some fields."""
         return replace(self, **changes)
 
@@ -301,7 +307,7 @@ class Scene:
         """Its ``[contact]``, None where there is none."""
         return next((effect for effect in self.effects if name_of(EFFECTS, effect) == "contact"), None)
 
-    def with_stiffness(self, stiffness):
+    def with_stiffness(self, stiffness: dict[str, float]) -> Scene:
         """The scene with another stiffness of contact for some bodies, by name, or "self_contact", as its choice."""
         bodies = {name: value for name, value in stiffness.items() if name != "self_contact"}
         tables = {"contact": bodies, "self_contact": stiffness.get("self_contact")}
@@ -309,14 +315,14 @@ class Scene:
         effects = tuple(effect.with_stiffness(value) if value else effect for value, effect in given)
         return self.replace(effects=effects, chosen=tuple(dict.fromkeys([*self.chosen, *stiffness])))
 
-    def settled(self):
+    def settled(self) -> Scene:
         """The scene with the stiffness of contact that it leaves out; itself where it leaves out none.
 
         Names of the bodies that it is chosen for, and "self_contact", stand in ``chosen``.
         """
         return self.settle()[0] if self._left_out() else self
 
-    def build(self):
+    def build(self) -> System:
         """The `refweb.system.system.System` of this scene, with the stiffness of contact that it leaves out chosen.
 
         Raises
@@ -332,7 +338,7 @@ class Scene:
         bodies = [effect for effect in self.effects if name_of(EFFECTS, effect) == "body"] if self.contact else []
         return ["self_contact" for _ in lines] + [*(self.contact.left_out(bodies) if bodies else ())]
 
-    def settle(self):
+    def settle(self) -> tuple[Scene, System]:
         """(`settled`, `build`) of it: it is built once, with any stiffness, and contact again with those chosen."""
         missing, chosen = self._left_out(), {}
         if not missing:
@@ -379,12 +385,18 @@ class Scene:
                     self.throw.on(self.observables, system, self.solve)
             return system
 
-    def trust(self, budget=None, out=None, force=False, progress=True):
+    def trust(
+        self,
+        budget: float | None = None,
+        out: str | PathLike[str] | None = None,
+        force: bool = False,
+        progress: bool | Callable[[str, float], object] | None = True,
+    ) -> Solution:
         """Find all parts of the error of each result, and its verdict, see `refweb.trust`."""
         return load("refweb.runner:trust")(self, budget, out, force, progress)
 
 
-def default_interval(solve):
+def default_interval(solve: Dynamic) -> float:
     """Time between history rows where none is given [s]: 1 ms, of runs above 1 s a thousandth of the duration.
 
     It is not shorter than a step that is given, as steps end at rows, and not longer than the duration.
@@ -392,7 +404,7 @@ def default_interval(solve):
     return min(max(SHORTEST_INTERVAL, solve.duration / ROWS_OF_LONG_RUNS, solve.step_size or 0.0), solve.duration)
 
 
-def file_of(source):
+def file_of(source: Any) -> pathlib.Path:
     """Path of a scene file, or of a scene shipped with refweb by its name; refused where there is neither."""
     if not isinstance(source, (str, os.PathLike)):
         raise InputError(f"scene = {quote(source)} must be a Scene, a scene file or the name of a shipped scene")
@@ -409,12 +421,12 @@ def file_of(source):
     raise InputError(f"{short(str(source))}: no such file and no shipped scene, {nearest(path.stem, known)}")
 
 
-def shipped():
+def shipped() -> dict[str, pathlib.Path]:
     """Paths of the scenes shipped with refweb, by name."""
     return {path.stem: path for path in sorted(SHIPPED_SCENES.glob("*.toml"))}
 
 
-def slug(title):
+def slug(title: str) -> str:
     """A title as the name of a folder, of at most 80 characters."""
     return re.sub(r"[\W_]+", "-", title.lower()).strip("-")[:80].strip("-") or "result"
 

@@ -102,7 +102,7 @@ class Static(Table):
     mass: str = choice("lumped", "consistent", default="lumped")
     factorization: str = choice("auto", *FACTORIZATIONS, default="auto")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse more load steps than 100 000."""
         if len(self.load_steps) > 100_000:
             raise InputError(f"load_steps has {len(self.load_steps)} numbers, must be at most 100000")
@@ -176,7 +176,7 @@ class Dynamic(Table):
     factorization: str = choice("auto", *FACTORIZATIONS, default="auto")
     start: str = text(default="web")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse keys of another method, and fill in the defaults of this one."""
         keys = () if self.method == "auto" else INTEGRATORS[self.method].keys
         for key in dict.fromkeys(key for method in INTEGRATORS.values() for key in method.keys):
@@ -254,10 +254,12 @@ class Event(Table):
     during: float | None = real(default=None, above=0, unit="s")
     stop: bool = boolean(default=False)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse keys of another kind, and what a kind lacks."""
-        needs = {"taut": ("line",), "threshold": ("observe", "value")}.get(self.kind, ())
-        may = {"contact": ("body", "with"), "rest": ("share", "during")}.get(self.kind, needs)
+        needed: dict[str, tuple[str, ...]] = {"taut": ("line",), "threshold": ("observe", "value")}
+        possible: dict[str, tuple[str, ...]] = {"contact": ("body", "with"), "rest": ("share", "during")}
+        needs = needed.get(self.kind, ())
+        may = possible.get(self.kind, needs)
         for key in ("body", "with", "line", "observe", "value", "share", "during"):
             value = self.with_ if key == "with" else getattr(self, key)
             if value is None and key in needs:
@@ -347,7 +349,7 @@ class Accuracy(Table):
     ensemble: int | None = integer(default=None, at_least=2, at_most=10_000)
     level: str = choice("time", "full", default="time")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse what needs something else."""
         if self.ensemble is not None and not self.horizon:
             raise InputError(f"ensemble = {self.ensemble} needs horizon = true")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pathlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+    from pandas import DataFrame
+    from pyvista import MultiBlock
 
 
 class Solution(SolutionData):
@@ -37,46 +40,46 @@ class Solution(SolutionData):
     """
 
     @property
-    def positions(self) -> np.ndarray:
+    def positions(self) -> NDArray[np.float64]:
         """Positions of the nodes in the last state [m], shape (nodes, 3); those of order and subdivision come last."""
         return self.state.position[: self.state.system.net.nodes]
 
     @property
-    def displacement(self) -> np.ndarray:
+    def displacement(self) -> NDArray[np.float64]:
         """Displacement of the nodes in the last state [m], shape (nodes, 3)."""
         return self.state.x[: self.state.system.net.nodes]
 
     @property
-    def tension(self) -> np.ndarray:
+    def tension(self) -> NDArray[np.float64]:
         """Tension of the lines in the last state [N], shape (lines,)."""
         return self.state.tension
 
     @property
-    def stress(self) -> np.ndarray:
+    def stress(self) -> NDArray[np.float64]:
         """Stress of the lines in the last state [Pa], shape (lines,)."""
         return self.state.stress
 
     @property
-    def strain(self) -> np.ndarray:
+    def strain(self) -> NDArray[np.float64]:
         """Strain of the lines in the last state [1], shape (lines,)."""
         return self.state.strain
 
     @property
-    def slack(self) -> np.ndarray:
+    def slack(self) -> NDArray[np.bool_]:
         """Lines that are slack in the last state, bool, shape (lines,)."""
         return self.state.slack
 
     @property
-    def velocities(self) -> np.ndarray:
+    def velocities(self) -> NDArray[np.float64]:
         """Velocities of the nodes in the last state [m/s], shape (nodes, 3)."""
         return self.state.v[: self.state.system.net.nodes]
 
     @property
-    def reaction(self) -> np.ndarray:
+    def reaction(self) -> NDArray[np.float64]:
         """Force of the supports on the nodes in the last state [N], shape (nodes, 3)."""
         return self.state.reaction[: self.state.system.net.nodes]
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         values = ", ".join(f"{name} = {result.value:.6g} {result.unit}" for name, result in self.results.items())
         return f'<Solution of "{self.scene.title}": {self.status}; {values}>'
 
@@ -85,7 +88,7 @@ class Solution(SolutionData):
 
         return of_solution(self)
 
-    def to_pyvista(self, frame=-1):
+    def to_pyvista(self, frame: int = -1) -> MultiBlock:
         """A frame as meshes of pyvista.
 
         Parameters
@@ -130,7 +133,7 @@ class Solution(SolutionData):
         range: Sequence[float] | str | None = None,
         scale: float = 1.0,
         view: Sequence[float] | str | None = None,
-        out: str | PathLike | None = None,
+        out: str | PathLike[str] | None = None,
         labels: str | None = None,
     ) -> Figure:
         """Draw one frame, as `refweb.picture` does, whose options these are.
@@ -149,7 +152,7 @@ class Solution(SolutionData):
 
         return picture(self, frame, time, field, range, scale, view, out, labels)
 
-    def to_pandas(self, what="history"):
+    def to_pandas(self, what: str = "history") -> DataFrame:
         """Results or history as a table of pandas, which is to be installed.
 
         Parameters
@@ -187,7 +190,7 @@ class Solution(SolutionData):
         table.attrs = {"title": self.scene.title, "units": dict(map(_named, self.columns))}
         return table
 
-    def plot(self, quantity: str | Sequence[str] | None = None, out: str | PathLike | None = None) -> Figure:
+    def plot(self, quantity: str | Sequence[str] | None = None, out: str | PathLike[str] | None = None) -> Figure:
         """Draw histories with ±, balances, spectra, stress over distance; a notebook shows the figure.
 
         Parameters
@@ -220,7 +223,9 @@ class Solution(SolutionData):
             write(figure, path)
         return figure
 
-    def report(self, out: str | PathLike | None = None, frames: int | None = None, sheet: bool = False) -> pathlib.Path:
+    def report(
+        self, out: str | PathLike[str] | None = None, frames: int | None = None, sheet: bool = False
+    ) -> pathlib.Path:
         """Write one page of the run, HTML that needs nothing else, with the web in space to turn and play.
 
         Parameters
@@ -247,7 +252,7 @@ class Solution(SolutionData):
 
         return report_of(self, out, frames, sheet)
 
-    def save(self, folder, force=False):
+    def save(self, folder: str | PathLike[str], force: bool = False) -> None:
         """Write the result folder.
 
         Parameters
@@ -279,7 +284,7 @@ class Solution(SolutionData):
         out.summary(self.summary())
 
 
-def load(folder) -> Solution:
+def load(folder: str | PathLike[str]) -> Solution:
     """The solution in a result folder, as `refweb.run` returned it.
 
     Its last state is that of the folder's last frame. The history is read when it is asked for, and a frame when it is
@@ -322,7 +327,7 @@ def load(folder) -> Solution:
     return solution
 
 
-def summary_of(folder):
+def summary_of(folder: str | PathLike[str]) -> dict[str, Any]:
     """The content of ``run.json`` in a result folder of refweb, a dict; `InputError` where there is none."""
     folder = pathlib.Path(folder)
     name = f"result folder {short(str(folder))}:"
@@ -334,7 +339,7 @@ def summary_of(folder):
     return summary
 
 
-def scene_of(folder, summary):
+def scene_of(folder: str | PathLike[str], summary: dict[str, Any]) -> Scene:
     """The scene in a result folder, with the stiffness of contact that refweb has chosen still its own to choose."""
     return Scene.load(pathlib.Path(folder) / "scene.toml").replace(chosen=tuple(summary.get("chosen", ())))
 

@@ -13,13 +13,18 @@ import functools
 import math
 import numbers
 from dataclasses import MISSING
-from typing import Any, ClassVar, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, dataclass_transform
 
 from .accepted import accepts, any_of, array, by_name, limits
 from .errors import InputError, refused_at
 from .messages import closest, nearest, quote, short
 from .registry import known, possible
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from dataclasses import Field
+
+T = TypeVar("T")
 LARGEST = 1e100
 """Largest value of a number with a unit: products of three stay finite."""
 SMALLEST = 1e-100
@@ -81,18 +86,26 @@ def _list(name, value, what):
     return value
 
 
-def field(read, *, default=MISSING, default_factory=MISSING, unit="") -> Any:
+def field(read: Callable[..., Any], *, default: Any = MISSING, default_factory: Any = MISSING, unit: str = "") -> Any:
     """A dataclass field whose values pass through ``read(name, value)``; None passes where it is the default."""
     made: dict = {"default": default} if default_factory is MISSING else {"default_factory": default_factory}
     return dataclasses.field(metadata={"read": read, "unit": unit}, **made)
 
 
-def checked(name, value, kind) -> Any:
+def checked(name: str, value: Any, kind: Any) -> Any:
     """A value as a field reads it: ``checked("seed", 3, integer(at_least=0))``."""
     return kind.metadata["read"](name, value)
 
 
-def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARGEST, unit="") -> Any:
+def real(
+    default: Any = MISSING,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+    at_most: float | None = LARGEST,
+    unit: str = "",
+) -> Any:
     """A finite real number within bounds."""
 
     @accepts(limits("number", above, -LARGEST if at_least is None else at_least, below, at_most))
@@ -102,7 +115,7 @@ def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARG
     return field(read, default=default, unit=unit)
 
 
-def integer(default=MISSING, *, at_least=None, at_most=None) -> Any:
+def integer(default: Any = MISSING, *, at_least: int | None = None, at_most: int | None = None) -> Any:
     """A whole number within bounds."""
 
     @accepts(limits("integer", at_least=at_least, at_most=at_most))
@@ -112,7 +125,7 @@ def integer(default=MISSING, *, at_least=None, at_most=None) -> Any:
     return field(read, default=default)
 
 
-def choice(*values, default=MISSING) -> Any:
+def choice(*values: Any, default: Any = MISSING) -> Any:
     """Accept one of a few values; a table of `refweb.registry` among them stands for its names."""
     registered = [given for given in values if isinstance(given, dict)]
 
@@ -134,7 +147,7 @@ def choice(*values, default=MISSING) -> Any:
     return field(read, default=default)
 
 
-def boolean(default=MISSING) -> Any:
+def boolean(default: Any = MISSING) -> Any:
     """True or false."""
 
     @accepts({"type": "boolean"})
@@ -146,7 +159,7 @@ def boolean(default=MISSING) -> Any:
     return field(read, default=default)
 
 
-def text(default=MISSING, *, limit=4096) -> Any:
+def text(default: Any = MISSING, *, limit: int = 4096) -> Any:
     """A string that is not empty, stands on one line and has at most ``limit`` characters."""
 
     @accepts({"type": "string", "pattern": r"\S", "maxLength": limit})
@@ -160,7 +173,7 @@ def text(default=MISSING, *, limit=4096) -> Any:
     return field(read, default=default)
 
 
-def vector(default=MISSING, unit="") -> Any:
+def vector(default: Any = MISSING, unit: str = "") -> Any:
     """Three finite numbers."""
 
     @accepts(array(_number.accepts, 3, 3))
@@ -173,7 +186,7 @@ def vector(default=MISSING, unit="") -> Any:
     return field(read, default=default, unit=unit)
 
 
-def rows(width, default=MISSING, *, unit="", increasing=False, number=_number) -> Any:
+def rows(width: int, default: Any = MISSING, *, unit: str = "", increasing: bool = False, number: Any = _number) -> Any:
     """A list of rows of ``width`` numbers; ``increasing`` asks that of the first column (a table over time)."""
 
     @accepts(array(array(number.accepts, width, width), 1))
@@ -197,12 +210,12 @@ def rows(width, default=MISSING, *, unit="", increasing=False, number=_number) -
 
 
 @accepts({"type": "integer", "minimum": 0})
-def node_number(name, value):
+def node_number(name: str, value: Any) -> int:
     """Read one whole number ≥ 0."""
     return _bounded(name, _integer(name, value, "a whole number ≥ 0"), "", None, 0, None, None)
 
 
-def numbers_list(default=MISSING, *, number=_number, empty=False) -> Any:
+def numbers_list(default: Any = MISSING, *, number: Any = _number, empty: bool = False) -> Any:
     """A list of numbers; ``number=node_number`` for whole numbers ≥ 0."""
 
     @accepts(array(number.accepts, 1 - empty))
@@ -215,7 +228,7 @@ def numbers_list(default=MISSING, *, number=_number, empty=False) -> Any:
     return field(read, default=default)
 
 
-def texts(default=MISSING) -> Any:
+def texts(default: Any = MISSING) -> Any:
     """A list of strings."""
 
     @accepts(array({"type": "string"}))
@@ -229,7 +242,7 @@ def texts(default=MISSING) -> Any:
     return field(read, default=default)
 
 
-def nodes(default=MISSING, *, empty=False, what="node") -> Any:
+def nodes(default: Any = MISSING, *, empty: bool = False, what: str = "node") -> Any:
     """A number of a node (or a line), a name, or a list of them; `refweb.net.web.Web.find` turns it into numbers."""
 
     either = [node_number.accepts, {"type": "string"}]
@@ -252,7 +265,7 @@ def nodes(default=MISSING, *, empty=False, what="node") -> Any:
     return field(read, default=default)
 
 
-def component(default=MISSING, *, axes="xyz") -> Any:
+def component(default: Any = MISSING, *, axes: str = "xyz") -> Any:
     """An axis: 0, 1, 2 or "x", "y", "z"; read as 0, 1 or 2."""
     known = [*range(len(axes)), *axes]
 
@@ -267,7 +280,7 @@ def component(default=MISSING, *, axes="xyz") -> Any:
     return field(read, default=default)
 
 
-def components(default=MISSING) -> Any:
+def components(default: Any = MISSING) -> Any:
     """A list of axes; read as a sorted tuple of 0, 1, 2."""
 
     @accepts(array(component().metadata["read"].accepts, 1))
@@ -280,7 +293,7 @@ def components(default=MISSING) -> Any:
     return field(read, default=default)
 
 
-def by_group(kind, where, *, default_factory=dict) -> Any:
+def by_group(kind: type[Table], where: str, *, default_factory: Callable[[], dict[str, Any]] = dict) -> Any:
     """Tables of a class by group of lines, in the scene ``[where.groups.NAME]``."""
 
     @accepts(by_name(kind))
@@ -295,7 +308,7 @@ def by_group(kind, where, *, default_factory=dict) -> Any:
     return field(read, default_factory=default_factory)
 
 
-def part(kind) -> Any:
+def part(kind: type[Any]) -> Any:
     """A table of a class below another one, None without it."""
 
     @accepts(kind)
@@ -305,12 +318,12 @@ def part(kind) -> Any:
     return field(read, default=None)
 
 
-def key_of(f):
+def key_of(f: Field[Any]) -> str:
     """Key of a field in scenes: its name, without the ``_`` behind a word of Python's own."""
     return f.name.removesuffix("_")
 
 
-def refuse_keys(cls, given):
+def refuse_keys(cls: type, given: dict[str, Any]) -> None:
     """Refuse what is no key of a class of `table`, with the nearest that is, and a key that is missing."""
     known = cls.keys(given) if issubclass(cls, Table) else [key_of(f) for f in dataclasses.fields(cls)]
     for key in given:
@@ -344,7 +357,7 @@ def refuse_keys(cls, given):
         dataclasses.field,
     ),
 )
-def table(cls):
+def table(cls: type[T]) -> type[T]:
     """Make a frozen dataclass of keywords alone, which names the nearest key where one is misspelt.
 
     Raises
@@ -353,7 +366,7 @@ def table(cls):
         From the class, where a key is unknown or missing.
     """
     described = cls.__doc__
-    made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    made: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     made.__doc__ = described or ""  # not the signature that a dataclass has in place of one
     initial, keys = made.__init__, {f.name: key_of(f) for f in dataclasses.fields(made)}
 
@@ -376,11 +389,11 @@ class Table:
     """
 
     several = False
-    excludes = ()
+    excludes: ClassVar[tuple[str, ...]] = ()
     either: ClassVar[tuple[tuple[str, ...], ...]] = ()
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for f in dataclasses.fields(self):
             value = getattr(self, f.name)
             if value is None and f.default is None:
@@ -390,23 +403,23 @@ class Table:
             object.__setattr__(self, f.name, checked(key_of(f), value, f))
         self.check()
 
-    def check(self):
+    def check(self) -> None:
         """Refuse impossible combinations of values; the default refuses none."""
 
     @classmethod
-    def keys(cls, given):
+    def keys(cls, given: dict[str, Any]) -> list[str]:
         """Names of the keys that the table may have when it is read from a dict."""
         return [key_of(f) for f in dataclasses.fields(cls)]
 
     @classmethod
-    def read(cls, where, given):
+    def read(cls, where: str, given: Any) -> Self:
         """The table from a dict; ``where`` (such as ``[gravity]``) begins every message."""
         if not isinstance(given, dict):
             raise InputError(f"{where} = {quote(given)} must be a table")
         with refused_at(where):
             return cls(**given)
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         """The table as plain TOML values, defaults filled in, absent values left out."""
 
         def plain(value):

@@ -22,7 +22,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     (
         "compiled",
         "*",
-        "Kernels: what compiles them, keeps their machine code on disk and hands records to them by one pointer.",
+        "Kernels: their compilation, machine code on disk, and records that they read by one pointer.",
     ),
     ("the ground floor", "accepted errors findings messages tables kernels memory settings registry", ""),
     ("net.laws", "*", "Tension laws of lines: stress, tangent and energy over strain; they know nothing of nets."),
@@ -60,7 +60,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     (
         "system",
         "*",
-        "M v' = f assembled: force, tangent, mass, links and factorizations; it knows no scene, method or file.",
+        "M v' = f of a net: forces, tangent, mass, links and factorizations; it knows no scene, method or file.",
     ),
     (
         "results",
@@ -97,7 +97,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     (
         "sweeps",
         "*",
-        "Many runs of one scene: cases, workers, rows and chances; it knows the desk, and nothing of the command line.",
+        "Many runs of one scene: cases, workers, rows and statistics; it knows scenes and runs, and no command line.",
     ),
     ("commands", "*", "The verbs of the command line, one file each; they know everything, and nothing knows them."),
     ("the door", "__main__", ""),

@@ -31,6 +31,7 @@ LONG = (
     "trust",
     "rupture",
     "frequencies",
+    "drag_and_link",
     "cable_law",
 )
 """Cases that take more than two seconds with ``--quick``; what they show has tests of its own beside them."""

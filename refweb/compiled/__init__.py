@@ -1,12 +1,12 @@
-"""Kernels: what compiles them, keeps their machine code on disk and hands records to them by one pointer.
+"""Kernels: their compilation, machine code on disk, and records that they read by one pointer.
 
 ===================  ==========================================================================================
-`kernel`             what a kernel is: compiled when it is called, listed or prepared, and never before
-`records`, `tables`  what kernels take by one pointer
-`keys`               what the machine code of a kernel depends on
-`store`              where it is kept: a folder of the user's, and one in the package of a wheel
-`second_process`     a copy of the process that compiles as well, from the other end of a list
-`numba_internals`    all that relies on private parts of numba, each with its reason and a way without it
+`kernel`             kernels: compiled when they are called, put in a table or prepared, and not before
+`records`, `tables`  arguments of kernels that are passed by one pointer
+`keys`               digests of all on which the machine code of a kernel depends
+`store`              files of machine code, in a folder of the user and in the package of a wheel
+`second_process`     a copy of the process that compiles from the other end of a list
+`numba_internals`    all uses of private parts of numba, with reasons and the ways without them
 ===================  ==========================================================================================
 """
 
@@ -16,7 +16,7 @@ import contextlib
 from collections.abc import Callable
 
 watchers: list[Callable[[int, int], None]] = []
-"""Called with the number of kernels that have been compiled and of those that are to be, before each of them."""
+"""Functions that are called before each compilation, with the numbers of compiled kernels and of all to compile."""
 
 
 @contextlib.contextmanager

@@ -1,10 +1,10 @@
-"""Kernels: functions that numba compiles when they are called, stand in a table or are prepared, never before.
+"""Kernels: functions that numba compiles when they are called, put in a table or prepared, and not before.
 
-Three kinds of calls lead to a kernel. Another kernel that names it is optimized with it, as numba does by itself: for
-what stands in loops over elements. A kernel with ``apart`` is called by its address: its callers know its signature,
-which its annotations say, and are neither optimized with it nor compiled again when it changes. Its ``apart`` are the
-features that a run needs to reach it; a run without them neither compiles nor loads it, see `prepare`. And Python calls
-a kernel through an entry of its own, which is compiled when it is first asked for.
+There are three kinds of calls of a kernel. In a call by another kernel numba optimizes both together; this is for code
+in loops over elements. A kernel with ``apart`` is called by its address: its callers know only its signature, from its
+annotations, and are not compiled again when the kernel changes. ``apart`` lists the features of a run that may call it;
+a run without them neither compiles nor loads it, see `prepare`. A call from Python goes through an entry, which is
+compiled at the first call.
 """
 
 from __future__ import annotations
@@ -13,22 +13,25 @@ import contextlib
 import functools
 import gc
 import typing
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from numba import types
 
 from . import keys, numba_internals, watchers
 from .second_process import beside
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 COMMON = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
-"""Options of all kernels: products and sums may contract, nothing else departs from IEEE arithmetic."""
+"""Options of all kernels: fused products and sums are allowed, otherwise the arithmetic is that of IEEE 754."""
 PLAIN_TYPES = {float: types.float64, int: types.int64, bool: types.boolean, type(None): types.void}
 RECORDS: dict[str, Any] = {}
-"""Classes of records by name, for annotations whose module does not import them."""
+"""Classes of records by name, for annotations in modules that do not import them."""
 
 
 def type_of(annotation):
-    """numba's type of what an annotation says: a number, an array with its type, a table, or a record."""
+    """Type of numba for an annotation: a number, an array with its type, a table, or a record."""
     if annotation in PLAIN_TYPES:
         return PLAIN_TYPES[annotation]
     if typing.get_origin(annotation) is Annotated:
@@ -40,7 +43,7 @@ def type_of(annotation):
 
 
 def signature_of(function):
-    """The `numba` signature that the annotations of a function say."""
+    """The numba signature from the annotations of a function."""
     hints = typing.get_type_hints(function, localns=RECORDS, include_extras=True)
     result = type_of(hints.pop("return"))
     return result(*map(type_of, hints.values()))
@@ -54,9 +57,9 @@ class Kernel:
     py_func : function
         The Python function.
     prepared : bool
-        True if there is machine code of all kernels that it may reach, for any features of a run.
+        True if there is machine code of all kernels that it may call, for any features of a run.
     apart : frozenset of str, optional
-        Features of a run that reaches it, for one that is called by its address; else None.
+        Features of runs that may call it, for a kernel that is called by its address; else None.
     """
 
     def __init__(self, function, signature, apart, counted, options):
@@ -69,12 +72,12 @@ class Kernel:
 
     @property
     def name(self):
-        """Its name with that of its module, without the package's."""
+        """Its name with its module, without the package."""
         return f"{self.py_func.__module__}.{self.py_func.__qualname__}".removeprefix("refweb.").replace("<locals>.", "")
 
     @functools.cached_property
     def signature(self):
-        """Its one signature; None where callers give it any."""
+        """Its only signature; None if callers determine it."""
         return signature_of(self.py_func) if self._given is None and self.apart is not None else self._given
 
     @functools.cached_property
@@ -84,11 +87,11 @@ class Kernel:
 
     @property
     def _linked(self):
-        """True if kernels that name it are optimized with it."""
+        """True if its callers are optimized with it."""
         return self.apart is None or numba_internals.PLAIN
 
     def machine_code_key(self):
-        """Key of all that a caller's machine code depends on, see `refweb.compiled.keys.described`."""
+        """Key of its part in the machine code of a caller, see `refweb.compiled.keys.described`."""
         return self._key if self._linked else _ByAddress(self).machine_code_key()
 
     @functools.cached_property
@@ -106,7 +109,7 @@ class Kernel:
         return numba_internals.dispatcher(self.py_func, given, cache)
 
     def _compiled(self):
-        """The same, with its one signature compiled where it has one."""
+        """The dispatcher, with its only signature compiled if it has one."""
         body = self._body
         if self.signature is not None and not body.overloads:
             body.compile(self.signature)
@@ -125,7 +128,7 @@ class Kernel:
         return numba_internals.PLAIN or self._body._cache.has(self.signature)
 
     def address(self):
-        """Address of its machine code, which is compiled where there is none."""
+        """Address of its machine code, which is compiled if necessary."""
         with numba_internals.lock:
             if not self._slot.filled:
                 for callee in self.callees:
@@ -149,7 +152,7 @@ class Kernel:
 
     @property
     def call(self):
-        """Entry for a run that has prepared it with its features: kernels for others may not be compiled."""
+        """Entry for a run that has prepared it with its features; kernels for other features may not be compiled."""
         return self._entry
 
     @functools.cached_property
@@ -174,7 +177,7 @@ def entry_of(signature):
 
 
 class _ByAddress:
-    """A kernel as its callers see it that call it by its address."""
+    """A kernel for callers that call it by its address."""
 
     def __init__(self, kernel):
         self.kernel = kernel
@@ -203,7 +206,7 @@ def _collect(function, kernels, visited):
 
 
 def needed(kernels, features=None):
-    """Kernels to have machine code of before a run: some, and all that they reach by address with its features.
+    """List the kernels whose machine code a run needs: given ones, and all that they call by address.
 
     Parameters
     ----------
@@ -227,7 +230,7 @@ def needed(kernels, features=None):
 
 
 def prepare(kernels, features=None):
-    """Compile or load all that is `needed` before a run, and tell `refweb.compiled.watchers` what is to be compiled.
+    """Compile or load all `needed` kernels before a run, and call `refweb.compiled.watchers` for compiled ones.
 
     Parameters
     ----------
@@ -248,7 +251,7 @@ def prepare(kernels, features=None):
 
 @contextlib.contextmanager
 def _no_collection():
-    """Do not look for unreachable objects: compiling makes many that stay, which takes a tenth of its time."""
+    """Disable garbage collection, which takes a tenth of the time of compilation, since many objects stay."""
     looks = gc.isenabled()
     gc.disable()
     try:
@@ -258,19 +261,19 @@ def _no_collection():
             gc.enable()
 
 
-def kernel(signature=None, *, leaf=False, apart=None, **options) -> Any:
+def kernel(signature: Any = None, *, leaf: bool = False, apart: Sequence[str] | None = None, **options: Any) -> Any:
     """Compile a function, and keep its machine code on disk.
 
     Parameters
     ----------
     signature : numba signature, optional
-        The only one that it has; by default callers give it any, or where it is ``apart`` its annotations say.
+        Its only signature; by default callers determine it, or, with ``apart``, its annotations.
     leaf : bool
-        True if it counts no references to arrays, which takes 10 ns for each array and call. Such a kernel neither
-        makes nor returns arrays, nor calls kernels that return any.
+        True for a kernel without reference counting, which takes 10 ns for each array and call. Such a kernel neither
+        makes nor returns arrays, and calls no kernels that do.
     apart : sequence of str, optional
-        Features of a run that reaches it: it is called by its address, see the module.
+        Features of runs that may call it, by its address, see the module.
     **options
-        Of `numba.njit`.
+        Options of `numba.njit`.
     """
     return lambda function: Kernel(function, signature, apart, not leaf, options)

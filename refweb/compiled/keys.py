@@ -1,7 +1,7 @@
-"""Keys of machine code: the bytecode of a kernel, and of all that is compiled into it.
+"""Keys of machine code: digests of the bytecode of a kernel and of all that is compiled into it.
 
-A comment, a docstring or a moved line changes no bytecode, so that nothing is compiled again. A kernel that is called
-by its address counts with its signature alone: its callers stay as they are when it changes.
+A changed comment, docstring or line number changes no bytecode, and nothing is compiled again. A kernel that is called
+by its address is part of the key of its callers only by its signature: a change of it does not affect them.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ import types as python
 import numpy as np
 
 LIBRARIES = {"numpy", "numba", "llvmlite", "scipy", *sys.stdlib_module_names}
-"""Packages whose functions numba compiles by its own means, or whose version is part of `platform_key`."""
+"""Packages whose functions numba knows, or whose version is part of `platform_key`."""
 LOAD_GLOBAL, EXTENDED_ARG = opcode.opmap["LOAD_GLOBAL"], opcode.opmap["EXTENDED_ARG"]
 
 
 def digest(*parts):
-    """A short name of some texts."""
+    """Digest of some texts."""
     return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()[:24]
 
 
 @functools.cache
 def platform_key(processor):
-    """A text that tells apart what machine code depends on besides its source: versions, processor and this package."""
+    """Text of everything besides the source on which machine code depends: versions, processor and this package."""
     import llvmlite
     import numba
 
@@ -41,7 +41,7 @@ def platform_key(processor):
 
 
 def code_of(code, docstring=None):
-    """Text of a code object's instructions: neither line numbers nor its docstring, which is its first constant."""
+    """Text of the instructions of a code object, without line numbers and docstring, its first constant."""
     constants = [
         code_of(constant) if isinstance(constant, python.CodeType) else repr(constant) for constant in code.co_consts
     ]
@@ -52,7 +52,7 @@ def code_of(code, docstring=None):
 
 
 def globals_in(code):
-    """Names of the globals that a code object and those inside of it load, a set."""
+    """Names of the globals that a code object and nested ones load, a set."""
     names, extended = set(), 0
     for operation, argument in zip(code.co_code[::2], code.co_code[1::2], strict=True):
         argument |= extended << 8
@@ -66,7 +66,7 @@ def globals_in(code):
 
 
 def captured(function):
-    """Pairs of name and value that a function refers to outside of itself, in a fixed order."""
+    """Pairs of name and value of the globals and closure of a function, in a fixed order."""
     for name in sorted(globals_in(function.__code__)):
         if name in function.__globals__:
             value = function.__globals__[name]
@@ -76,7 +76,7 @@ def captured(function):
 
 
 def _used(name, value, attributes):
-    """Pairs of name and value of a captured value; of a module of a package that is no library, what is used of it."""
+    """Pairs of name and value of a captured value; for a module of no library, its functions and values in use."""
     if isinstance(value, python.ModuleType) and value.__name__.partition(".")[0] not in LIBRARIES:
         for inner in sorted(attributes & vars(value).keys()):
             yield from _used(f"{name}.{inner}", getattr(value, inner), attributes - {inner})
@@ -92,7 +92,7 @@ def described(value, visited):
     value : object
         A number, a text, a type, a kernel, a function, or a tuple of such.
     visited : tuple
-        Functions that are being described, of which no more is said.
+        Functions that are being described, to end recursion.
     """
     if hasattr(value, "machine_code_key"):
         return value.machine_code_key()
@@ -113,7 +113,7 @@ def described(value, visited):
 
 
 def of_function(function, visited=()):
-    """A text that changes where what a function does changes, or what it calls."""
+    """Text that changes with the code of a function and of all that it calls."""
     if function in visited:
         return f"again {function.__qualname__}"
     visited = (*visited, function)

@@ -1,4 +1,4 @@
-"""All that relies on private parts of numba, and what is done where one of them is missing.
+"""All uses of private parts of numba, with reasons, and the ways without them.
 
 =====================  ======================================================  ====================================
 part                   reason                                                  without it
@@ -16,8 +16,8 @@ of one's own                                                                   n
                                                                                ``extending`` stands here
 =====================  ======================================================  ====================================
 
-``REFWEB_PLAIN=1`` takes the right column. Addresses of functions and the calling convention of numba are needed in
-both: tables of kernels have them. numba is bounded above in ``pyproject.toml``.
+``REFWEB_PLAIN=1`` uses the right column. Tables of kernels need addresses of functions and the calling convention of
+numba in both. numba is bounded above in ``pyproject.toml``.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ from . import keys, store
 __all__ = ["AbstractTemplate", "AttributeTemplate", "infer_global", "lower_builtin", "make_array", "populate_array"]
 
 PLAIN = os.environ.get("REFWEB_PLAIN") == "1"
-"""True if kernels use the public parts of numba alone."""
+"""True if kernels use only public parts of numba."""
 BARE = {} if PLAIN else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of a kernel without an entry from Python."""
 ENTRY = {} if PLAIN else {"no_cfunc_wrapper": True}
-"""Options of a kernel that is entered from Python alone."""
+"""Options of a kernel that only Python calls."""
 _byte = ir.IntType(8).as_pointer()
 _config: Any = config  # numba makes its entries at run time, from variables of the environment
 lock = global_compiler_lock
@@ -71,7 +71,7 @@ def host():
 
 @functools.cache
 def shipped():
-    """(processor, features) whose machine code this processor runs and a wheel may bring; None where none does."""
+    """Processor and features of machine code in a wheel that this processor can run; None if there is none."""
     target, features = store.portable(), llvm.get_host_cpu_features()
     return target if target and (target[0] != "x86-64-v3" or all(features.get(name) for name in store.V3)) else None
 
@@ -104,7 +104,7 @@ class Cache:
         return f"{self.name}-{made}"
 
     def _paths(self, signature):
-        """Files that may have the machine code of a signature: the user's own, and that of a wheel."""
+        """Files that may contain the machine code of a signature: in the folder of the user, and in a wheel."""
         yield store.folder() / self.file(signature)
         if store.SHIPPED.is_dir() and (target := shipped()):
             yield store.SHIPPED / self.file(signature, target)
@@ -114,7 +114,7 @@ class Cache:
         return any(path.exists() for path in self._paths(signature))
 
     def load_overload(self, signature, target_context):
-        """The machine code of a signature, None where there is none."""
+        """The machine code of a signature; None if there is none."""
         content = next(
             (machine_code for path in self._paths(signature) if (machine_code := store.read(path)) is not None), None
         )
@@ -136,10 +136,10 @@ class Cache:
 
 
 def without_literals(signature):
-    """The signature for any whole number where a caller names one.
+    """The signature with integers in place of literal integers of a caller.
 
-    By itself numba compiles a kernel again for each whole number that a caller names. That pays where the caller is
-    optimized with it, as ``forceinline`` asks for: loops over the nodes of an element become straight code.
+    By default numba compiles a kernel again for each literal integer of a caller. This is useful only if both are
+    optimized together, as with ``forceinline``: loops over the nodes of an element are then unrolled.
     """
     arguments, result = sigutils.normalize_signature(signature)
     arguments = tuple(map(types.unliteral, arguments))
@@ -147,7 +147,7 @@ def without_literals(signature):
 
 
 def dispatcher(function, given, cache) -> Any:
-    """A dispatcher of numba with a `Cache`, of which one thread and one process compiles at a time."""
+    """A dispatcher of numba with a `Cache`; one thread and one process compiles at a time."""
     if PLAIN:
         return numba.njit(cache=function.__code__.co_filename != "<string>", **given)(function)
     made: Any = numba.njit(**given)(function)
@@ -180,8 +180,7 @@ def address_of(made, signature):
 class Slot:
     """Memory of the address of a kernel for its callers, 0 until it is compiled.
 
-    Its symbol is known to LLVM before any caller is compiled or read from disk: a symbol that is not would end the
-    process.
+    LLVM must know its symbol before a caller is compiled or read from disk: an unknown symbol would end the process.
     """
 
     def __init__(self, symbol, key):
@@ -195,7 +194,7 @@ class Slot:
 
     @property
     def address(self):
-        """The address, 0 where it is not known."""
+        """The address; 0 if it is not known."""
         return self._cell.value or 0
 
     def fill(self, address):
@@ -207,7 +206,7 @@ _slots: dict[str, Slot] = {}
 
 
 def slot_of(symbol, key):
-    """The `Slot` of a symbol, which stays for ever; of another symbol where a kernel of another key has it."""
+    """The `Slot` of a symbol, kept until the process ends; a symbol of a kernel with another key is renamed."""
     name = symbol
     while name in _slots and _slots[name].key != key:
         name += "'"
@@ -217,7 +216,7 @@ def slot_of(symbol, key):
 
 
 def give_back(meminfo):
-    """Give back a reference to an array that a kernel has made, by the address of what counts them."""
+    """Release a reference to an array that a kernel has made, by the address of its reference counter."""
     runtime: Any = importlib.import_module("numba.core.runtime._nrt_python")
     runtime._MemInfo(meminfo)  # takes the reference, and gives it back at its own end
 

@@ -1,10 +1,10 @@
-"""Records that kernels take by one pointer.
+"""Records: frozen dataclasses that Python writes and kernels read by one pointer.
 
-numba hands a named tuple over field by field: the explicit loop would take some thousand numbers, whose code is most of
-what a kernel has to be compiled for. Its structrefs count references, which kernels of the loop do not, and its
-structured arrays have no arrays in them. A `Record` here is a frozen dataclass. Python writes it once to a block of
-memory that lives as long as it does, one word a number, a pointer and the sizes of an array, or the pointer to another
-record or table; kernels read the fields that they name from there. The annotation of a field says how kernels see it:
+numba passes a named tuple field by field: the explicit loop would have a thousand arguments, and most of the
+compilation time would be for them. The structrefs of numba count references, which kernels of the loop avoid, and
+structured arrays cannot contain arrays. A `Record` is written once to a block of memory that exists as long as the
+record: a word for a number, pointer and sizes for an array, and a pointer for another record or table. Kernels read
+fields from the block. The annotation of a field determines its form in kernels:
 
 =====================  =======================================================================================
 float, int             a number, which stays what it was when the block was written
@@ -20,7 +20,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import typing
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from llvmlite import ir
@@ -31,9 +31,12 @@ from . import kernel, keys
 from .numba_internals import AttributeTemplate
 from .tables import WORD, Functions, Pointer, array_at, enter, load, pointer_to, refuse, sizes_of
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 
 class Reference(Pointer):
-    """Type of a `record`; its name changes with the fields of it and of all that it has."""
+    """Type of a `Record`; its name changes with its fields and those of its records."""
 
     def __init__(self, of):
         hints = typing.get_type_hints(of, localns=kernel.RECORDS, include_extras=True)
@@ -85,7 +88,7 @@ def _read_field(context, builder, kind, value, name):
 class Record:
     """A frozen dataclass that kernels take by one pointer; annotations of a subclass are its fields, see the module."""
 
-    def __init_subclass__(cls):
+    def __init_subclass__(cls) -> None:
         known = kernel.RECORDS.get(cls.__name__)
         if known is not None and known.__module__ != cls.__module__:
             raise TypeError(f"a record {cls.__name__} stands in {known.__module__}: give this one another name")
@@ -118,25 +121,25 @@ class Record:
         return np.array(words, dtype=WORD)
 
     @functools.cached_property
-    def address(self):
-        """Address of the block, which lives as long as the record."""
+    def address(self) -> int:
+        """Address of the block, valid as long as the record exists."""
         return self._block.ctypes.data
 
-    def __getstate__(self):
-        """Its fields: a copy has a block of its own."""
+    def __getstate__(self) -> dict[str, Any]:
+        """Its fields; a copy makes a new block."""
         return self.by_name()
 
     @classmethod
-    def field_names(cls):
+    def field_names(cls) -> list[str]:
         """Names of the fields."""
         base: Any = cls
         return [field.name for field in dataclasses.fields(base)]
 
-    def by_name(self):
+    def by_name(self) -> dict[str, Any]:
         """Its fields by name."""
         return {name: getattr(self, name) for name in self.field_names()}
 
-    def all_kernels(self):
+    def all_kernels(self) -> Iterator[Any]:
         """All kernels in its tables and those of its records."""
         for value in self.by_name().values():
             if isinstance(value, Functions):

@@ -1,13 +1,13 @@
 """Rows of matrices as records: Python and kernels read the numbers of a cell by the names of one dtype.
 
-All terms of the compiled loop take matrices, so that one loop serves every combination of them. A dtype says what the
-columns of one are called; its fields are all of one type, numbers or arrays of them, and in front of what a record
-names, or behind it, a row may have more.
+All terms of the compiled loop take matrices, so that one loop serves every combination of them. A dtype names the
+columns of a matrix; its fields are numbers or arrays of one type. A row may have more columns before and after those of
+a record.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import types
@@ -15,25 +15,29 @@ from numba.extending import intrinsic
 
 from .numba_internals import make_array
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 _intrinsic: Any = intrinsic  # kernels give all but the first argument
 
 
-def width_of(kind):
+def width_of(kind: np.dtype[Any]) -> int:
     """Number of columns of a dtype."""
     return kind.itemsize // 8
 
 
-def column_of(kind, field):
+def column_of(kind: np.dtype[Any], field: str) -> int:
     """Number of the first column of a field."""
-    return kind.fields[field][1] // 8
+    fields: Any = kind.fields
+    return fields[field][1] // 8
 
 
-def records_of(kind, matrix):
-    """The rows of a C-contiguous matrix as records over the same memory, shape (rows,); of its first columns."""
+def records_of(kind: np.dtype[Any], matrix: NDArray[np.float64]) -> NDArray[Any]:
+    """The first columns of a C-contiguous matrix as records over the same memory, shape (rows,)."""
     return np.ndarray(len(matrix), kind, matrix, strides=matrix.strides[:1])
 
 
-def matrix_of(records):
+def matrix_of(records: NDArray[Any]) -> NDArray[np.float64]:
     """Numbers of records as a matrix over the same memory, shape (records, columns)."""
     return records.view(float).reshape(len(records), width_of(records.dtype))
 

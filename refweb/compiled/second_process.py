@@ -1,9 +1,9 @@
-"""A second process that compiles: a copy of this one, which begins at the other end of the list.
+"""A second process for compilation: a copy of this one, which starts at the other end of the list.
 
-LLVM and numba's front end hold locks, so that two threads compile no faster than one. A copy of the process has all
-kernels of the list with their records and factories, needs no imports, and leaves what it compiles in the folder of
-`refweb.compiled.store`, where the first process reads what it comes to. Locks of files keep both from compiling the
-same. There is a copy on Linux, where copies of processes with threads are safe while no thread compiles.
+LLVM and the front end of numba hold locks, so that two threads compile no faster than one. A copy of the process has
+all kernels of the list, needs no imports, and writes machine code to the folder of `refweb.compiled.store`, from which
+the first process reads it. File locks prevent that both compile the same kernel. A copy is made only on Linux, on which
+copying a process with threads is safe while no thread compiles.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import warnings
 from . import numba_internals
 
 LEAST = 8
-"""Number of kernels from which on a second process is begun; a copy costs some 20 ms."""
+"""Least number of kernels for a second process; a copy costs some 20 ms."""
 
 
 def allowed():
     """Tell if a second process may compile.
 
-    Not on one core, not where ``REFWEB_COMPILERS=1`` says so, and not in a worker: its like are busy on other cores.
+    It may not on one core, with ``REFWEB_COMPILERS=1``, and in a worker, since other workers use the other cores.
     """
     if sys.platform != "linux" or numba_internals.PLAIN or os.environ.get("REFWEB_COMPILERS") == "1":
         return False
@@ -34,12 +34,12 @@ def allowed():
 
 @contextlib.contextmanager
 def beside(kernels):
-    """Compile some kernels in a copy of this process, the last one first, while the block does so from the first on.
+    """Compile some kernels in a copy of this process, the last one first, while the block compiles from the first on.
 
     Parameters
     ----------
     kernels : list of refweb.compiled.kernel.Kernel
-        Those without machine code on disk. Fewer than `LEAST` are left to the block.
+        Kernels without machine code on disk. Fewer than `LEAST` are left to the block.
     """
     if len(kernels) < LEAST or not allowed():
         yield
@@ -55,7 +55,7 @@ def beside(kernels):
 
 
 def _copy(kernels):
-    """Number of the process that compiles kernels from the last one on."""
+    """Start a process that compiles kernels from the last one on; returns its id."""
     parent = os.getpid()
     with numba_internals.lock, warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # of copies of processes with threads

@@ -1,8 +1,8 @@
-"""Storage of machine code: one file for each kernel and signature, named by all that it depends on.
+"""Storage of machine code: one file for each kernel and signature, named by a digest of its dependencies.
 
-It is looked for in a folder of the user's, see `folder`, then in the one that a wheel brings, ``machine_code`` in this
-package. A file is written beside its place and moved there, so that several processes may share a folder, and is read
-only where its name is that of what is asked for. Files unused for `UNUSED` are removed when something is compiled.
+Files are searched in a folder of the user, see `folder`, then in the folder ``machine_code`` of this package, which a
+wheel may contain. A file is written under another name and then renamed, so that several processes may share a folder.
+Files unused for `UNUSED` are removed during compilation.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ import tempfile
 import time
 
 UNUSED = 90 * 24 * 3600.0
-"""Time after which a file that nobody has read is removed [s]."""
+"""Time after which an unused file is removed [s]."""
 NOTED = 24 * 3600.0
-"""Age of a file from which on its use is noted [s]."""
+"""Age of a file above which its use updates its time [s]."""
 V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 """Features of a processor that runs code for x86-64-v3."""
 CHECK = 16
-"""Bytes of the checksum that a file begins with."""
+"""Size of the checksum at the beginning of a file [byte]."""
 SHIPPED = pathlib.Path(__file__).parent / "machine_code"
 """Folder of the machine code that a wheel contains."""
 
 
 @functools.cache
 def folder():
-    """The folder that machine code is kept in: ``REFWEB_CACHE``, else one of the user's for the cache of programs."""
+    """Folder of machine code: ``REFWEB_CACHE``, else the cache folder of the user."""
     if path := os.environ.get("REFWEB_CACHE"):
         return pathlib.Path(path)
     import platformdirs
@@ -39,7 +39,7 @@ def folder():
 
 
 def portable():
-    """(processor, features) that machine code in a wheel is made for on machines like this one; None where for none."""
+    """Processor and features of machine code in wheels for machines like this one; None if there is none."""
     machine = platform.machine().lower()
     if machine in ("x86_64", "amd64"):
         return "x86-64-v3", ""
@@ -51,7 +51,7 @@ def _checksum(content):
 
 
 def read(path):
-    """Content of a file, whose use is noted; None where there is none, or a damaged one."""
+    """Content of a file, with an update of its time; None if it does not exist or is damaged."""
     with contextlib.suppress(OSError):
         content = path.read_bytes()
         if content[:CHECK] == _checksum(content[CHECK:]):
@@ -61,14 +61,14 @@ def read(path):
 
 
 def _note_use(path):
-    """Give a file the present time, where its own is older than `NOTED`."""
+    """Update the time of a file that is older than `NOTED`."""
     with contextlib.suppress(OSError):
         if time.time() - path.stat().st_mtime > NOTED:
             os.utime(path)
 
 
 def write(name, content):
-    """Write a file of machine code, where the folder can be written to."""
+    """Write a file of machine code, if the folder can be written."""
     with contextlib.suppress(OSError):
         folder().mkdir(parents=True, exist_ok=True)
         number, path = tempfile.mkstemp(dir=folder(), suffix=".part")
@@ -80,7 +80,7 @@ def write(name, content):
 
 @functools.cache
 def prune():
-    """Remove what nobody has used for long, once a process."""
+    """Remove unused files, once in a process."""
     before = time.time() - UNUSED
     for path in folder().iterdir():
         with contextlib.suppress(OSError):
@@ -90,7 +90,7 @@ def prune():
 
 @contextlib.contextmanager
 def alone(name):
-    """Keep other processes from compiling what has a name; they wait, and read what has been written."""
+    """Lock a name during compilation; other processes wait, and then read the written file."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(ImportError, OSError):
             import fcntl  # not on Windows, where each process compiles

@@ -1,7 +1,8 @@
-"""Tables that kernels take by one pointer: of arrays of one type, and of kernels of one signature.
+"""Tables that kernels read by one pointer: of arrays of one type, and of kernels of one signature.
 
-A table is two words, the number of its items and where they stand. An item of a table of kernels is an address. One of
-a table of arrays is what counts its references, 0 where Python does, its address and its sizes.
+A table has two words, the number of its items and their address. An item of a table of kernels is the address of a
+kernel. An item of a table of arrays has the address of a reference counter, 0 for an array of Python, the address of
+the array, and its sizes.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import ctypes
 import functools
 import operator
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from llvmlite import ir
@@ -22,23 +23,28 @@ from numba.np.numpy_support import as_dtype
 from . import numba_internals
 from .numba_internals import AbstractTemplate, infer_global, lower_builtin, make_array, populate_array
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
 _word, _byte = ir.IntType(64), ir.IntType(8).as_pointer()
 WORD = np.dtype(np.int64)
 _global: Any = infer_global
 
 
 def pointer_to(builder, word):
-    """A pointer, of the word that holds it."""
+    """Pointer from a word that contains an address."""
     return builder.inttoptr(word, _byte)
 
 
 def _words_at(builder, pointer, index):
-    """Pointer to a word behind a pointer."""
+    """Pointer to a word at an index from a pointer."""
     return builder.gep(builder.bitcast(pointer, _word.as_pointer()), [index])
 
 
 def load(builder, pointer, index, stays=True):
-    """A word behind a pointer, which ``stays`` what it is while kernels run, or may change."""
+    """Word at an index from a pointer; ``stays`` is True if kernels do not change it."""
     value = builder.load(_words_at(builder, pointer, ir.Constant(_word, index)))
     if stays:
         value.set_metadata("invariant.load", builder.module.add_metadata([]))
@@ -46,7 +52,7 @@ def load(builder, pointer, index, stays=True):
 
 
 def array_at(context, builder, kind, data, sizes, meminfo=None):
-    """An array of numba's at an address, with sizes of its own."""
+    """Array of numba at an address, with given sizes."""
     made = make_array(kind)(context, builder)
     size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
     step, strides = ir.Constant(_word, size), []
@@ -59,26 +65,26 @@ def array_at(context, builder, kind, data, sizes, meminfo=None):
 
 
 class Pointer(types.Type):
-    """Type of what is handed over by one pointer."""
+    """Type of an argument that is passed by one pointer."""
 
-    def can_convert_to(self, context, target):
-        """To nothing else."""
+    def can_convert_to(self, context: Any, target: Any) -> Any:
+        """Allow no conversion."""
         return None
 
 
 class ArraysType(Pointer):
     """Type of `Arrays`."""
 
-    def __init__(self, item):
-        self.item = item
+    def __init__(self, item: Any) -> None:
+        self.item: Any = item
         super().__init__(name=f"Arrays({item})")
 
 
 class FunctionsType(Pointer):
     """Type of `Functions`."""
 
-    def __init__(self, signature):
-        self.item = numba_internals.Called(signature)
+    def __init__(self, signature: Any) -> None:
+        self.item: Any = numba_internals.Called(signature)
         super().__init__(name=f"Functions({signature})")
 
 
@@ -104,7 +110,7 @@ def _function(context, builder, signature, arguments):
 
 
 def _item(builder, table, index, kind):
-    """Pointer to the words of an array in a table: what counts its references, its address, its sizes."""
+    """Pointer to the words of an array in a table: reference counter, address, sizes."""
     items = builder.inttoptr(load(builder, table, 1), _word.as_pointer())
     return builder.gep(items, [builder.mul(index, ir.Constant(_word, 2 + kind.ndim))])
 
@@ -131,7 +137,7 @@ class _SetItem(AbstractTemplate):
 
 @lower_builtin(operator.setitem, ArraysType, types.intp, types.Array)
 def _put(context, builder, signature, arguments):
-    """Put an array into a table, which then has a reference to it."""
+    """Put an array into a table, which then holds a reference to it."""
     kind, (table, index, value) = signature.args[2], arguments
     at, new = _item(builder, table, index, kind), make_array(kind)(context, builder, value)
     before = _array_in(context, builder, kind(signature.args[0], types.intp), (table, index))
@@ -179,7 +185,7 @@ _number_type = functools.cache(from_dtype)
 
 
 def sizes_of(value, kind, name):
-    """Address and sizes of an array, which is of a type."""
+    """Address and sizes of an array, with a check of its type."""
     fits = isinstance(value, np.ndarray) and value.ndim == kind.ndim and value.flags.c_contiguous
     if not fits or _number_type(value.dtype) != kind.dtype or not value.flags.writeable:
         refuse(value, kind, name)
@@ -194,33 +200,34 @@ class Arrays:
     item : numba type
         That of the arrays.
     arrays : sequence of ndarray
-        C-contiguous, with numbers of that type; the table keeps them. Kernels may put others in their places, which
-        are given back with the table.
+        C-contiguous arrays with numbers of that type; the table keeps them. Kernels may replace them; the table
+        releases these arrays at its end.
     """
 
     kind_of = ArraysType
 
-    def __init__(self, item, arrays):
-        self.item, self._arrays = item, list(arrays)
+    def __init__(self, item: Any, arrays: Sequence[Any]) -> None:
+        self.item: Any = item
+        self._arrays = list(arrays)
         words = [[0, *sizes_of(array, item, "an array")] for array in self._arrays]
         self._items = np.array(words, dtype=WORD).reshape(len(words), 2 + item.ndim)
         self._head = np.array([len(words), self._items.ctypes.data], dtype=WORD)
-        self.address = self._head.ctypes.data
+        self.address: int = self._head.ctypes.data
 
     @functools.cached_property
     def _numba_type_(self):
         return ArraysType(self.item)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._arrays)
 
-    def __setitem__(self, index, array):
+    def __setitem__(self, index: int, array: NDArray[Any]) -> None:
         self._give_back(index)
         self._items[index] = [0, *sizes_of(array, self.item, "an array")]
         self._arrays[index] = array
 
-    def __getitem__(self, index) -> np.ndarray:
-        """The array that Python has put there, or a view of what a kernel has, while it stands there."""
+    def __getitem__(self, index: int) -> np.ndarray:
+        """The array from Python, or a view of the array of a kernel, valid while it is in the table."""
         words = self._items[index]
         if not words[0]:
             return self._arrays[index]
@@ -234,7 +241,7 @@ class Arrays:
             numba_internals.give_back(int(self._items[index, 0]))
             self._items[index, 0] = 0
 
-    def __del__(self):
+    def __del__(self) -> None:
         if sys is None or sys.is_finalizing():
             return
         for index in range(len(self)):
@@ -247,16 +254,17 @@ class Functions:
     Parameters
     ----------
     signature : numba signature
-        Theirs.
+        Signature of the kernels.
     kernels : sequence of refweb.compiled.kernel.Kernel
-        Of it; they are compiled where the address of the table is asked for, or before by
-        `refweb.compiled.kernel.prepare`.
+        Kernels of that signature; they are compiled by `refweb.compiled.kernel.prepare`, or when the address of the
+        table is needed.
     """
 
     kind_of = FunctionsType
 
-    def __init__(self, signature, kernels):
-        self.signature, self.kernels = signature, tuple(kernels)
+    def __init__(self, signature: Any, kernels: Sequence[Any]) -> None:
+        self.signature: Any = signature
+        self.kernels: tuple[Any, ...] = tuple(kernels)
         for item in self.kernels:
             if item.signature != signature:
                 raise TypeError(f"{item.name} has the signature {item.signature}, not {signature}")
@@ -265,10 +273,10 @@ class Functions:
     def _numba_type_(self):
         return FunctionsType(self.signature)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.kernels)
 
-    def __getitem__(self, index):
+    def __getitem__(self, index: int) -> Any:
         return self.kernels[index]
 
     @functools.cached_property
@@ -280,6 +288,6 @@ class Functions:
         return np.array([len(self), self._items.ctypes.data], dtype=WORD)
 
     @functools.cached_property
-    def address(self):
+    def address(self) -> int:
         """Address of the table."""
         return self._head.ctypes.data

@@ -1,7 +1,7 @@
-"""Build a wheel that brings machine code, ``python -m refweb.compiled.wheel FOLDER``, behind ``refweb warm --ship``.
+"""Build a wheel with machine code: ``python -m refweb.compiled.wheel FOLDER`` after ``refweb warm --ship``.
 
-It is run in a clone, with `build` and `wheel` installed. Machine code is that of one minor version of Python and one
-platform, so the wheel is named after these; where another numba is installed, refweb compiles as without it.
+It needs a clone, and the packages `build` and `wheel`. Machine code is for one minor version of Python and one
+platform, which are in the name of the wheel; with another version of numba refweb compiles as usual.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .store import SHIPPED
 
 
 def main(folder):
-    """Build into a folder; the exit status."""
+    """Build the wheel into a folder; returns the exit status."""
     if not any(SHIPPED.glob("*")):
         print(f"no machine code in {SHIPPED}: run `python -m refweb warm --ship` first", file=sys.stderr)
         return 2

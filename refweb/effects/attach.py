@@ -13,6 +13,7 @@ which have no multipliers. On a fixed body a node is a support. One that tables 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from ..kernels import FORCE, kernel
 from ..messages import nearest, quote
 from ..tables import Several, Table, nodes, table, text, vector
 from .base import PrescribedMotion, column
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 
 @kernel(FORCE)
@@ -75,7 +79,7 @@ class Attach(Table):
     node: Several = nodes()
     point: Several = vector(default=None, unit="m")
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with the nodes attached to the body."""
         names = [body.name for body in net.bodies]
         if self.body not in names:
@@ -106,7 +110,7 @@ class Attach(Table):
             places[body.row] += shift
         return replace(net, mass=mass, points=places, bodies=tuple(bodies))
 
-    def on(self, net):
+    def on(self, net: Net) -> PrescribedMotion | list[Any]:
         """The nodes on a fixed body as supports; nothing for a free body."""
         body = next(body for body in net.bodies if body.name == self.body)
         carried = np.isin(body.carried, net.web.find(self.node))

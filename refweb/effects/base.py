@@ -21,13 +21,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..compiled.rows import column_of, width_of
 from ..errors import InputError
 from ..kernels import FORCE, kernel
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from ..net.net import Net
+    from ..net.rigid_body import RigidBody
+    from ..system.system import System
 
 LINE_OUT = np.dtype([(name, float) for name in ("tension", "strain", "damped_tension", "power", "length_power")])
 """Numbers that terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law the
@@ -39,14 +48,16 @@ TENSION, STRAIN, DAMPED_TENSION, POWER, LENGTH_POWER = range(5)
 TOUCH = np.dtype([("value", float), ("force", float, (3,))])
 """Numbers that terms of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of a
 loss; and the force on the body that `ContactForce.felt` names [N]."""
-OWN, CONTACT_COLUMNS = column_of(TOUCH, "value"), width_of(TOUCH)
-"""Column of that value, and number of columns."""
+OWN: int = column_of(TOUCH, "value")
+"""Column of that value."""
+CONTACT_COLUMNS: int = width_of(TOUCH)
+"""Number of columns."""
 CONTACT = -2
 """Number that stands, in place of that of a term, for what bodies feel of contact."""
 FELT = np.dtype([("depth", float), ("force", float, (3,)), ("element", float)])
 """That: the largest depth of lines in a body, or that of a pair of bodies [m]; the force on the body [N]; the element
 of that depth, −1 where nothing touches."""
-FELT_COLUMNS = width_of(FELT)
+FELT_COLUMNS: int = width_of(FELT)
 """Number of its columns."""
 
 
@@ -63,8 +74,8 @@ class ImplicitContactKernels(NamedTuple):
         Largest number of rows that a contact moves, without attached nodes.
     """
 
-    detect: Callable
-    law: Callable
+    detect: Callable[..., Any]
+    law: Callable[..., Any]
     slots: int
     parts: int = 4
 
@@ -84,13 +95,13 @@ class Crossing(NamedTuple):
         Rows, numbers and elements of neighbours: pairs of lines that do not push each other.
     """
 
-    meets: Callable
-    soon: Callable
+    meets: Callable[..., Any]
+    soon: Callable[..., Any]
     touch: float
     stiffness: float
-    rows: np.ndarray
-    data: np.ndarray
-    elements: np.ndarray
+    rows: NDArray[np.int32]
+    data: NDArray[np.float64]
+    elements: NDArray[np.int64]
 
 
 class Tangent(NamedTuple):
@@ -106,8 +117,8 @@ class Tangent(NamedTuple):
         True if stiffness and damping are symmetric.
     """
 
-    stiffness: Callable | None = None
-    bound: Callable | None = None
+    stiffness: Callable[..., Any] | None = None
+    bound: Callable[..., Any] | None = None
     symmetric: bool = True
 
 
@@ -124,8 +135,8 @@ class VelocityForce(NamedTuple):
         Kernels that solve explicit kicks of a force that may be stiff; None where kicks iterate it.
     """
 
-    damping: Callable | None = None
-    bound: Callable | None = None
+    damping: Callable[..., Any] | None = None
+    bound: Callable[..., Any] | None = None
     implicit: ImplicitContactKernels | None = None
 
 
@@ -153,15 +164,15 @@ class ContactForce(NamedTuple):
         `refweb.kernels.MEETS`, if lines come as deep in a body as its middle in a drift.
     """
 
-    felt: tuple = ()
-    pairs: tuple = ()
-    near: Callable | None = None
-    finder: Callable | None = None
+    felt: tuple[int, ...] = ()
+    pairs: tuple[tuple[RigidBody, RigidBody], ...] = ()
+    near: Callable[..., Any] | None = None
+    finder: Callable[..., Any] | None = None
     crossing: Crossing | None = None
-    passing: Callable | None = None
+    passing: Callable[..., Any] | None = None
 
     @property
-    def with_lines(self):
+    def with_lines(self) -> bool:
         """True for contact of lines with bodies."""
         return len(self.felt) == 1
 
@@ -191,7 +202,7 @@ class Balance(NamedTuple):
     column: str
     power: int | None = None
     internal: bool = False
-    impulse: Callable | None = None
+    impulse: Callable[..., Any] | None = None
     moment_free: bool = False
     twists: bool = False
 
@@ -207,7 +218,7 @@ class MovingFrame(NamedTuple):
         Radius of an orbit [m], for forces that are linear in distances from the origin, which are small against it.
     """
 
-    angular_velocity: tuple | None = None
+    angular_velocity: tuple[float, float, float] | None = None
     orbit_radius: float | None = None
 
 
@@ -222,7 +233,7 @@ class Timing(NamedTuple):
         True if the force acts at rest; statics leaves out all other forces.
     """
 
-    times: tuple = ()
+    times: Sequence[float] = ()
     at_rest: bool = True
 
 
@@ -237,8 +248,8 @@ class CellElements(NamedTuple):
         Changes rows of ``data`` in place so that their cells have no force, for cells with a broken element.
     """
 
-    numbers: np.ndarray | None = None
-    disable: Callable | None = None
+    numbers: NDArray[np.int64] | None = None
+    disable: Callable[..., Any] | None = None
 
 
 class InternalVariables(NamedTuple):
@@ -299,11 +310,11 @@ class ForceTerm:
     """
 
     name: str
-    cells: np.ndarray
-    data: np.ndarray | None
-    force: Callable
+    cells: NDArray[np.int32]
+    data: NDArray[np.float64] | None
+    force: Callable[..., Any]
     balance: Balance
-    energy: Callable | None = None
+    energy: Callable[..., Any] | None = None
     tangent: Tangent = Tangent()
     velocity: VelocityForce = VelocityForce()
     contact: ContactForce = ContactForce()
@@ -314,12 +325,12 @@ class ForceTerm:
     adds_tension: bool = False
 
     @property
-    def over_lines(self):
+    def over_lines(self) -> bool:
         """True if the cells are the elements of the net."""
         return self.data is None
 
     @property
-    def columns(self):
+    def columns(self) -> int:
         """Number of values per cell that ``force`` writes to its ``out``."""
         if self.contact.felt:
             return CONTACT_COLUMNS
@@ -328,7 +339,7 @@ class ForceTerm:
         return int(self.contact.crossing is not None) if self.balance.power is None else self.balance.power + 1
 
     @property
-    def dead(self):
+    def dead(self) -> bool:
         """True for a load that follows from time alone, with a power and a potential."""
         linear = self.tangent.stiffness is None and self.velocity.damping is None
         return linear and self.balance.power is not None and self.energy is not None
@@ -339,12 +350,12 @@ def no_force(t, x, v, f, cells, data, out):
     pass
 
 
-def pairs_of(system):
+def pairs_of(system: System) -> list[tuple[RigidBody, RigidBody]]:
     """Pairs of bodies of a system that may touch each other, in the order of terms and their cells."""
     return [pair for term in system.terms for pair in term.contact.pairs]
 
 
-def refuse_found(terms, what):
+def refuse_found(terms: Iterable[ForceTerm], what: str) -> None:
     """Refuse terms with a `ContactForce.finder`, which have no tangent, since ``what`` needs one.
 
     Raises
@@ -360,13 +371,13 @@ def refuse_found(terms, what):
             )
 
 
-def refuse_flows(net, name):
+def refuse_flows(net: Net, name: str) -> None:
     """Refuse ``name``, which has masses that stay, beside masses that follow a reel; `InputError`."""
     if net.flows:
         raise InputError(f'{name} takes masses that stay: leave it out, or [[reel]] mass = "follows"')
 
 
-def without(columns):
+def without(columns: int | slice) -> Callable[[NDArray[np.float64]], None]:
     """A `CellElements.disable` that sets some columns, a number or a slice, to zero."""
 
     def disable(numbers):
@@ -393,10 +404,10 @@ class PrescribedMotion:
         Times at which the motion has a corner [s].
     """
 
-    cells: np.ndarray
-    data: np.ndarray
-    kernel: Callable
-    times: tuple = ()
+    cells: NDArray[np.int32]
+    data: NDArray[np.float64]
+    kernel: Callable[..., Any]
+    times: Sequence[float] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -413,36 +424,36 @@ class Constraint:
         The vector d at x = 0, and its magnitude L [m].
     """
 
-    cells: np.ndarray
-    data: np.ndarray
+    cells: NDArray[np.int32]
+    data: NDArray[np.float64]
 
-    def between(self, x):
+    def between(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Vectors d from the first to the second row of each pair, shape (cells, 3)."""
         return x[self.cells[:, 1]] - x[self.cells[:, 0]]
 
     @property
-    def length(self):
+    def length(self) -> NDArray[np.float64]:
         """L [m], shape (cells,)."""
         return self.data[:, 3]
 
-    def excess(self, x):
+    def excess(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """g [m] at displacement x, shape (cells,); it is close to the difference of both lengths if that is small."""
         u = self.between(x)
         return ((2.0 * self.data[:, :3] + u) * u).sum(axis=1) / (2.0 * self.length)
 
-    def direction(self, x):
+    def direction(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """∂g/∂x of the second row, d/L, shape (cells, 3); that of the first is its negative."""
         return (self.data[:, :3] + self.between(x)) / self.length[:, None]
 
-    def speed(self, x, v):
+    def speed(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """dg/dt [m/s] at displacement x and velocity v, shape (cells,)."""
         return (self.direction(x) * self.between(v)).sum(axis=1)
 
-    def turning(self, v):
+    def turning(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Part of d²g/dt² beside the accelerations, |v₂ − v₁|²/L [m/s²], shape (cells,)."""
         return (self.between(v) ** 2).sum(axis=1) / self.length
 
-    def pull(self, x, multipliers):
+    def pull(self, x: NDArray[np.float64], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
         """Gᵀλ on every row [N], G = ∂g/∂x, shape (rows, 3); the links act with its negative."""
         along, total = multipliers[:, None] * self.direction(x), np.zeros_like(x)
         np.subtract.at(total, self.cells[:, 0], along)
@@ -462,15 +473,15 @@ class BreakLimits:
         Times at which elements break at any tension [s], increasing, with the element.
     """
 
-    limits: np.ndarray
-    times: tuple = ()
+    limits: NDArray[np.float64]
+    times: tuple[tuple[float, int], ...] = ()
 
     @property
-    def watched(self):
+    def watched(self) -> bool:
         """True if any limit is finite."""
         return bool(np.isfinite(self.limits).any())
 
 
-def column(rows):
+def column(rows: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int32]:
     """Row numbers as the cells of a term that couples nothing: int32, shape (rows, 1)."""
     return np.ascontiguousarray(np.asarray(rows, dtype=np.int32).reshape(-1, 1))

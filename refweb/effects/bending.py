@@ -20,6 +20,7 @@ tip it bends by P L³/(3 B) (1 + 1/(2 n²)).
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +29,9 @@ from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..tables import Several, Table, nodes, real, table
 from .base import Balance, CellElements, ForceTerm, Tangent, without
 from .vectors import cross, dot
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 LARGEST = math.radians(30.0)
 """Largest angle between elements that continue each other in the initial web."""
@@ -206,7 +210,7 @@ class Bending(Table):
     stiffness: float = real(above=0, unit="N·m²")
     clamp: Several = nodes(default=None)
 
-    def on(self, net):
+    def on(self, net: Net) -> list[ForceTerm]:
         """The terms of all springs between elements, and of all clamps.
 
         Two supported nodes that follow each other clamp a line in the middle between them.

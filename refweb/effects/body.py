@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from ..tables import (
     text,
     vector,
 )
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 EVEN = 1e-9
 """Relative tolerance of conditions on moments of inertia: they may come from a CAD program with few digits."""
@@ -207,7 +210,7 @@ class Body(Table):
     fixed: bool = boolean(default=False)
     axle: Any = field(_axle, default=None)
 
-    def __init__(self, **given):
+    def __init__(self, **given: Any) -> None:
         form = given.pop("form", None)  # of the body that this one is a copy of
         values = {f.name: getattr(form, f.name) for f in fields(form)} if form else {}
         refuse_keys(type(self), {**values, **given})
@@ -216,14 +219,14 @@ class Body(Table):
         object.__setattr__(self, "form", {**values, **given})
         self.__post_init__()
 
-    def __getattr__(self, key):
+    def __getattr__(self, key: str) -> Any:
         form = self.__dict__.get("form")
         if isinstance(form, Shape) and key in _keys(self.shape):
             return getattr(form, key)
         raise AttributeError(f"'Body' object has no attribute {key!r}")
 
     @classmethod
-    def keys(cls, given):
+    def keys(cls, given: dict[str, Any]) -> list[str]:
         """Names of the keys for a shape, or of all shapes if a key in ``given`` belongs to another one.
 
         Shapes that ``given`` does not need are not imported.
@@ -237,12 +240,12 @@ class Body(Table):
         keys = among(shape) if isinstance(shape, str) and known(SHAPES, shape) else []
         return keys if given.keys() <= set(keys) else among(*SHAPES)
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """The table as plain TOML values, the keys of the shape among the others."""
         pairs = super().to_dict().items()
         return {k: v for key, value in pairs for k, v in (value.items() if key == "form" else [(key, value)])}
 
-    def check(self):
+    def check(self) -> None:
         """Refuse an incomplete shape, a free body without mass, a fixed body that moves, and a bad name."""
         object.__setattr__(self, "form", self._form())
         if not self.fixed and not self.form.free and not self.moved:
@@ -268,12 +271,12 @@ class Body(Table):
             self._refuse_axle()
 
     @property
-    def moved(self):
+    def moved(self) -> bool:
         """True if it is not fixed and has no mass: then ``[[motion]]`` has to move it."""
         return not self.fixed and self.mass is None and self.density is None
 
     @property
-    def without_mass(self):
+    def without_mass(self) -> str:
         """Reason for which it is refused without mass where nothing moves it."""
         return (
             "mass is missing: a free body needs mass = ... [kg] or density = ... [kg/m³]; fixed = true holds it, and "
@@ -318,7 +321,7 @@ class Body(Table):
             raise InputError(f'{key} = {quote(given[key])} has no meaning for shape = "{self.shape}"')
         return kind(**given)
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with one more row."""
         if any(body.name == self.name for body in net.bodies):
             raise InputError(f'name = "{self.name}" is listed twice: names of bodies are unique')
@@ -326,7 +329,7 @@ class Body(Table):
             if net.quasi_static and any(getattr(self, key)):
                 raise InputError(f"{key} = {list(getattr(self, key))} has no meaning in statics: leave it out")
         self.form.settle()
-        mass = self.mass or (self.density * self.form.volume() if self.density else 0.0)
+        mass = self.mass or (self.density * (self.form.volume() or 0.0) if self.density else 0.0)
         body = RigidBody(
             name=self.name,
             row=len(net.points),

@@ -19,6 +19,7 @@ are of order 1 across this jump.
 from __future__ import annotations
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,6 +42,9 @@ from .base import (
 )
 from .line_kernels import gradient, line_at, pull_together, strain
 from .natural_lengths import GROWTH
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 
 @functools.cache
@@ -238,18 +242,18 @@ class Damping(Table):
     rate: float = real(default=0.0, at_least=0, unit="1/s")
     bodies: float = real(default=0.0, at_least=0, unit="1/s")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a damping that damps nothing."""
         if not (self.time or self.rate or self.bodies):
             raise InputError(
                 "time = 0 [s], rate = 0 [1/s] and bodies = 0 [1/s]: one of them must be > 0, or leave the table out"
             )
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with τ in one more column of line data, and room for L'/L behind it."""
         return net.with_column("damping_time", self.time).with_column(GROWTH, 0.0) if self.time else net
 
-    def on(self, net):
+    def on(self, net: Net) -> list[ForceTerm]:
         """The terms of all lines, whose tension is that with damping, of all nodes with mass, and of free bodies."""
         terms, free = [], [body.row for body in net.bodies if not body.prescribed]
         if self.bodies and not free:

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import math
 import pathlib
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError
 from ..net.folding import refuse_unfit, turns_of, wound
 from ..tables import Several, Table, choice, nodes, real, table, text, vector
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..net.net import Net
 
 
 @table
@@ -72,7 +78,7 @@ class Fold(Table):
     file: str | None = text(default=None)
     gap: float | None = real(default=None, at_least=0, unit="m")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse keys of the other kind, a missing file, a ratio not below 1, and an axis without direction."""
         keys = ("ratio", "turns", "hub", "axis") if self.kind == "positions" else ("file",)
         for key in keys:
@@ -85,7 +91,7 @@ class Fold(Table):
         if self.axis is not None and not any(self.axis):
             raise InputError("axis = [0, 0, 0] must have a direction")
 
-    def lay(self, net, supported):
+    def lay(self, net: Net, supported: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Displacement of all rows at the start [m], shape (rows, 3)."""
         if net.quasi_static:
             raise InputError("a start that is folded cannot be used in statics: leave it out")

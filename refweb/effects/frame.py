@@ -10,11 +10,17 @@ velocity v is
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..tables import Several, Table, table, vector
 from .base import Balance, MovingFrame
 from .turning_axes import force_terms
+
+if TYPE_CHECKING:
+    from ..net.net import Net
+    from .base import ForceTerm
 
 
 @table
@@ -43,7 +49,7 @@ class Frame(Table):
 
     angular_velocity: Several = vector(unit="rad/s")
 
-    def on(self, net):
+    def on(self, net: Net) -> list[ForceTerm]:
         """Centrifugal and Coriolis force of all rows with mass."""
         speed = np.array(self.angular_velocity)
         across = (speed @ speed) * np.eye(3) - np.outer(speed, speed)

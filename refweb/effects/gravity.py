@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..kernels import ENERGY, FORCE, IMPULSE, kernel
 from ..tables import Several, Table, table, vector
 from .base import Balance, ForceTerm, column
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 
 @kernel(FORCE)
@@ -52,13 +57,13 @@ class Gravity(Table):
 
     acceleration: Several = vector(unit="m/s²")
 
-    def on(self, net):
+    def on(self, net: Net) -> ForceTerm | list[ForceTerm]:
         """Terms of all rows with mass, and of what reels add to it; the energy is zero in the web's position."""
         heavy = net.heavy
         steady = ForceTerm(
             name="gravity",
             cells=column(heavy),
-            data=np.outer(net.mass[heavy], self.acceleration),
+            data=net.mass[heavy, None] * np.array(self.acceleration),
             force=force,
             energy=energy,
             balance=Balance("potential_energy", impulse=impulse, moment_free=True),

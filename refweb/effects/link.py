@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import InputError
 from ..messages import quote
 from ..tables import Several, Table, nodes, table
 from .base import Constraint
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 
 @table
@@ -37,12 +42,12 @@ class Link(Table):
 
     nodes: Several = nodes()
 
-    def check(self):
+    def check(self) -> None:
         """Refuse fewer than two nodes."""
         if not isinstance(self.nodes, tuple) or len(self.nodes) < 2:
             raise InputError(f"nodes = {quote(self.nodes)} must be a list of two nodes or more")
 
-    def on(self, net):
+    def on(self, net: Net) -> Constraint:
         """The pairs of rows, and their distances."""
         ends = [self._node(net, i, node) for i, node in enumerate(self.nodes)]
         cells = np.column_stack([ends[:-1], ends[1:]]).astype(np.int32)

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..tables import Several, Table, nodes, rows, table, vector
 from .outer_load import nodal_load
+
+if TYPE_CHECKING:
+    from ..net.net import Net
+    from .base import ForceTerm
 
 
 @table
@@ -42,7 +48,7 @@ class Load(Table):
     force: Several = vector(unit="N")
     factor: Several = rows(2, default=None, increasing=True)
 
-    def on(self, net):
+    def on(self, net: Net) -> ForceTerm:
         """The term of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
         return nodal_load(net, "load", loaded, np.tile(self.force, (len(loaded), 1)), self.factor)

@@ -17,12 +17,17 @@ An explicit step brings Δm in the middle of its drift, where v − v_d goes wit
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..kernels import INDICES, VECTOR, Arrays, IndexTable, Integers, Matrix, Record, Vector, VectorTable, kernel
 from .time_tables import flattened, interpolate
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..system.system import System
 
 
 class MassFlow(NamedTuple):
@@ -83,14 +88,14 @@ class FollowedMass(Record):
     points: Matrix
 
     @classmethod
-    def none(cls):
+    def none(cls) -> FollowedMass:
         """Make the record of masses that stay."""
         no_tables = Arrays(INDICES, []), Arrays(VECTOR, []), Arrays(VECTOR, [])
         nothing = np.zeros(0), np.zeros((0, 3)), np.zeros(3), np.zeros((0, 3))
         return cls(np.zeros(0, dtype=np.int64), np.zeros(0), *no_tables, *nothing)
 
     @classmethod
-    def of(cls, system, mass, inverse):
+    def of(cls, system: System, mass: NDArray[np.float64], inverse: NDArray[np.float64]) -> FollowedMass:
         """Make the record of a system with flows, that writes to ``mass`` and ``inverse``."""
         flows = system.material_flow.flows
         rows = np.unique(np.concatenate([flow.rows for flow in flows])).astype(np.int64)

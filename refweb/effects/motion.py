@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from ..messages import nearest, quote
 from ..tables import Several, Table, nodes, rows, table, text
 from .base import PrescribedMotion, column
 from .time_tables import flattened, interpolate
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 ROW = 9
 """Numbers of a row of rotations: its time, quaternion, angular velocity behind it, and angle about the axle."""
@@ -93,7 +97,7 @@ class Motion(Table):
     displacement: Several = rows(4, default=None, unit="m", increasing=True)
     rotation: Several = rows(4, default=None, unit="rad", increasing=True)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse what moves nothing, or two things at once."""
         if self.node is None and self.body is None:
             raise InputError("node is missing: give node = ... or body = ...")
@@ -105,7 +109,7 @@ class Motion(Table):
             also = "" if self.body is None else " or rotation = [[t, x, y, z], ...]"
             raise InputError(f"displacement is missing: give displacement = [[t, x, y, z], ...]{also}")
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net whose body is turned."""
         if self.body is None:
             return net
@@ -145,7 +149,7 @@ class Motion(Table):
             raise InputError(f"body = {quote(self.body)} is not a [[body]], {nearest(self.body, names)}")
         return net.bodies[names.index(self.body)]
 
-    def on(self, net):
+    def on(self, net: Net) -> PrescribedMotion | list[PrescribedMotion]:
         """The driven rows."""
         if self.body is None:
             return self._shift(net.find(self.node))

@@ -7,6 +7,7 @@ them to the line data of its caller.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -33,6 +34,11 @@ from .elasticity import length_force
 from .line_kernels import LINE
 from .mass_flow import FollowedMass, set_masses
 from .time_tables import flattened, interpolate
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..net.net import Net
 
 GROWTH = "growth"
 """Column of line data with (dL/dt)/L of each element [1/s], of effects that need it."""
@@ -82,7 +88,7 @@ class NaturalLengths(Record):
     masses: FollowedMass
 
     @classmethod
-    def of(cls, net):
+    def of(cls, net: Net) -> Self:
         """Make the record of a net."""
         factors = net.factors
         elements = np.unique(np.concatenate([[], *(part for part, _ in factors)])).astype(np.int64)
@@ -128,7 +134,7 @@ def set_lengths(t: float, lengths: NaturalLengths, lines: Matrix) -> None:
         set_growth(t, lengths, lines)
 
 
-def with_factor(net, lines, table):
+def with_factor(net: Net, lines: NDArray[np.int64], table: Any) -> Net:
     """The net with a factor on the natural lengths of some lines.
 
     Parameters
@@ -154,7 +160,7 @@ def with_factor(net, lines, table):
     return replace(net, factors=(*net.factors, (elements, table)))
 
 
-def shortest_of(net):
+def shortest_of(net: Net) -> NDArray[np.float64]:
     """Least natural length of each element in a run [m], shape (cells,).
 
     Between corners a length is a product of positive linear functions of time, which has its minimum at an end.

@@ -12,12 +12,18 @@ of the kinetic energy, −½ m n² (3x² − z²) and the energies of all other 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, ClassVar
+
 import numpy as np
 
 from ..errors import InputError
 from ..tables import Several, Table, real, rows, table
 from .base import Balance, MovingFrame
 from .turning_axes import force_terms
+
+if TYPE_CHECKING:
+    from ..net.net import Net
+    from .base import ForceTerm
 
 GRAVITATION = 3.986004418e14
 """Gravitational parameter of the Earth [m³/s²], IERS Conventions (2010), table 1.1."""
@@ -64,13 +70,13 @@ class Orbit(Table):
         mean_motion = 1.1e-3
     """
 
-    excludes = ("frame", "gravity")
+    excludes: ClassVar[tuple[str, ...]] = ("frame", "gravity")
 
     mean_motion: float | None = real(default=None, above=0, unit="rad/s")
     altitude: float | None = real(default=None, at_least=0, unit="m")
     axes: Several = rows(3, default=None)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse an orbit that is not given, or given twice, and wrong axes."""
         if (self.mean_motion is None) == (self.altitude is None):
             given = "both are given" if self.altitude is not None else "none is"
@@ -86,13 +92,13 @@ class Orbit(Table):
         return axes_of(self.axes)
 
     @property
-    def radius(self):
+    def radius(self) -> float:
         """Radius R of the orbit of the Earth [m]."""
         if self.mean_motion is None:
             return EARTH + (self.altitude or 0.0)
         return float(np.cbrt(GRAVITATION / self.mean_motion) / np.cbrt(self.mean_motion))
 
-    def on(self, net):
+    def on(self, net: Net) -> list[ForceTerm]:
         """The terms of all rows with mass."""
         n = np.sqrt(GRAVITATION / self.radius) / self.radius if self.mean_motion is None else self.mean_motion
         frame = self._frame()

@@ -7,11 +7,18 @@ step.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..kernels import ENERGY, FORCE, IMPULSE, kernel
 from .base import Balance, ForceTerm, Timing, column
 from .time_tables import flattened, integrate, interpolate
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..net.net import Net
 
 
 @kernel()
@@ -30,7 +37,15 @@ def factor_until(t, data, start):
     return (data[start + 1] + 0.5 * data[start + 2] * t) * t
 
 
-def outer_load(net, name, cells, data, factor, impulse=None, **parts):
+def outer_load(
+    net: Net,
+    name: str,
+    cells: NDArray[np.int32],
+    data: NDArray[np.float64],
+    factor: Any,
+    impulse: Any = None,
+    **parts: Any,
+) -> ForceTerm:
     """The `ForceTerm` of a load.
 
     Parameters
@@ -88,6 +103,6 @@ def impulse(t, x, cells, data, total):
             total[i] += times * data[c, i]
 
 
-def nodal_load(net, name, rows, forces, factor):
+def nodal_load(net: Net, name: str, rows: NDArray[np.int64], forces: NDArray[np.float64], factor: Any) -> ForceTerm:
     """The `ForceTerm` of dead loads ``forces (rows, 3)`` [N] on rows, times a factor as that of `outer_load`."""
     return outer_load(net, name, column(rows), forces, factor, impulse=impulse, force=force, energy=energy)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..tables import Several, Table, nodes, real, table
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 
 @table
@@ -37,7 +41,7 @@ class PointMass(Table):
     node: Several = nodes()
     mass: float = real(at_least=0, unit="kg")
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with the masses added."""
         added = np.zeros(len(net.mass))
         np.add.at(added, net.web.find(self.node), self.mass)

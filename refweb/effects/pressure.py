@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,10 @@ from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..tables import Several, Table, nodes, real, rows, table, vector
 from .base import CellElements, Tangent, without
 from .outer_load import factor_at, outer_load
+
+if TYPE_CHECKING:
+    from ..net.net import Net
+    from .base import ForceTerm
 
 PUSH = np.dtype([("normal", float, (3,)), ("along", float, (3,))])
 """Data of a cell, p n and dX/dξ; behind it stands the factor."""
@@ -138,12 +143,12 @@ class Pressure(Table):
     away_from: Several = vector(default=None, unit="m")
     factor: Several = rows(2, default=None, increasing=True)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a normal without direction."""
         if not any(self.normal):
             raise InputError("normal = [0, 0, 0] must have a direction")
 
-    def on(self, net):
+    def on(self, net: Net) -> ForceTerm:
         """The term of the elements of these lines; ``out`` is the power [W]."""
         lines = net.web.find_lines(self.lines)
         at = np.flatnonzero(np.isin(net.line, lines))

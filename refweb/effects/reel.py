@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError
 from ..tables import Several, Table, choice, nodes, rows, table
 from .natural_lengths import with_factor
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 
 @table
@@ -54,7 +58,7 @@ class Reel(Table):
     mass: str = choice("stays", "follows", default="stays")
     drum: Several = nodes(default=None)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a natural length that is not positive, and a drum that has no meaning."""
         for i, (_, factor) in enumerate(self.factor):
             if not factor > 0.0:
@@ -62,7 +66,7 @@ class Reel(Table):
         if self.drum is not None and self.mass == "stays":
             raise InputError('drum has no meaning where mass = "stays": leave it out, or give mass = "follows"')
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with the factor on its lines."""
         lines = net.web.find_lines(self.lines)
         net = with_factor(net, lines, self.factor)

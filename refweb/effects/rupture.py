@@ -8,6 +8,7 @@ energy balance closes through every break. `refweb.dynamics.integrators.rupture`
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +17,10 @@ from ..net.groups import givers
 from ..tables import Several, Table, by_group, real, rows, table
 from .base import BreakLimits
 from .broken import HELD, held_energy
+
+if TYPE_CHECKING:
+    from ..net.net import Net
+    from .base import ForceTerm
 
 
 @table
@@ -72,14 +77,14 @@ class Rupture(Table):
 
     strength: float | None = real(default=None, above=0, unit="Pa")
     at: Several = rows(2, default=None)
-    groups: dict = by_group(GroupRupture, "rupture", default_factory=dict)
+    groups: dict[str, Any] = by_group(GroupRupture, "rupture", default_factory=dict)
 
     @property
     def _due(self) -> tuple:
         """(Line, t) of ``at``."""
         return self.at or ()
 
-    def check(self):
+    def check(self) -> None:
         """Refuse breaks that are not (line, time), and a line that breaks twice."""
         lines = [line for line, _ in self._due]
         for i, (line, time) in enumerate(self._due):
@@ -90,7 +95,7 @@ class Rupture(Table):
             if line in lines[:i]:
                 raise InputError(f"at[{i}][0] = {line:g}: this line breaks at two times, name it once")
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with the strengths of its lines, and the rupture energy in one more column of line data."""
         web = net.web
         strengths = np.full(len(web.lines), np.nan if self.strength is None else self.strength)
@@ -101,7 +106,7 @@ class Rupture(Table):
         strength = np.where(np.isnan(strengths[net.line]), net.strength, strengths[net.line])
         return replace(net, strength=strength).with_column(HELD, 0.0)
 
-    def on(self, net):
+    def on(self, net: Net) -> BreakLimits | list[ForceTerm | BreakLimits]:
         """The elements that may break and, except in statics, the term of the rupture energy."""
         limits, count = net.strength * net.area, len(net.web.lines)
         for i, (line, _) in enumerate(self._due):

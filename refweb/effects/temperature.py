@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..accepted import accepts, any_of
@@ -10,6 +12,9 @@ from ..messages import short
 from ..net.groups import givers
 from ..tables import Several, Table, by_group, checked, field, real, rows, table
 from .natural_lengths import with_factor
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 
 @accepts(any_of(real().metadata["read"].accepts, rows(2).metadata["read"].accepts))
@@ -62,19 +67,19 @@ class Temperature(Table):
 
     expansion: float = real(unit="1/K")
     change: Several = field(_change, unit="K")
-    groups: dict = by_group(GroupTemperature, "temperature", default_factory=dict)
+    groups: dict[str, Any] = by_group(GroupTemperature, "temperature", default_factory=dict)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a natural length that is not positive."""
         for name in (None, *self.groups):
-            settings = self.groups.get(name, self)
+            settings = self if name is None else self.groups[name]
             _refuse_none(
                 self if settings.expansion is None else settings,
                 self if settings.change is None else settings,
                 "" if name is None else f"groups.{short(name)} ",
             )
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with a factor on the lines of each pair of α and ΔT."""
         for lines, factor in self._factors(net.web):
             net = with_factor(net, lines, factor)

@@ -11,6 +11,7 @@ It has no potential. If dx/dξ is zero at the node, the line has no direction an
 from __future__ import annotations
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,10 @@ from ..tables import Several, Table, nodes, real, rows, table
 from .base import CellElements, Tangent, without
 from .line_kernels import direction
 from .outer_load import factor_at, outer_load
+
+if TYPE_CHECKING:
+    from ..net.net import Net
+    from .base import ForceTerm
 
 SHORTER = 0.5
 """Length of a line, over that at the last history row, down to which the bound of the step is valid."""
@@ -114,7 +119,7 @@ class Thrust(Table):
     force: float = real(unit="N")
     factor: Several = rows(2, default=None, increasing=True)
 
-    def on(self, net):
+    def on(self, net: Net) -> ForceTerm:
         """The term of one element; ``out`` is the power [W]."""
         nodes_found = net.web.find(self.node)
         if len(nodes_found) != 1:

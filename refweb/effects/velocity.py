@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import InputError
 from ..tables import Several, Table, nodes, table, vector
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..net.net import Net
 
 
 @table
@@ -45,14 +52,14 @@ class Velocity(Table):
     spin: Several = vector(default=None, unit="rad/s")
     about: Several = vector(default=(0.0, 0.0, 0.0), unit="m")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a table without ``value`` and ``spin``."""
         if self.value is None and self.spin is None:
             raise InputError("value is missing: a velocity needs value = [...] [m/s], spin = [...] [rad/s], or both")
         if self.spin is None and any(self.about):
             raise InputError(f"about = {list(self.about)} has no meaning without spin = [...] [rad/s]")
 
-    def start(self, net, supported, v):
+    def start(self, net: Net, supported: NDArray[np.bool_], v: NDArray[np.float64]) -> None:
         """Write the initial velocities into v, shape (rows, 3); refuse those that a support does not allow."""
         if net.quasi_static:
             raise InputError("a velocity cannot be used in statics: leave it out")

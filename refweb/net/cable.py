@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -18,9 +18,14 @@ from .materials import FILLED, MATERIALS
 from .plastic_keys import check_yield, hardening_key
 from .tension_laws import law_of, names_in, strains_of
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .web import Web
+
 SMOOTH_LAW = {"slackness": 0.0, "smoothing": 1e-5}
 """Parameters of the smooth law where none are given."""
-_DENSE: dict = dict(at_least=0, unit="kg/m³")
+_DENSE: dict[str, Any] = dict(at_least=0, unit="kg/m³")
 LENGTHS = ("prestrain", "pretension", "sag")
 """Keys that say what natural length a line has."""
 DENSITY = "force_density"
@@ -89,18 +94,18 @@ class Group(Table):
     tension: Any = points(unit="N")
     yield_stress: float | None = real(default=None, above=0, unit="Pa")
     hardening: Any = hardening_key()
-    parameters: dict | None = numbers_by_name()
+    parameters: dict[str, Any] | None = numbers_by_name()
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float | None = real(default=None, above=0, unit="1")
     knot_factor: float | None = real(default=None, above=0, at_most=1, unit="1")
 
-    def check(self):
+    def check(self) -> None:
         """Fill in what the material gives; refuse two keys of one thing, and a force density that is none."""
         _fill(self)
         _check_lengths(self)
         law_keys.curve_key(self)
 
-    def filled(self):
+    def filled(self) -> Group:
         """The group with the smooth law's parameters where it has none."""
         return replace(self, **{k: v for k, v in SMOOTH_LAW.items() if getattr(self, k) is None})
 
@@ -261,7 +266,12 @@ class Cable(Table):
         density = 200.0
     """
 
-    either = ("modulus", "density"), ("material",), ("stress", "density"), ("tension", "density")
+    either: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("modulus", "density"),
+        ("material",),
+        ("stress", "density"),
+        ("tension", "density"),
+    )
 
     law: str = choice(LAWS, default="smooth")
     material: str | None = choice(*MATERIALS, default=None)
@@ -278,16 +288,16 @@ class Cable(Table):
     tension: Any = points(unit="N")
     yield_stress: float | None = real(default=None, above=0, unit="Pa")
     hardening: Any = hardening_key()
-    parameters: dict | None = numbers_by_name()
+    parameters: dict[str, Any] | None = numbers_by_name()
     strength: float | None = real(default=None, above=0, unit="Pa")
     safety_factor: float = real(default=1.0, above=0, unit="1")
     knot_factor: float = real(default=1.0, above=0, at_most=1, unit="1")
     order: int = choice(1, 2, 3, default=1)
     subdivide: int = integer(default=1, at_least=1, at_most=1000)
     viscous: Viscous | None = part(Viscous)
-    groups: dict = by_group(Group, "cable", default_factory=dict)
+    groups: dict[str, Group] = by_group(Group, "cable", default_factory=dict)
 
-    def check(self):
+    def check(self) -> None:
         """Fill in what the material gives and the smooth law's parameters; refuse what does not fit together."""
         own_modulus = self.modulus
         _fill(self)
@@ -314,12 +324,12 @@ class Cable(Table):
         groups = {name: group.filled() if group.law == "smooth" else group for name, group in self.groups.items()}
         object.__setattr__(self, "groups", groups)
 
-    def with_smoothing(self, share):
+    def with_smoothing(self, share: float) -> Cable:
         """The cable with a share of its smoothing and of that of its groups."""
         groups = {name: _smoothed(group, share) for name, group in self.groups.items()}
         return replace(_smoothed(self, share), groups=groups)
 
-    def properties(self, web, quasi_static=False):
+    def properties(self, web: Web, quasi_static: bool = False) -> dict[str, NDArray[Any]]:
         """Values for each line of a web; ``quasi_static`` with the modulus of arms that act in statics.
 
         Returns

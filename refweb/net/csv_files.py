@@ -1,4 +1,4 @@
-"""Webs from two CSV files, one of points and one of lines."""
+"""Reading of webs from two CSV files, one of points and one of lines."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .web import Web
 
 POINTS = {"x": True, "y": True, "z": True, "name": False, "support": False}
 LINES = {"i": True, "j": True, "natural_length": False, "group": False}
-"""Columns of both, and whether they must be there."""
+"""Columns of both files; True for a required column."""
 NAMES = (*POINTS, *LINES)
 """Names of all columns."""
 LISTED = 5
-"""Number of problems that a message lists; of more it tells how many."""
+"""Largest number of problems in a message, which gives the number of the others."""
 ALIKE = 0.75
-"""Likeness above which a column may be a misspelt one."""
+"""Similarity above which the name of a column may be misspelt."""
 
 
 def web_of(points, lines, columns=None, first=0):
@@ -31,15 +31,15 @@ def web_of(points, lines, columns=None, first=0):
     points, lines : path-like
         Both files.
     columns : dict of str to str, optional
-        Columns in the files by the names that they have in `NAMES`.
+        Columns in the files by the names in `NAMES`.
     first : int
         Number of the first point in the columns i and j.
 
     Raises
     ------
     InputError
-        For files that are not there or hold no rows; for wrong columns, cells and node numbers, of which the message
-        lists the first `LISTED`.
+        For missing files and files without rows; for wrong columns, cells and node numbers, whose first `LISTED` are in
+        the message.
     """
     columns, problems = columns or {}, Problems()
     nodes, ends = (_table(path, known, columns, problems) for path, known in ((points, POINTS), (lines, LINES)))
@@ -77,7 +77,7 @@ def columns_of(path, names):
 
 
 class Problems:
-    """Problems of files, told at once."""
+    """Problems of files, collected for one message."""
 
     def __init__(self):
         self._texts, self._hints = [], []
@@ -87,7 +87,7 @@ class Problems:
         self._texts.append(text)
 
     def hint(self, text):
-        """Add a remedy that stands behind them."""
+        """Add a remedy at the end of the message."""
         self._hints.append(text)
 
     def refuse(self):
@@ -99,7 +99,7 @@ class Problems:
 
 
 class _Columns:
-    """Columns of a CSV file as texts, by name; ``others`` are the names of those that a web does not have."""
+    """Columns of a CSV file as texts, by name; ``others`` are names of columns that a web does not have."""
 
     def __init__(self, path, columns, rows, others=(), known=()):
         self.path, self.columns, self._rows, self.others, self._known = path, columns, rows, others, known
@@ -112,7 +112,7 @@ class _Columns:
         return f"{self.path.name}, line {self._rows[number]}"
 
     def numbers(self, key, problems, integer=False, empty=None):
-        """A column as numbers, None where there is none; what is no number is added to the problems."""
+        """A column as numbers; None for a missing column; cells that are no numbers are added to the problems."""
         if key not in self.columns:
             return None
         values = []
@@ -131,7 +131,7 @@ class _Columns:
             return np.array([min(max(value, -(2**62)), 2**62) for value in values])
 
     def notes(self):
-        """Findings on columns that are left alone; a warning of those that may be misspelt."""
+        """Findings on ignored columns, with a warning of names that may be misspelt."""
         if not self.others:
             return
         listed = ", ".join(map(quote, self.others))
@@ -145,7 +145,7 @@ class _Columns:
 
 
 def _check_ends(ends, pairs, count, first, problems):
-    """Add to the problems node numbers that no point has."""
+    """Add node numbers without a point to the problems."""
     if count == 0 or any(column is None for column in pairs):
         return
     numbers = np.column_stack(pairs)

@@ -1,4 +1,4 @@
-"""Curved line elements on [0, 1]: scikit-fem's quadratic, and the nodal cubic that it does not have."""
+"""Curved line elements on [0, 1]: the quadratic one of scikit-fem, and a nodal cubic, which scikit-fem lacks."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ class ElementLineP3(ElementH1):
 
     The integrals of its functions are the weights of Gauss–Lobatto quadrature, 1/12 and 5/12, so that its row-sum
     lumped mass is positive and keeps the order of the frequencies (spectral elements; Cohen, *Higher-Order Numerical
-    Methods for Transient Wave Equations*, 2002, doi:10.1007/978-3-662-04823-8). scikit-fem's own cubic,
-    ``ElementLinePp(3)``, is hierarchical: its inner functions belong to no node and have integrals of no fixed sign.
+    Methods for Transient Wave Equations*, 2002, doi:10.1007/978-3-662-04823-8). The cubic of scikit-fem,
+    ``ElementLinePp(3)``, is hierarchical: its inner functions belong to no node, and their integrals have no fixed
+    sign.
     """
 
     nodal_dofs = 1

@@ -1,8 +1,8 @@
 """Reference line elements on [0, 1] and their quadrature.
 
-The functions of a straight element are 1 − ξ and ξ and its nodes are the ends of the line. Explicit steps ask nothing
-else of scikit-fem, whose import with that of scipy takes as long as that of numba. Elements of higher order are in
-`refweb.net.curved`.
+The functions of a straight element are 1 − ξ and ξ and its nodes are the ends of the line. Explicit steps need nothing
+else, and therefore avoid scikit-fem: its import and that of scipy take as long as that of numba. Elements of higher
+order are in `refweb.net.curved`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def line_element(order):
 
 
 def gauss(points):
-    """Gauss–Legendre quadrature on [0, 1]: places of shape (1, points) and weights of sum 1."""
+    """Gauss–Legendre quadrature on [0, 1]: points, shape (1, points), and weights of sum 1."""
     places, weights = np.polynomial.legendre.leggauss(points)
     return 0.5 * (places[None] + 1.0), 0.5 * weights
 
@@ -45,7 +45,7 @@ def lumped_shares(element):
 
 
 def values(element, places):
-    """Functions of an element at places, shape (places, nodes), and their derivatives, the same shape."""
+    """Functions of an element at points, shape (points, nodes), and their derivatives, the same shape."""
     local = np.reshape(places, (1, -1))
     both = [element.lbasis(local, a) for a in range(len(element.doflocs))]
     return np.array([value for value, _ in both]).T.copy(), np.array([slope[0] for _, slope in both]).T.copy()

@@ -19,11 +19,11 @@ CORNERS = {
     "pixel": 4,
     "polygon": None,
 }
-"""Kinds of faces, and how many of their nodes, the first ones, are corners; None for all."""
+"""Kinds of faces, and the number of corners, which are their first nodes; None if all nodes are."""
 
 
 def decided(mesh, edges):
-    """The mesh as `File` takes it: of its faces the edges as lines, or without its faces.
+    """The mesh without faces; their edges become lines if that is asked for or the file has no lines.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ def decided(mesh, edges):
     edge_groups : dict of str to ndarray of int
         Edges of each group of faces, by their number among the edges.
     notes : list of refweb.findings.Finding
-        Decisions that were made automatically.
+        Findings on automatic decisions.
 
     Raises
     ------
     InputError
-        Where ``edges`` asks for what the file does not have, and where it has lines and faces and ``edges`` is not
+        If the file lacks the kind of cells that ``edges`` needs, and if it has lines and faces and ``edges`` is not
         given.
     """
     faces = [block for block in mesh.blocks if block.kind in CORNERS and len(block.cells)]
@@ -76,7 +76,7 @@ def decided(mesh, edges):
 
 
 def _counted(blocks):
-    """Cells in words: ``1 line, 2 triangle``."""
+    """Text of the numbers of cells: ``1 line, 2 triangle``."""
     counts = {}
     for block in blocks:
         counts[block.kind] = counts.get(block.kind, 0) + len(block.cells)
@@ -123,12 +123,12 @@ def _ends(blocks):
 
 
 def _keys(pairs, count):
-    """A number for each pair of nodes, whatever their order."""
+    """A key for each pair of nodes, in any order."""
     return pairs.min(axis=1) * np.int64(count) + pairs.max(axis=1)
 
 
 def _data(mesh, pairs):
-    """Data that the edges need beside lines that have them: lengths by distance, and no group."""
+    """Data of edges, if lines have them: natural lengths by distance, and no group."""
     data = {"entity": np.full(len(pairs), -1)} if mesh.groups is not None else {}
     if mesh.lines and all("natural_length" in block.data for block in mesh.lines):
         points = np.asarray(mesh.points, dtype=float)
@@ -152,7 +152,7 @@ def _groups(faces, of_face):
 
 
 def group_names(values, count):
-    """Group of each of some cells as text: 2 and 2.0 read "2"; None where there are none."""
+    """Group of each cell as text, "2" for 2 and 2.0; None without groups."""
     if values is None:
         return None
     values = np.asarray(values)

@@ -1,4 +1,4 @@
-"""Folded places of the nodes of a web: drawn in and wound about a hub; and how near lines are to each other.
+"""Folded positions of a web, drawn in and wound about a hub, and the check of taut lines and distances.
 
 A node at the distance r from the axis through the hub goes to s r and is turned about the axis by ω(r) = 2π n r/R, with
 R the largest r. With κ = r ω' ≤ 2π n, no distance grows by more than
@@ -18,19 +18,19 @@ import numpy as np
 from ..errors import InputError
 
 SLACKEST = 0.9
-"""Largest distance of the ends of a line over its natural length, where the turns are not given."""
+"""Largest distance of the ends of a line over its natural length, if the turns are not given."""
 CHUNK = 1_000_000
-"""Number of pairs of lines that are looked at together."""
+"""Number of pairs of lines that are processed together."""
 
 
 def turns_of(ratio, tightest):
-    """n, of which σ is `SLACKEST` times the least natural length over distance, ``tightest``; 0 where none is."""
+    """Number of turns n for which σ is `SLACKEST` times ``tightest``, the least natural length over distance; or 0."""
     limit = SLACKEST * tightest
     return max(limit / ratio - ratio / limit, 0.0) / (2.0 * math.pi)
 
 
 def wound(points, hub, axis, ratio, turns):
-    """Places of points that are drawn in to ``ratio`` and wound ``turns`` times about an axis through a hub."""
+    """Positions of points, drawn in to ``ratio`` and wound ``turns`` times about an axis through a hub."""
     along = np.array(axis) / np.linalg.norm(axis)
     away = points - hub
     height = away @ along
@@ -44,8 +44,8 @@ def wound(points, hub, axis, ratio, turns):
 def distances(starts, ends, pairs):
     """Least distance of the segments of each pair, shape (pairs,).
 
-    The minimum of |a + s u − t v|² over the unit square of s and t is at its stationary point if that is inside. Else
-    it is on one of the four edges, where it is the distance of an end and a segment.
+    The minimum of |a + s u − t v|² over the unit square of s and t is at its stationary point if that is inside.
+    Otherwise it is on one of the four edges, and is the distance of an end from a segment.
     """
     (i, j), tiny = pairs.T, np.finfo(float).tiny
     u, v, a = ends[i] - starts[i], ends[j] - starts[j], starts[i] - starts[j]
@@ -69,9 +69,9 @@ def distances(starts, ends, pairs):
 
 
 def nearest_lines(points, lines, gap):
-    """(Distance, line, other line) of the two lines nearest to each other of those that share no node.
+    """Distance and numbers of the two lines nearest to each other that share no node.
 
-    Only lines that may be nearer than ``gap`` are looked at; the distance is infinite where there are none.
+    Only lines that may be closer than ``gap`` are compared; the distance is infinite if there are none.
     """
     from scipy.spatial import cKDTree
 
@@ -89,18 +89,18 @@ def nearest_lines(points, lines, gap):
 
 
 def refuse_unfit(points, lines, length, gap):
-    """Refuse places in which a line is taut or has no length, or two lines without a common node are within a gap.
+    """Refuse positions with a taut line, a line without length, or two lines without common node within a gap.
 
     Parameters
     ----------
     points : ndarray, shape (nodes, 3)
-        The places [m].
+        Positions [m].
     lines : ndarray of int, shape (lines, 2)
         Ends of the lines.
     length : ndarray, shape (lines,)
         Their natural lengths [m].
     gap : float
-        Distance that lines without a common node keep [m].
+        Least distance of lines without a common node [m].
     """
     size = np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1)
     share = size / length

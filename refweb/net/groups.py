@@ -1,4 +1,4 @@
-"""Groups of lines: the names by which a scene speaks of many lines at once. A line may be in several.
+"""Groups of lines: names for sets of lines in a scene. A line may be in several.
 
 Every web has groups by its own supports, the nodes of its rim, unless the user has given these names to others:
 
@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..messages import nearest, quote
 
 PLACES = ("inner", "anchors", "rim")
-"""Groups by the number of a line's ends that are in the rim."""
+"""Groups by the number of ends of a line in the rim."""
 
 
 def members(given, count):
@@ -67,7 +67,7 @@ def by_place(lines, rim, nodes):
 
 
 def givers(groups, tables, count, where="groups"):
-    """Tables by group that give each key of a line.
+    """Number of the table, by group, that sets each key on each line.
 
     Parameters
     ----------
@@ -78,17 +78,17 @@ def givers(groups, tables, count, where="groups"):
     count : int
         Number of lines.
     where : str
-        How messages begin.
+        Beginning of messages.
 
     Returns
     -------
     dict of str to ndarray of int64, shape (lines,)
-        Of each key that is given the number of the table, −1 where none gives it.
+        For each key that is set, the number of the table, −1 for none.
 
     Raises
     ------
     InputError
-        For a group that the web does not have, and a line to which two groups give the same key.
+        For a group that the web does not have, and for a line with the same key from two groups.
     """
     owners, names = {}, list(tables)
     for number, (name, table) in enumerate(tables.items()):

@@ -1,27 +1,28 @@
-"""Depth in a core that has grown, as compiled kernels.
+"""Depth in a body, a core grown by a radius: value, gradient and Hessian, by compiled kernels.
 
-A core has grown by a radius r: that of a sphere is the point in its centre, of a ring its axis, of a box or a cylinder
-with rounded edges a smaller box or cylinder, of half sizes c. With w = l − clip(l, −c, c) from its nearest point to the
-point l, r − |w| is the distance from the surface, negative outside. That is the depth as far as `EXACT` of r, and
-beyond where one face is much nearer than the others; of a core that is a point or a line it is the depth everywhere.
+The core is the centre of a sphere, the axis of a ring, or, for a box or cylinder with rounded edges, a smaller box or
+cylinder with half sizes c. r is the radius of growth. With w = l − clip(l, −c, c), the vector from the nearest point of
+the core to the point l, r − |w| is the distance from the surface, negative outside. This is the depth up to `EXACT` of
+r, and beyond that if one face is much nearer than the others. For a core that is a point or a line it is the depth
+everywhere.
 
-Further in, distance has creases where two faces are equally near. A line is deepest where it crosses one, a node there
-jumps from one face to the next, and at an edge of the core the push of a line over it drops to 1/√2 of itself. The
-normal of one face is then no slope of an energy, and a mixture of both is one for lines alone. So the depth t is that
-of the surface on which the point lies, of a term of rounded boxes: their half sizes are c − g(t), the radius of their
-edges ρ(t) = r − t + g(t), and their faces are t below those of the body. g is 0 up to `EXACT` of r, then a parabola,
-then of the slope `WIDENING`: ρ falls from r to r/4 and then grows with depth. Where g exceeds a half size, a roof joins
-opposite faces. With b = (|l| − c + g)₊ of each axis, or √(l² + (g − c)²) + g − c where g > c, the depth solves
+Farther inside, the distance has a kink where two faces are equally near. There a line has its largest depth, a node
+jumps from one face to the other, and at an edge of the core the force of a line drops to 1/√2. The normal of one face
+is then not the gradient of an energy. Therefore the depth t at a point is the parameter of the surface through it, of a
+family of rounded boxes: their half sizes are c − g(t), the radius of their edges is ρ(t) = r − t + g(t), and their
+faces are t below those of the body. g is 0 up to `EXACT` of r, then a parabola, then a line with slope `WIDENING`: ρ
+decreases from r to r/4 and then increases with depth. If g exceeds a half size, a roof joins opposite faces. With b =
+(|l| − c + g)₊ of each axis, or √(l² + (g − c)²) + g − c where g > c, the depth solves
 
     |b(l, t)| = ρ(t).
 
-This is convex in l and t together. Depth is concave, its gradient continuous, of length 1 at the surface and nowhere
-longer, and Newton's method comes down to the root from the distance of the nearest face.
+This is convex in l and t together. The depth is therefore concave, and its gradient is continuous, of length 1 at the
+surface and at most 1 elsewhere. Newton's method converges to the root from the distance of the nearest face.
 
-With the default rounding, this depth does better than faces with creases and the normal of one of them. Of 60 taut
-cables that are bent over the edge of a box, Newton's method refuses none instead of 48. Nets that fall on a box keep
-their energy to 1e-5, with order 2, instead of 0.1. A `WIDENING` of 1, edges that stay as sharp as they are, gives the
-same until rounding is as small as 1e-4 of the size, where the order is 1; one of 2 leaves less depth in the middle.
+The depth with kinks, and the normal of the nearest face, gives worse results with the default rounding: of 60 taut
+cables bent over the edge of a box Newton's method then refuses 48, here none; nets that fall on a box then keep their
+energy to 0.1, here to 1e-5 with order 2. A `WIDENING` of 1, with a constant edge radius, gives the same results except
+for a rounding of 1e-4 of the size, at which the order is 1. A `WIDENING` of 2 gives less depth in the middle.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ import math
 from ..kernels import kernel
 
 EXACT = 0.5
-"""Depth up to which it is the distance from the surface, over the radius of growth."""
+"""Depth up to which depth is the distance from the surface, over the radius of growth."""
 WIDENING = 1.5
-"""Slope of g far in: faces whose depths differ by less than this factor share a push."""
+"""Slope of g far inside: faces whose depths differ by less than this factor share the force."""
 
 
 @kernel()
@@ -43,7 +44,7 @@ def _beyond(at, c):
 
 @kernel()
 def _shrinkage(t, radius):
-    """(g, g', g'') at a depth."""
+    """Shrinkage g at a depth, with g' and g''."""
     past, width = t - EXACT * radius, (1.0 - EXACT) * radius
     if past <= 0.0:
         return 0.0, 0.0, 0.0
@@ -54,7 +55,7 @@ def _shrinkage(t, radius):
 
 @kernel()
 def _half_square(at, c):
-    """½ b² and its derivatives by the place l and by c: (b²/2, ∂l, ∂c, ∂l∂l, ∂l∂c, ∂c∂c)."""
+    """½ b² and its derivatives by l and c: (b²/2, ∂l, ∂c, ∂l∂l, ∂l∂c, ∂c∂c)."""
     if c >= 0.0:
         b, sign = abs(at) - c, math.copysign(1.0, at)
         return (0.5 * b * b, b * sign, -b, 1.0, -sign, 1.0) if b > 0.0 else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -65,7 +66,7 @@ def _half_square(at, c):
 
 @kernel()
 def _smooth(l0, l1, l2, radius, c0, c1, c2, t):
-    """Depth of a box, as `depth`, where faces share: ``t`` is the depth in the nearest one."""
+    """Depth of a box, as `depth`, near several faces; ``t`` is the depth of the nearest face."""
     for _ in range(60):
         g, g1, _ = _shrinkage(t, radius)
         b0, b1, b2 = _half_square(l0, c0 - g), _half_square(l1, c1 - g), _half_square(l2, c2 - g)
@@ -94,7 +95,7 @@ def _smooth(l0, l1, l2, radius, c0, c1, c2, t):
 
 @kernel()
 def grown_box(l0, l1, l2, radius, c0, c1, c2, thin):
-    """Depth of a box, as `depth`; ``thin`` is true if its core is a point or a line."""
+    """Depth of a box, as `depth`; ``thin`` is True if its core is a point or a line."""
     w0, w1, w2 = _beyond(l0, c0), _beyond(l1, c1), _beyond(l2, c2)
     distance = math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
     if distance > 0.0 and (thin or distance >= (1.0 - EXACT) * radius):

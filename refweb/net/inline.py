@@ -1,6 +1,8 @@
-"""Webs that are given node by node and line by line in the scene."""
+"""Webs given node by node and line by line in the scene."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,6 +11,9 @@ from ..errors import InputError
 from ..messages import quote
 from ..tables import Several, Table, checked, choice, field, node_number, numbers_list, real, rows, table, texts
 from .web import Web, in_range
+
+if TYPE_CHECKING:
+    from os import PathLike
 
 LENGTH = real(above=0, unit="m")
 
@@ -85,14 +90,14 @@ class Inline(Table):
     lines: Several = rows(2, number=node_number)
     natural_length: Several = field(_lengths, default="distance", unit="m")
     supports: Several = numbers_list(default=(), number=node_number, empty=True)
-    names: dict = field(_names, default_factory=dict)
+    names: dict[str, Any] = field(_names, default_factory=dict)
     groups: Several = field(_groups, default=None)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse supports that are none of the nodes."""
         in_range("supports", np.array(self.supports, dtype=np.int64), len(self.points))
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `Web`."""
         length = self.natural_length
         if length == "distance":

@@ -1,4 +1,4 @@
-"""Webs with triangle, square and hexagon meshes: those of the paper, windows of any size, and concentric layers.
+"""Webs with triangle, square and hexagon meshes: webs of the paper, windows of any size, and concentric layers.
 
 The paper is *Dynamic modelling and analysis of space webs*, Sci China-Phys Mech Astron 54 (2011). Lattice points have
 integer coordinates in steps of `STEP` sides; the meshes are polygons of such points, and shared points and sides of
@@ -18,22 +18,26 @@ Groups of lines, beside ``rim``, ``anchors`` and ``inner`` of `refweb.net.groups
 ``corners``   of windows: lines of this ``rim`` that end where the inner web has its corners
 ============= =========================================================================
 
-Webs have those that have lines: squares ``rows`` and ``columns``, triangles no ``columns`` but for links at the rim,
-hexagons no ``rows`` but for these. Ends that are held stand at the ends of links: the paper's webs have no ``rim``, and
-the links are their ``anchors``. In a web of layers the outline is held, its ``rim``; where a line cuts off
-a corner of a triangle, both of its nodes are on that as well, and ``ring-N`` is the outline alone.
+A web has the groups with lines: squares have ``rows`` and ``columns``, triangles have ``columns`` only at links of the
+rim, and hexagons have ``rows`` only there. Supports are at the ends of links: webs of the paper have no ``rim``, and
+the links are their ``anchors``. In a web of layers the nodes of the outline are supported, and the outline is the
+``rim``. A line that cuts off a corner of a triangle has both nodes on the outline and belongs to ``rim`` too;
+``ring-N`` is only the outline.
 """
 
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
 from ..tables import Table, choice, integer, real, table
 from .web import Web
+
+if TYPE_CHECKING:
+    from os import PathLike
 
 MESHES = ("triangle", "square", "hexagon")
 #: Rows and columns of the paper's three webs (section 3.2).
@@ -66,14 +70,14 @@ def _places(counts):
 
 
 def _rows(counts, first, polygon, pitch=(2, 1)):
-    """Copies of a polygon, ``counts[j]`` in row j from x = ``first[j]`` on; integer array (polygons, corners, 2)."""
+    """Copies of a polygon, ``counts[j]`` in row j from x = ``first[j]`` on; integers, shape (polygons, corners, 2)."""
     row, column = _places(counts)
     points = np.stack([pitch[0] * column + np.asarray(first)[row], pitch[1] * row], axis=1)
     return points[:, None, :] + np.array(polygon)
 
 
 class Tessellation(NamedTuple):
-    """Polygons of lattice points as a net.
+    """Net of polygons between lattice points.
 
     Attributes
     ----------
@@ -82,9 +86,9 @@ class Tessellation(NamedTuple):
     lines : ndarray of int, shape (lines, 2)
         Shared sides.
     frame : ndarray of bool, shape (lines,)
-        True for sides of one polygon only.
+        True for sides of only one polygon.
     sides : ndarray of int, shape (polygons, corners)
-        The line of each side.
+        Line of each side of each polygon.
     """
 
     nodes: np.ndarray
@@ -108,7 +112,7 @@ def _tessellation(polygons):
 
 
 def _directions(points, lines):
-    """Groups by the direction of lines in the plane, of the names above."""
+    """Groups by the direction of lines in the plane, see the module."""
     x, y, _ = (points[lines[:, 1]] - points[lines[:, 0]]).T
     along, up = abs(y) < _PARALLEL * abs(x), abs(x) < _PARALLEL * abs(y)
     aslant, rising = ~(along | up), x * y > 0.0
@@ -189,7 +193,7 @@ def _outline(points, lines, ends, sides):
 
 @table
 class Paper(Table):
-    """Web of the paper's section 3.2, exactly: a triangle, square or hexagon web.
+    """Web of section 3.2 of the paper: a triangle, square or hexagon web.
 
     Groups of lines: ``anchors``, the links at the rim; ``inner``, all others; of these and of links ``rows``,
     ``columns``, ``rising``, ``falling`` and ``diagonals``, see `refweb.net.lattices`.
@@ -199,7 +203,7 @@ class Paper(Table):
     mesh : {"triangle", "square", "hexagon"}
         755, 1677 and 3554 nodes.
     cable_length : float
-        Total length of cable [m]; the paper's webs share one.
+        Total length of cable [m], which is the same for the three webs of the paper.
 
     Raises
     ------
@@ -218,7 +222,7 @@ class Paper(Table):
     mesh: str = choice(*MESHES)
     cable_length: float = real(above=0, unit="m")
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `refweb.net.web.Web`.
 
         Notes
@@ -249,16 +253,16 @@ class Window(Table):
         nodes and nodes in the first of them, every second row having one node more. An even number of rows ends with
         a row of the second kind.
     width, height : float
-        In place of columns and rows: size along x and along y, with links [m]. There are as many cells as come nearest
-        to it, at least the fewest that there may be; ``refweb check`` prints the size that the web has.
+        Size along x and y with links [m], in place of columns and rows. The web has the number of cells with the
+        nearest size, and at least the smallest number; ``refweb check`` prints the actual size.
     side : float
         Length of each line [m].
 
     Raises
     ------
     InputError
-        For sizes at which nothing hangs together, of rows below 2, and of columns below 2, of triangles 1, of hexagons
-        3; for rows × columns above a million; and unless either columns or width is given, and rows or height.
+        For rows below 2, for columns below 2, with triangles below 1 and with hexagons below 3; for rows × columns
+        above a million; unless either columns or width is given, and either rows or height.
 
     Examples
     --------
@@ -278,8 +282,8 @@ class Window(Table):
     height: float | None = real(default=None, above=0, unit="m")
     side: float = real(above=0, unit="m")
 
-    def check(self):
-        """Refuse sizes at which nothing hangs together, and more than a million cells."""
+    def check(self) -> None:
+        """Refuse sizes without a connected web, and more than a million cells."""
         for name, size in (("rows", "height"), ("columns", "width")):
             cells, length = getattr(self, name), getattr(self, size)
             if cells is None and length is None:
@@ -294,8 +298,8 @@ class Window(Table):
             raise InputError(f"rows × columns = {rows * columns} must be ≤ {_MOST_CELLS}")
 
     @property
-    def counts(self):
-        """Numbers of rows and of columns, those given or the nearest to height and width."""
+    def counts(self) -> tuple[int, int]:
+        """Numbers of rows and columns, given or from height and width."""
         counts = []
         (per_column, more_columns), (per_row, more_rows) = EXTENT[self.mesh]
         for given, length, pitch, more, smallest in (
@@ -307,7 +311,7 @@ class Window(Table):
             counts.append(given)
         return tuple(counts)
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `refweb.net.web.Web`; its cells count the sectors between links as `Paper` does."""
         rows, columns = self.counts
         return _window(self.mesh, rows, columns, self.side, "window")
@@ -354,7 +358,7 @@ class Layers(Table):
     layers: int = integer(at_least=1)
     cell_area: float = real(above=0, unit="m²")
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `refweb.net.web.Web`; refused above a million cells."""
         n = self.layers
         cells = _cells(self.mesh, n)

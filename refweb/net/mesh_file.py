@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,10 +17,13 @@ from .faces import CORNERS, decided, group_names
 from .groups import members
 from .web import Web
 
+if TYPE_CHECKING:
+    from os import PathLike
+
 INNER = {"line": 0, "line3": 1, "line4": 2}
-"""Nodes between the ends of cells that are lines, of which a web takes the ends."""
+"""Number of nodes between the ends of cells that are lines; a web uses only the ends."""
 HARMLESS = ("vertex", "poly_vertex")
-"""Cells that a web leaves alone."""
+"""Kinds of cells that a web ignores."""
 
 
 @accepts(by_name({"type": "string", "pattern": r"\S"}))
@@ -95,16 +99,16 @@ class File(Table):
     path: str = text()
     lines: str | None = text(default=None)
     edges: bool | None = boolean(default=None)
-    columns: dict | None = field(_columns, default=None)
+    columns: dict[str, Any] | None = field(_columns, default=None)
     first: int | None = integer(default=None, at_least=0)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse columns that a web does not have."""
         for key in self.columns or ():
             if key not in NAMES:
                 raise InputError(f"columns.{key} is no column of a web, {nearest(key, NAMES)}")
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `Web`; ``base`` is the folder that a relative path starts from."""
         folder, csv = Path(base or "."), Path(self.path).suffix.lower() == ".csv"
         if csv != (self.lines is not None):
@@ -127,9 +131,9 @@ class File(Table):
 
 
 def remarks(web):
-    """Findings on a web of a file: how it was read, and what files often hold by mistake.
+    """Findings on a web of a file: decisions of the reader, and frequent mistakes in files.
 
-    The latter are lines that are there twice, and nodes at one place that no line joins.
+    Mistakes are lines that occur twice, and nodes with equal positions that no line joins.
     """
     yield from web.notes
     ends = np.sort(web.lines, axis=1)
@@ -206,10 +210,10 @@ def _web_of(mesh, edges=None):
 
 
 def _kept(mesh, lines, rim, count, unused):
-    """Mask of the nodes that the web keeps, bool of shape (nodes,), None for all.
+    """Mask of the nodes of the web, bool, shape (nodes,); None for all nodes.
 
-    Nodes within curved lines are not, and of Gmsh and where there are faces, ``unused``, those that no line uses and
-    no physical point names.
+    Nodes within curved lines are left out. With ``unused``, for Gmsh and faces, nodes without a line and a physical
+    point are left out too.
     """
     mask = np.full(count, mesh.groups is None and not unused)
     curved = [block.cells[:, 2:] for block in mesh.lines if INNER.get(block.kind)]
@@ -224,7 +228,7 @@ def _kept(mesh, lines, rim, count, unused):
 
 
 def _check_cells(mesh):
-    """Refuse what is no line, and say what there is."""
+    """Refuse cells that are no lines, with their kinds."""
     counts = {}
     for block in mesh.blocks:
         counts[block.kind] = counts.get(block.kind, 0) + len(block.cells)
@@ -235,7 +239,7 @@ def _check_cells(mesh):
 
 
 def _segments(blocks, points):
-    """Lines (n, 2) of all blocks, the cell of each, and its share of the cell by distance."""
+    """Lines (n, 2) of all blocks, the cell of each, and its share of the length of the cell."""
     lines, of, share, first = [], [], [], 0
     for block in blocks:
         cells = block.cells if block.kind == "polyline" else block.cells[:, :2]
@@ -254,7 +258,7 @@ def _segments(blocks, points):
 
 
 def _merged(lines, mesh):
-    """Elements of Gmsh, each once, and the place there of all: one in two groups may be listed twice."""
+    """Different elements of Gmsh, and the index of each: a file may list an element of two groups twice."""
     entity = np.concatenate([block.data.get("entity", np.arange(len(block.cells))) for block in mesh.lines])
     key = np.column_stack([np.sort(lines, axis=1), entity])
     _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
@@ -264,7 +268,7 @@ def _merged(lines, mesh):
 
 
 def _joined(key, blocks):
-    """A datum of all cells, None where a block has it not."""
+    """Data of a name of all cells; None if a block lacks it."""
     values = [block.data.get(key) for block in blocks]
     return None if any(value is None for value in values) else np.concatenate(values)
 

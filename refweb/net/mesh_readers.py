@@ -1,14 +1,14 @@
-"""Meshes from files: meshio reads them, and VTK those that meshio does not know.
+"""Reading of mesh files: by meshio, and by VTK for content that meshio does not read.
 
-meshio leaves out polylines of .vtu files without a word, and knows neither polygonal data nor texts; such files are
-read by VTK. It does so in a process of its own, as it may end the one that it is in on a file that is damaged.
+meshio skips polylines of .vtu files without a message, and reads neither polygonal data nor texts. VTK reads such
+files, in a separate process, since a damaged file may end the process.
 """
 
 from __future__ import annotations
 
 import itertools
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,14 +17,14 @@ from ..errors import InputError
 from ..messages import quote
 
 FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".vtp": None, ".msh": "gmsh", ".obj": "obj", ".stl": "stl"}
-"""Formats of meshes by the end of their name, as meshio calls them; None for what VTK alone reads."""
+"""Formats of mesh files by suffix, with the names of meshio; None for files that only VTK reads."""
 LINES = ("line", "line3", "line4", "polyline")
 REMEDIES = {
     ".msh": "in Gmsh give the curves physical groups and save these alone, Mesh.SaveAll = 0, or mesh by `gmsh -1`",
     ".obj": "write rows l 1 2 of lines, or rows f 1 2 3 of faces",
     "": "extract the edges of solids, in ParaView by Extract Edges, in pyvista by mesh.extract_all_edges()",
 }
-"""Remedies for a file with other cells, by the end of its name."""
+"""Remedies for a file with other cells, by its suffix."""
 BY_VTK = """
 import sys
 import numpy as np
@@ -43,15 +43,15 @@ write."""
 
 
 class Block(NamedTuple):
-    """Cells of one kind with as many nodes: their nodes, shape (cells, nodes), and what is known of each by name.
+    """Cells of one kind: their nodes, shape (cells, nodes), and data of cells by name.
 
     ``members`` are the cells of each physical group of Gmsh, for faces.
     """
 
     kind: str
     cells: np.ndarray
-    data: dict
-    members: dict = {}
+    data: dict[str, Any]
+    members: dict[str, Any] = {}
 
 
 class Mesh(NamedTuple):
@@ -76,21 +76,21 @@ class Mesh(NamedTuple):
     """
 
     points: np.ndarray
-    blocks: list
-    point_data: dict
+    blocks: list[Any]
+    point_data: dict[str, Any]
     remedy: str
-    groups: dict | None = None
-    names: dict = {}
-    supports: list = []
+    groups: dict[str, Any] | None = None
+    names: dict[str, Any] = {}
+    supports: list[Any] = []
 
     @property
     def lines(self):
-        """Blocks of lines that have any."""
+        """Blocks of lines, without empty ones."""
         return [block for block in self.blocks if block.kind in LINES and len(block.cells)]
 
 
 def read(path):
-    """The `Mesh` in a file."""
+    """Read the `Mesh` of a file."""
     if not path.is_file():
         raise InputError(f"there is no file {path}")
     suffix = path.suffix.lower()
@@ -140,7 +140,7 @@ def _asks_for_vtk(path, suffix):
 
 
 def _has_polylines(path, content):
-    """Tell if meshio leaves cells of a .vtu file out."""
+    """Tell if meshio skips cells of a .vtu file."""
     said = sum(map(int, re.findall(rb'NumberOfCells="(\d{1,12})"', content)))
     try:
         return said != sum(len(block.data) for block in by_meshio(path, "vtu").cells)
@@ -156,7 +156,7 @@ def _unread(path, reason, reader="meshio"):
 
 
 def by_meshio(path, kind):
-    """The mesh that meshio reads; it reports some failures by printing and leaving the program."""
+    """Read a mesh by meshio, which reports some failures by printing and SystemExit."""
     import contextlib
     import io
     import warnings
@@ -177,7 +177,7 @@ def by_meshio(path, kind):
 
 
 def by_vtk(path):
-    """The `Mesh` that VTK reads in a process of its own."""
+    """Read a `Mesh` by VTK in a separate process."""
     import subprocess
     import sys
     import tempfile

@@ -1,7 +1,7 @@
-"""Points, lines and faces of OBJ files.
+"""Reading of OBJ files: points, lines and faces.
 
-Corners of faces have numbers of their own for texture and normals, ``f 1/4/2 ...``, of which the first alone says where
-they are; a negative number counts backwards from the last point above it.
+A corner of a face has numbers for position, texture and normal, ``f 1/4/2 ...``; only the first is used. A negative
+number counts backwards from the last point above it.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from ..errors import InputError
 from ..messages import quote
 
 SIDES = {"l": (2, "a line needs two points"), "f": (3, "a face needs three points")}
-"""Least number of corners of each kind of element, and what to say of less."""
+"""Least number of corners of each kind of element, and the message for fewer."""
 NO_GROUP = ("off", "default", "all")
-"""Names that are no group: programs write them where they have none."""
+"""Names that programs write for elements without a group."""
 
 
 def read_obj(path):
@@ -27,12 +27,12 @@ def read_obj(path):
     lines, faces : list of list of int
         Points of each polyline and around each face, from 0.
     line_groups, face_groups : list of str
-        Group of each, which a row ``g NAME`` begins; "" for none.
+        Group of each, from the last row ``g NAME``; "" for none.
 
     Raises
     ------
     InputError
-        For what is no text, a point without three numbers, and an element of points that are not there.
+        For a file that is no text, a point without three numbers, and an element with unknown points.
     """
     points, group = [], ""
     cells, names = {kind: [] for kind in SIDES}, {kind: [] for kind in SIDES}
@@ -68,7 +68,7 @@ def _point(path, number, words):
 
 
 def _corners(path, number, words, count):
-    """Points of an element, from 0; ``count`` are above it."""
+    """Points of an element, from 0; ``count`` is the number of points above it."""
     try:
         given = [int(word.partition("/")[0]) for word in words[1:]]
     except ValueError:

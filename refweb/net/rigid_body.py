@@ -1,4 +1,4 @@
-"""Rigid bodies: rows of the unknowns after those of the web's nodes, and what a shape has to say.
+"""Rigid bodies: rows of the unknowns after those of the nodes, and the interface of shapes.
 
 How to write a body shape
 -------------------------
@@ -31,15 +31,15 @@ A shape is a class whose fields are its keys in ``[[body]]``. All that lies behi
             corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
             return 0.5 * self.drawn * corners, np.array([[0, 1, 2], [0, 2, 3]])
 
-A body is convex. Its depth is the distance from its surface there, and concave, with a gradient that nowhere jumps: the
-force is the slope of an energy. That is why edges are rounded, and a body is a core and the radius by which it has
-grown on all sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core is a box, whose half sizes may be 0, or
-round about its axis, ``depth`` and ``boundary`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is
-a capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move and turn
-sets ``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its
-centre. One that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as
-`refweb.net.shapes.filled` has. By its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`, it touches other
-bodies; where they are to touch, one without is refused. Scenes know it by an entry point of your package; in a script
+A body is convex. Its depth is the distance from its surface near the surface, and concave, with a continuous gradient:
+the force is the gradient of an energy. Therefore edges are rounded. A body is a core and a radius of growth on all
+sides, ``grown.radius`` and ``grown.core`` in a kernel. For a core that is a box, whose half sizes may be 0, or round
+about its axis, `Shape` has ``depth`` and ``boundary``: ``Grown(radius, (0.0, 0.0, length / 2))`` is a capsule. For
+other cores ``farthest`` may give the surface, whose triangles face outward. A shape that may move and turn sets ``free
+= True``; without such a core it defines its ``volume()`` and the tensor ``inertia(mass)`` about its centre. A shape
+that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, see `refweb.net.shapes.filled`. A
+body touches other bodies by its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`; contact of bodies
+refuses a shape without one. An entry point of your package makes it known to scenes; in a script
 ``refweb.register("shape", "wall", Wall)`` does the same. One that refweb ships is a line in `refweb.registry.SHAPES`::
 
     [project.entry-points."refweb.shapes"]
@@ -49,13 +49,20 @@ bodies; where they are to touch, one without is refused. Scenes know it by an en
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
 from ..messages import quote
 from ..tables import Table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from .net import Net
 
 
 class Grown(NamedTuple):
@@ -70,15 +77,15 @@ class Grown(NamedTuple):
     round : bool
         True if the core is a cylinder about the third axis, with the first number as radius; False for a box.
     fine : float
-        Length on which the surface may turn [m], of a body that need not be convex; 0 of a convex one.
+        Length on which the surface may turn [m] for a body that need not be convex; 0 for a convex body.
     thick : float
-        Least distance from its middle to its surface [m], where that does not follow from the core.
+        Least distance from its middle to its surface [m], if it does not follow from the core.
     field : float
-        Where the numbers of a field stand in memory, of a body that has one.
+        Address of the numbers of a field, for a body with a field.
     """
 
     radius: float
-    core: tuple
+    core: tuple[float, float, float]
     round: bool = False
     fine: float = 0.0
     thick: float = 0.0
@@ -100,9 +107,9 @@ class Shape(Table):
     ground : bool
         True for ground, whose size gives no limit of the penetration.
     error : float, optional
-        Largest distance of the surface that lines feel from the one that is meant [m], where these differ.
+        Largest distance of the surface of contact from the given surface [m], if they differ.
     directions : tuple of str
-        Keys that say where its axes are.
+        Keys of the directions of its axes.
     """
 
     free = False
@@ -110,67 +117,67 @@ class Shape(Table):
     planar = False
     ground = False
     error: float | None = None
-    directions: ClassVar[tuple] = ("axes", "axis", "normal")
+    directions: ClassVar[tuple[str, ...]] = ("axes", "axis", "normal")
 
-    def grown(self):
+    def grown(self) -> Grown:
         """Its core and the radius of growth, a `Grown`."""
         raise NotImplementedError
 
-    def settle(self):
-        """Read what is in files, and refuse what cannot be; called when a net is made."""
+    def settle(self) -> None:
+        """Read files, and refuse invalid content; called when a net is made."""
 
     @property
-    def extent(self):
-        """Largest distance from its centre to its surface as a web sees it [m]."""
+    def extent(self) -> float:
+        """Largest distance from its centre to its surface for contact with a web [m]."""
         radius, core, *_ = self.grown()
         return radius + float(np.linalg.norm(core))
 
-    def frame(self):
+    def frame(self) -> NDArray[np.float64]:
         """Unit vectors of its axes, right-handed, shape (3, 3)."""
         return np.eye(3)
 
-    def remarks(self):
-        """Warnings of what it was made of, each a text."""
+    def remarks(self) -> Iterable[str]:
+        """Texts of warnings on its input."""
         return ()
 
-    def texts(self):
+    def texts(self) -> Iterable[str]:
         """Texts on it for the box of a scene."""
         return ()
 
-    def volume(self):
+    def volume(self) -> float | None:
         """Its volume [m³]."""
         from .solid import moments
 
         return moments(self.grown())[0]
 
-    def inertia(self, mass):
+    def inertia(self, mass: float) -> NDArray[np.float64]:
         """Tensor of inertia of a uniform mass about its centre [kg m²], along its axes, shape (3, 3)."""
         from .solid import inertia
 
         return inertia(self.grown(), mass)
 
-    def refuse_turning(self, angular_velocity):
-        """Refuse an angular velocity [rad/s] that it cannot have."""
+    def refuse_turning(self, angular_velocity: Sequence[float]) -> None:
+        """Refuse an impossible angular velocity [rad/s]."""
 
-    def depth(self):
-        """Kernel of its depth, as `refweb.net.grown_core.depth`, which is that of boxes and of round cores."""
+    def depth(self) -> Any:
+        """Kernel of its depth, by default `refweb.net.grown_core.depth` for boxes and round cores."""
         from .grown_core import depth
 
         return depth
 
-    def skeleton(self):
-        """Parts by which it touches other bodies, as `refweb.net.skeleton` makes them; None: it touches none."""
+    def skeleton(self) -> NDArray[Any] | None:
+        """Parts by which it touches other bodies, from `refweb.net.skeleton`; None if it touches none."""
         return None
 
-    def touched(self, thickness):
-        """The `Grown` that parts of other bodies feel which are so thick at most [m]."""
+    def touched(self, thickness: float) -> Grown:
+        """The `Grown` for contact with parts of other bodies up to a thickness [m]."""
         return self.grown()
 
-    def farthest(self, normals):
+    def farthest(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points of the core (n, 3) [m] that are farthest along unit vectors (n, 3)."""
         return np.sign(normals) * self.grown().core
 
-    def boundary(self):
+    def boundary(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Its surface about the centre as points (n, 3) [m] and triangles (t, 3), outward."""
         from .surfaces import sphere
 
@@ -179,7 +186,7 @@ class Shape(Table):
 
 
 ON_AXLE = 1e-12
-"""Share of coordinates below which the distance of a body from its axle is rounding."""
+"""Distance of a body from its axle that counts as rounding, over its coordinates."""
 
 
 class Axle(NamedTuple):
@@ -195,11 +202,11 @@ class Axle(NamedTuple):
         Torque about it over time [N m], linear in between, end values held; empty for none.
     """
 
-    point: np.ndarray
-    direction: np.ndarray
-    torque: tuple = ()
+    point: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    torque: tuple[tuple[float, float], ...] = ()
 
-    def arm(self, position):
+    def arm(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
         """Vector from the nearest point of the axle to a position [m], shape (3,)."""
         away = position - self.point
         return away - (away @ self.direction) * self.direction
@@ -234,78 +241,78 @@ class RigidBody:
     turns : bool
         True if its rotation is followed.
     spin : int, optional
-        Its row of rotation, where it has one.
+        Its first row of rotation, if it has one.
     turn : int, optional
-        The second one, where its orientation counts, see `refweb.net.rotation`.
+        Its second row of rotation, if its orientation counts, see `refweb.net.rotation`.
     carried : tuple of int
-        Nodes that it carries, whose mass its own has.
+        Nodes that it carries; its mass includes theirs.
     points : ndarray, shape (carried, 3)
-        Where it does, along its axes from its row [m].
+        Positions of the carried nodes, along its axes from its row [m].
     offset : ndarray, shape (3,)
-        Centre of its shape, along its axes from its row [m]: that is the centre of mass of all.
+        Centre of its shape, along its axes from its row [m]; the row is the centre of mass with carried nodes.
     pivot : int, optional
-        Row of the point of the axle that its row turns about, where that does not lie on the axle itself.
+        Row of the point of the axle about which its row turns, if its row is off the axle.
     arm : ndarray, shape (3,)
-        Vector from there to its row at the start [m]; 0 without one.
+        Vector from that point to its row at the start [m]; 0 without a pivot.
     mass : float
-        Its mass [kg], where it turns about an axle.
+        Its mass [kg], for a body on an axle.
     """
 
     name: str
     row: int
     shape: Shape
-    velocity: tuple
+    velocity: tuple[float, float, float]
     fixed: bool
-    axes: np.ndarray = field(default_factory=lambda: np.eye(3), compare=False)
-    inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)), compare=False)
-    angular_velocity: tuple = (0.0, 0.0, 0.0)
+    axes: NDArray[np.float64] = field(default_factory=lambda: np.eye(3), compare=False)
+    inertia: NDArray[np.float64] = field(default_factory=lambda: np.zeros((3, 3)), compare=False)
+    angular_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turns: bool = False
     spin: int | None = None
     turn: int | None = None
-    carried: tuple = ()
-    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)), compare=False)
-    offset: np.ndarray = field(default_factory=lambda: np.zeros(3), compare=False)
+    carried: tuple[int, ...] = ()
+    points: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)), compare=False)
+    offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3), compare=False)
     moved: bool = False
     axle: Axle | None = field(default=None, compare=False)
     pivot: int | None = None
-    arm: np.ndarray = field(default_factory=lambda: np.zeros(3), compare=False)
+    arm: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3), compare=False)
     mass: float = 0.0
 
     @property
-    def prescribed(self):
-        """True if nothing that acts on it moves it: it is fixed, or moves as tables say."""
+    def prescribed(self) -> bool:
+        """True if forces do not move it: it is fixed, or tables move it."""
         return self.fixed or self.moved
 
     @property
-    def base(self):
-        """Row that its rotation is about: its own, or that of a point of its axle."""
+    def base(self) -> int:
+        """Row of the centre of its rotation: its own, or that of a point of its axle."""
         return self.row if self.pivot is None else self.pivot
 
     @property
-    def radius(self):
+    def radius(self) -> float:
         """Radius of growth of its shape [m]."""
         return self.shape.grown().radius
 
     @property
-    def core(self):
+    def core(self) -> tuple[float, float, float]:
         """Half sizes of the core of its shape [m]."""
         return self.shape.grown().core
 
     @property
-    def thickness(self):
+    def thickness(self) -> float:
         """Least distance from its middle to its surface [m]."""
         return self.shape.grown().thick or self.radius + min(self.core)
 
     @property
-    def extent(self):
-        """Largest distance from its row to its surface as a web sees it [m]; infinite for a ring."""
+    def extent(self) -> float:
+        """Largest distance from its row to its surface for contact with a web [m]; infinite for a ring."""
         return self.shape.extent + float(np.linalg.norm(self.offset))
 
     @property
-    def tumbles(self):
+    def tumbles(self) -> bool:
         """True if its orientation counts: a free body that is no ring, nor a sphere with one moment of inertia.
 
-        Of a body that carries nodes it does, and of one that tables move or that turns about an axle.
+        It also counts for a body that carries nodes, and for one that tables move or that turns about an axle.
         """
         if self.moved or self.axle:
             return True
@@ -313,10 +320,10 @@ class RigidBody:
         return not (self.fixed or self.shape.planar or self.shape.once and spherical and not self.carried)
 
     @property
-    def moment(self):
-        """Moment of inertia that stands in place of mass [kg m²]: the largest, or that of a ring about its normal.
+    def moment(self) -> float:
+        """Moment of inertia in place of mass [kg m²]: the largest one, or that of a ring about its normal.
 
-        About an axle it is that, and without a meaning where tables move the body.
+        On an axle it is the moment about the axle; for a body that tables move it has no meaning.
         """
         if self.moved:
             return 1.0
@@ -327,18 +334,18 @@ class RigidBody:
         return float(self.inertia[2, 2])
 
     @property
-    def moment_about_centre(self):
-        """`moment` without the mass at its arm from an axle: that about the direction of the axle through the row."""
+    def moment_about_centre(self) -> float:
+        """`moment` about the direction of the axle through the row: without the mass times the squared arm."""
         if self.moved or not self.axle:
             return self.moment
         direction = self.axes @ self.axle.direction
         return float(direction @ self.inertia @ direction)
 
     @property
-    def mobility(self):
+    def mobility(self) -> NDArray[np.float64]:
         """Moment of inertia times the inverse of the inertia tensor, along its axes, shape (3, 3).
 
-        About an axle it turns whatever moment acts: the part along the axle counts.
+        On an axle only the part along the axle remains.
         """
         if self.moved:
             return np.eye(3)
@@ -349,13 +356,13 @@ class RigidBody:
         return 0.5 * (tensor + tensor.T)
 
     @property
-    def start_spin(self):
+    def start_spin(self) -> tuple[float, float, float] | NDArray[np.float64]:
         """Velocity of its row of rotation at the start [rad/s], see `refweb.net.rotation`; a tuple or an ndarray."""
         if not self.tumbles or self.axle:
             return self.angular_velocity
         return self.axes.T @ (self.inertia @ (self.axes @ self.angular_velocity)) / self.moment
 
-    def rotation(self, x):
+    def rotation(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Matrix of its rotation since the start, at displacements x (rows, 3)."""
         if self.turn is not None:
             return matrix_of((1.0 + x[self.turn, 0], *x[self.spin]))
@@ -364,29 +371,31 @@ class RigidBody:
             return matrix_of((np.cos(0.5 * angle), *np.sin(0.5 * angle) * self.axes[2]))
         return np.eye(3)
 
-    def turning(self, x, v):
+    def turning(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Its angular velocity [rad/s] at displacements and velocities of all rows, (rows, 3); along x, y and z."""
         if self.turn is None:
             return np.zeros(3) if self.spin is None else v[self.spin]
         axes = self.axes @ self.rotation(x).T
         return axes.T @ (self.mobility @ (axes @ v[self.spin]))
 
-    def surface(self, centre, rotation=None):
+    def surface(
+        self, centre: NDArray[np.float64] | Sequence[float], rotation: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Its surface with its row at a centre: points (n, 3) [m] and triangles (t, 3), outward; turned by a matrix."""
         local, triangles = self.shape.boundary()
         axes = self.axes if rotation is None else self.axes @ rotation.T
         return np.asarray(centre) + (local + self.offset) @ axes, triangles
 
 
-def row_names(bodies):
-    """Names of the rows behind those of the nodes: of bodies, of points of axles, and of rotations, with a dot."""
+def row_names(bodies: Sequence[RigidBody]) -> list[str]:
+    """Names of the rows after the nodes: of bodies, and, with a dot, of points of axles and rotations."""
     rows = ([f"{b.name}.spin", f"{b.name}.turn"][: 1 + (b.turn is not None)] for b in bodies if b.spin is not None)
     pivots = [f"{body.name}.axle" for body in bodies if body.pivot is not None]
     return [body.name for body in bodies] + pivots + [name for names in rows for name in names]
 
 
-def with_rotations(net):
-    """The net with the rows of rotation of its bodies behind all others."""
+def with_rotations(net: Net) -> Net:
+    """The net with the rows of rotation of its bodies after all others."""
     if net.spins or not any(body.turns for body in net.bodies):
         return net
     net = _with_pivots(net)
@@ -407,7 +416,7 @@ def with_rotations(net):
 
 
 def _with_pivots(net):
-    """The net with a row for the point of each axle that the row of its body turns about."""
+    """The net with a row for the point of each axle about which the row of a body turns."""
     bodies, pivots = [], []
     for body in net.bodies:
         if body.axle:
@@ -423,13 +432,13 @@ def _with_pivots(net):
     return replace(net, points=points, mass=mass, bodies=tuple(bodies))
 
 
-def of_size_one(vector):
-    """A vector over the power of 2 above its largest component: its square is neither 0 nor infinite."""
+def of_size_one(vector: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """A vector over a power of 2 near its largest component, so that its square is neither 0 nor infinite."""
     vector = np.asarray(vector, dtype=float)
     return np.ldexp(vector, -np.frexp(np.abs(vector).max())[1])
 
 
-def matrix_of(quaternion):
+def matrix_of(quaternion: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     """Rotation matrix of a quaternion (w, x, y, z) of any length but 0."""
     quaternion = of_size_one(quaternion)
     w, *v = quaternion / np.linalg.norm(quaternion)
@@ -438,27 +447,27 @@ def matrix_of(quaternion):
     return np.eye(3) + 2.0 * (w * across + across @ across)
 
 
-def unit(name, axis):
+def unit(name: str, axis: Any) -> NDArray[np.float64]:
     """The unit vector along a key's value; zero is refused."""
-    given, axis = axis, of_size_one(axis)
-    size = np.linalg.norm(axis)
+    vector = of_size_one(axis)
+    size = np.linalg.norm(vector)
     if not size > 0.0:
-        raise InputError(f"{name} = {list(given)} must not be zero")
-    return np.array(axis) / size
+        raise InputError(f"{name} = {list(axis)} must not be zero")
+    return vector / size
 
 
-def axes_about(name, axis):
+def axes_about(name: str, axis: Any) -> NDArray[np.float64]:
     """Unit vectors, shape (3, 3), the third along a key's value."""
     if axis is None:
         raise InputError(f"{name} is missing: give {name} = ... or orientation = ...")
     vector = unit(name, axis)
-    first = np.cross(vector, np.eye(3)[np.abs(vector).argmin()])
+    first: Any = np.cross(vector, np.eye(3)[np.abs(vector).argmin()])
     first /= np.linalg.norm(first)
     return np.array([np.cross(first, vector), first, vector])
 
 
-def axes_of(axes):
-    """Unit vectors, shape (3, 3), along two at right angles and across; those of x, y and z for None."""
+def axes_of(axes: Any) -> NDArray[np.float64]:
+    """Unit vectors, shape (3, 3), along two given ones at right angles and their cross product; x, y, z for None."""
     if axes is None:
         return np.eye(3)
     if len(axes) != 2:

@@ -1,22 +1,23 @@
-"""Rotations of rigid bodies: quaternions in the rows of a net, and the free motion of a body that turns.
+"""Rotations of rigid bodies: quaternions in rows of a net, free rotation, and motion of carried nodes.
 
-The rotation of a body since the start is a unit quaternion q. Its vector part is the displacement of the body's row of
-rotation, q₀ − 1 the first component of that of the row behind it, so that no displacement is no rotation. The velocity
-of the row of rotation is L/I: the angular momentum L about the centre, along the axes of space, over a moment of
-inertia I that stands in place of mass. So torques kick that row as forces kick the others, and what moves the body
-freely keeps it. With W = I J⁻¹ of the tensor J at the start and the rotation matrix R of q,
+The rotation of a body since the start is a unit quaternion q. Its vector part is the displacement of the first row of
+rotation, and q₀ − 1 is the first component of the displacement of the second row: zero displacement is no rotation. The
+velocity of the first row is L/I, the angular momentum L about the centre, along the axes of space, over a moment of
+inertia I that replaces the mass. Torques change this velocity as forces change that of other rows, and free motion
+keeps it constant. With W = I J⁻¹ of the tensor J at the start and the rotation matrix R of q,
 
     ω = R W Rᵀ (L/I),        q' = ½ ω q.
 
-A free body moves by Taylor's series of this, along the axes of the body, to rounding: its coefficients follow from each
-other, since all is quadratic. The poles of the motion lie at imaginary times of at least π/2 over the largest |ω|, so
-that steps of `TURN` converge as 0.16ⁿ. That is the flow of the kinetic energy itself, symplectic and reversible as the
-closed form of van Zon and Schofield [1]_ is, in splittings of any order, and takes no Jacobi functions nor cases.
+Free motion is computed by the Taylor series of these equations, along the axes of the body, to rounding. The
+coefficients follow from a recurrence, since the equations are quadratic. The poles of the solution are at imaginary
+times of at least π/2 over the largest |ω|, so that steps of `TURN` converge as 0.16ⁿ. The result is the exact flow of
+the kinetic energy, symplectic and reversible in splittings of any order, as the closed form of van Zon and Schofield
+[1]_, but without Jacobi functions and distinctions of cases.
 
-A body may carry nodes of the web, see `refweb.effects.attach`: they are where it takes them, and what acts on them acts
-on it. One that turns about an axle has W = n⊗n of its direction n, and I about it: so moments across it turn nothing.
-Where its centre of mass is off the axle, its row is carried as nodes are, by a row of the axle that stays, and kinetic
-energy has what it adds to I once. The second row of rotation has the angle about the axle as its second component.
+A body may carry nodes of the web, see `refweb.effects.attach`: they move with the body, and forces on them act on the
+body. A body on an axle of direction n has W = n⊗n, and I about the axle: moments across the axle do not turn it. If its
+centre of mass is off the axle, a fixed row of the axle carries the row of the body as a node, and the kinetic energy
+counts its part of I once. The second component of the second row of rotation is the angle about the axle.
 
 References
 ----------
@@ -34,9 +35,9 @@ import numpy as np
 from ..kernels import Cube, IntegerMatrix, Matrix, Record, Vector, kernel
 
 TURN = 0.25
-"""Largest angle by which a series takes a body on [rad]; longer ways are several."""
+"""Largest angle of rotation by one series [rad]; a larger rotation takes several series."""
 TERMS = 24
-"""Largest number of terms of a series: the next is below 1e-19."""
+"""Largest number of terms of a series; the next term is below 1e-19."""
 SMALL = 1e-18
 """Size of a term that ends a series."""
 
@@ -87,7 +88,7 @@ def quaternion_rate(w, a, b, c, omega):
 
 @kernel()
 def to_quaternion(block, x, spin, turn, at):
-    """Make columns of a quaternion, in two rows of three from ``at``, of those of a rotation, of all rows before."""
+    """Convert columns of a rotation to columns of its quaternion, two rows of three from ``at``, of all rows."""
     w, a, b, c = 1.0 + x[turn, 0], x[spin, 0], x[spin, 1], x[spin, 2]
     size = 2.0 / (w * w + a * a + b * b + c * c)
     for i in range(at + 3):
@@ -104,33 +105,33 @@ class RigidRotations(Record):
     Attributes
     ----------
     rows : ndarray of int, shape (bodies, 3)
-        Row of the place of each, and its two rows of rotation.
+        Row of each body and its two rows of rotation.
     moment : ndarray, shape (bodies,)
-        I [kg m²]; 0 of those that tables move.
+        I [kg m²]; 0 for bodies that tables move.
     mobility : ndarray, shape (bodies, 3, 3)
         W, along the axes of space at the start.
     principal : ndarray, shape (bodies, 3, 3)
         Unit vectors of the principal axes, along the axes of space at the start.
     faster : ndarray, shape (bodies, 3)
-        I over the moments of inertia about these; 1 about one of them, and not less about the others.
+        I over the moments of inertia about the principal axes; the least is 1.
     reach : ndarray, shape (bodies, 3)
-        Largest distance of a point of a body from each of these axes, at most [m].
+        Bound of the distance of points of a body from each principal axis [m].
     before : ndarray, shape (bodies, 4)
-        Space for quaternions.
+        Memory for quaternions.
     terms_space : ndarray, shape (TERMS + 1, 10)
-        Space for the terms of a series: of q, of L/I and of ω along the axes of the body.
+        Memory for the terms of a series: q, L/I and ω along the axes of the body.
     carried : ndarray of int, shape (carried, 2)
         Nodes that bodies carry, and the number of the body of each.
     arms : ndarray, shape (carried, 3)
-        Vectors from the centre of mass to them at the start [m].
+        Vectors from the centre of mass to carried nodes at the start [m].
     ahead : ndarray, shape (carried, 3)
-        Their displacements at the start [m], 0 where the body takes them where the web has them.
+        Displacements of carried nodes at the start [m]; 0 if they start in their positions in the web.
     scales : ndarray, shape (carried, 3)
-        Factors that make rates of the nodes those of the body, see `carry_rates`.
+        Factors that convert rates of nodes to rates of the body, see `carry_rates`.
     axles : ndarray, shape (bodies, 3)
-        Unit vectors along axles, 0 of bodies that have none.
+        Unit vectors along axles; 0 without an axle.
     doubled : ndarray, shape (bodies,)
-        Part of the moments of inertia that rows off axles have by their mass [kg m²].
+        Part of the moments of inertia from the mass of rows off axles, which their own rows contain too [kg m²].
     """
 
     rows: IntegerMatrix
@@ -150,7 +151,7 @@ class RigidRotations(Record):
 
     @classmethod
     def of(cls, net):
-        """Those of a `refweb.net.net.Net`."""
+        """The record of a `refweb.net.net.Net`."""
         bodies = [body for body in net.bodies if body.turn is not None]
         count = len(bodies)
         mobility = np.array([b.axes.T @ b.mobility @ b.axes for b in bodies]).reshape(count, 3, 3)
@@ -178,18 +179,18 @@ class RigidRotations(Record):
 
 
 def _carried_rows(body):
-    """Rows that a body carries: its own, where it is off the axle, and those of nodes."""
+    """Rows that a body carries: its own row, if it is off the axle, and rows of nodes."""
     return ([] if body.pivot is None else [body.row]) + list(body.carried)
 
 
 def _arms(body):
-    """Vectors at the start from where it turns about to what a body carries [m], shape (carried, 3)."""
+    """Vectors at the start from the centre of rotation of a body to carried rows [m], shape (carried, 3)."""
     nodes = body.arm + body.points @ body.axes
     return nodes if body.pivot is None else np.vstack([body.arm, nodes])
 
 
 def _reach(body, axes):
-    """Largest distance of a point of a body from each of some axes that it turns about, at most [m]: of the box."""
+    """Bound of the distance of points of a body from each of some axes [m], by the box of the body."""
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     corners = body.arm + (signs * (np.array(body.core) + body.radius) + body.offset) @ body.axes
     largest = body.extent + np.linalg.norm(body.arm)
@@ -197,7 +198,7 @@ def _reach(body, axes):
 
 
 def _exact(a, b):
-    """a + b, 0 where that is of rounding."""
+    """a + b, and 0 if the sum is of the size of rounding."""
     total = a + b
     return np.where(np.abs(total) > 1e-13 * np.abs(a).max(initial=0.0), total, 0.0)
 
@@ -236,7 +237,7 @@ def angular_velocity(n, x, v, turns):
 
 @kernel(leaf=True, apart=("turning",))
 def more_kinetic(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
-    """Kinetic energy of bodies that turn less ½ I |L/I|² of each [J], which their rows have as all others."""
+    """Kinetic energy of rotating bodies minus ½ I |L/I|² of each [J], which their rows contain as other rows do."""
     total = 0.0
     for n in range(turns.moment.size):
         s, omega = turns.rows[n, 1], angular_velocity(n, x, v, turns)
@@ -247,7 +248,7 @@ def more_kinetic(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
 
 @kernel(leaf=True)
 def note_turns(x, turns):
-    """Note the quaternions of bodies ahead of a drift."""
+    """Save the quaternions of bodies before a drift."""
     for n in range(turns.moment.size):
         s = turns.rows[n, 1]
         turns.before[n, 0] = 1.0 + x[turns.rows[n, 2], 0]
@@ -257,7 +258,7 @@ def note_turns(x, turns):
 
 @kernel(leaf=True)
 def series(h, n, v, turns, q):
-    """Take the quaternion ``q (4,)`` of a free body on by a time h, by one series."""
+    """Advance the quaternion ``q (4,)`` of a free body by a time h, by one series."""
     terms_space, w, s = turns.terms_space, turns.mobility[n], turns.rows[n, 1]
     start = times_transposed(matrix_of(q[0], q[1], q[2], q[3]), (v[s, 0], v[s, 1], v[s, 2]))
     for k in range(4):
@@ -298,14 +299,14 @@ def series(h, n, v, turns, q):
 
 @kernel(forceinline=True)
 def along_principal(n, m, a, turns):
-    """Components of a vector along the principal axes of a body of rotation matrix m."""
+    """Components of a vector along the principal axes of a body with rotation matrix m."""
     p, e = times_transposed(m, a), turns.principal[n]
     return times(((e[0, 0], e[0, 1], e[0, 2]), (e[1, 0], e[1, 1], e[1, 2]), (e[2, 0], e[2, 1], e[2, 2])), p)
 
 
 @kernel(leaf=True)
 def fastest_about(n, u, turns):
-    """Angular velocities about its principal axes that a free body comes to, at most [rad/s], by L/I along these.
+    """Bounds of the angular velocities of a free body about its principal axes [rad/s], from L/I along these.
 
     Let w = I/J about each axis and e = Σ (w − 1) u², which is (2 T I − L²)/I² and constant for a free body. Bounds are
     w |u|, √(w Σ w u²) and w √(e/(w − 1)). With the last one, a rod that spins about its middle does not spin about its
@@ -328,7 +329,7 @@ def fastest_about(n, u, turns):
 
 @kernel(leaf=True, apart=("turning",))
 def advance_rotation(h: float, v: Matrix, x: Matrix, turns: RigidRotations) -> None:
-    """Turn free bodies by a time h [s] from the quaternions that are noted, and write them to x."""
+    """Rotate free bodies for a time h [s] from the saved quaternions, and write the result to x."""
     for n in range(turns.moment.size):
         s, q = turns.rows[n, 1], turns.before[n]
         u = along_principal(n, matrix_of(q[0], q[1], q[2], q[3]), (v[s, 0], v[s, 1], v[s, 2]), turns)
@@ -346,7 +347,7 @@ def advance_rotation(h: float, v: Matrix, x: Matrix, turns: RigidRotations) -> N
 
 @kernel(leaf=True)
 def take_along_axle(n, v, turns):
-    """Leave the rotation about the axle of a body in its velocity; that about it [rad/s], 0 without an axle."""
+    """Keep the component of a velocity about the axle of a body; returns it [rad/s], 0 without an axle."""
     s, e = turns.rows[n, 1], turns.axles[n]
     rate = e[0] * v[s, 0] + e[1] * v[s, 1] + e[2] * v[s, 2]
     if e[0] != 0.0 or e[1] != 0.0 or e[2] != 0.0:
@@ -359,10 +360,10 @@ def take_along_axle(n, v, turns):
 def turns_within(
     s: float, h: float, old: Cube, x: Matrix, v: Matrix, turns: RigidRotations, state: Matrix, speed: Matrix
 ) -> None:
-    """Write rotations, and what bodies carry, to ``state`` and ``speed``.
+    """Write rotations, and rows that bodies carry, within a step to ``state`` and ``speed``.
 
-    They are those at the share s of a step of size h that begins at ``old`` (position, velocity, ...), and lie on the
-    cubic through quaternions and their rates at either end.
+    s is the fraction of a step of size h from ``old`` (position, velocity, ...). The rotations are those of the cubic
+    through quaternions and their rates at both ends.
     """
     r = 1.0 - s
     blend, rate0, rate1 = s * s * (3.0 - 2.0 * s), h * s * r * r, -h * s * s * r
@@ -382,9 +383,9 @@ def turns_within(
 
 @kernel(leaf=True)
 def turn_by(x, y, v, turns):
-    """Turn bodies from where x has them by the rotation vectors y − x of their rows of rotation [rad], written to y.
+    """Rotate bodies from their orientation in x by the rotation vectors y − x of their rows [rad]; the result is in y.
 
-    Carried nodes go with them: their places are written to y, their velocities by ``v`` of the bodies.
+    Positions of carried nodes are written to y, and their velocities, from ``v`` of the bodies, to v.
     """
     for n in range(turns.moment.size):
         s, t = turns.rows[n, 1], turns.rows[n, 2]
@@ -406,14 +407,14 @@ def turn_by(x, y, v, turns):
 
 @kernel(leaf=True)
 def update_attached_nodes(x, v, turns):
-    """Write places and velocities of the nodes that bodies carry, where they carry any."""
+    """Write positions and velocities of carried nodes, if there are any."""
     if turns.carried.shape[0]:
         carry_nodes(x, v, turns)
 
 
 @kernel(leaf=True, apart=("carried",))
 def carry_nodes(x: Matrix, v: Matrix, turns: RigidRotations) -> None:
-    """Write places and velocities of the nodes that bodies carry."""
+    """Write positions and velocities of carried nodes."""
     for c in range(turns.carried.shape[0]):
         i, n, a = turns.carried[c, 0], turns.carried[c, 1], turns.arms[c]
         b = turns.rows[n, 0]
@@ -428,14 +429,14 @@ def carry_nodes(x: Matrix, v: Matrix, turns: RigidRotations) -> None:
 
 @kernel(leaf=True)
 def add_forces_to_bodies(x, f, turns):
-    """Add the forces on nodes that bodies carry to those on the bodies, where they carry any."""
+    """Add forces on carried nodes, if there are any, to the forces on their bodies."""
     if turns.carried.shape[0]:
         forces_to_bodies(x, f, turns)
 
 
 @kernel(leaf=True, apart=("carried",))
 def forces_to_bodies(x: Matrix, f: Matrix, turns: RigidRotations) -> None:
-    """Add the forces on nodes that bodies carry, and their moments, to those on the bodies."""
+    """Add forces on carried nodes, and their moments, to the rows of their bodies."""
     for c in range(turns.carried.shape[0]):
         i, n, a = turns.carried[c, 0], turns.carried[c, 1], turns.arms[c]
         b, s = turns.rows[n, 0], turns.rows[n, 1]

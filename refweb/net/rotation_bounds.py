@@ -13,10 +13,11 @@ from .rotation import RigidRotations, along_principal, fastest_about, matrix_at
 
 @kernel(leaf=True, apart=("carried",))
 def carry_rates(rates: Vector, turns: RigidRotations) -> None:
-    """Make row sums of |K|, or of damping, of nodes that bodies carry those of the bodies.
+    """Convert row sums of |K|, or of damping, of carried nodes to row sums of the bodies.
 
-    A node at the arm a moves by δ + θ × a. In place of its displacement there are two unknowns, scaled to be no more
-    than half of it: so rows of other nodes keep their sums, and those of the body are its own over these scales.
+    A node at the arm a moves by δ + θ × a. Two unknowns of the body replace its displacement. They are scaled to at
+    most half of it: the rows of other nodes then keep their sums, and the rows of the body get the sums of the node
+    over these scales.
     """
     for c in range(turns.carried.shape[0]):
         i, n = turns.carried[c, 0], turns.carried[c, 1]
@@ -26,7 +27,7 @@ def carry_rates(rates: Vector, turns: RigidRotations) -> None:
 
 @kernel(leaf=True, apart=("carried",))
 def pull_rates(rates: Vector, f: Matrix, turns: RigidRotations) -> None:
-    """Add what forces f on the nodes that a body carries make of its rotation, for twice these forces."""
+    """Add the moments of forces f on carried nodes to the rows of rotation of bodies, for twice these forces."""
     for c in range(turns.carried.shape[0]):
         i = turns.carried[c, 0]
         pull = math.sqrt(f[i, 0] ** 2 + f[i, 1] ** 2 + f[i, 2] ** 2)
@@ -35,10 +36,7 @@ def pull_rates(rates: Vector, f: Matrix, turns: RigidRotations) -> None:
 
 @kernel(leaf=True)
 def speeds(n, x, v, turns):
-    """Speed of the place of a body, and what its rotation adds to that at its surface while it moves freely, at most.
-
-    [m/s].
-    """
+    """Bounds of the speed of a body and of the speed from rotation at its surface, in free motion [m/s]."""
     b, s, far = turns.rows[n, 0], turns.rows[n, 1], turns.reach[n]
     speed = math.sqrt(v[b, 0] ** 2 + v[b, 1] ** 2 + v[b, 2] ** 2)
     u = along_principal(n, matrix_at(x, s, turns.rows[n, 2]), (v[s, 0], v[s, 1], v[s, 2]), turns)
@@ -48,9 +46,9 @@ def speeds(n, x, v, turns):
 
 @kernel(leaf=True)
 def pushes(n, x, f, turns):
-    """Force on a body, and I times what the moment on it gives its surface by rotation over time, at most.
+    """Bounds of the force on a body, and of I times the acceleration of its surface by the moment on it.
 
-    [N], and [N m²] over I [kg m²].
+    The units are [N] and [N m²]: the second over I [kg m²] is the acceleration.
     """
     b, s, far, w = turns.rows[n, 0], turns.rows[n, 1], turns.reach[n], turns.faster[n]
     force_size = math.sqrt(f[b, 0] ** 2 + f[b, 1] ** 2 + f[b, 2] ** 2)
@@ -60,7 +58,7 @@ def pushes(n, x, f, turns):
 
 @kernel(leaf=True, apart=("turning",))
 def fastest_surface(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
-    """Largest speed that rotation adds at the surface of any body while it moves freely, at most [m/s]."""
+    """Bound of the speed from rotation at the surface of any body in free motion [m/s]."""
     fastest = 0.0
     for n in range(turns.moment.size):
         fastest = max(fastest, speeds(n, x, v, turns)[1])
@@ -69,7 +67,7 @@ def fastest_surface(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
 
 @kernel(leaf=True, apart=("turning",))
 def fastest_point(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
-    """Largest speed of any point of a body while it moves freely, at most [m/s]."""
+    """Bound of the speed of any point of a body in free motion [m/s]."""
     fastest = 0.0
     for n in range(turns.moment.size):
         speed, turning = speeds(n, x, v, turns)
@@ -79,7 +77,7 @@ def fastest_point(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
 
 @kernel(leaf=True, apart=("turning",))
 def hardest_push(x: Matrix, f: Matrix, inverse: Matrix, turns: RigidRotations) -> float:
-    """Largest acceleration of any point of a body by forces f, at most [m/s²]."""
+    """Bound of the acceleration of any point of a body by forces f [m/s²]."""
     hardest = 0.0
     for n in range(turns.moment.size):
         force, moment = pushes(n, x, f, turns)
@@ -91,10 +89,9 @@ def hardest_push(x: Matrix, f: Matrix, inverse: Matrix, turns: RigidRotations) -
 def beside_places(
     kick: float, drift: float, x: Matrix, v: Matrix, f: Matrix, inverse: Matrix, turns: RigidRotations
 ) -> float:
-    """Largest distance of points of bodies from their predicted positions in a drift behind a kick [m].
+    """Bound of the distance of points of bodies from predicted positions in a drift after a kick [m].
 
-    Of the surface that is what it turns by; of nodes that bodies carry how far they are off the way that the velocities
-    they have lead them.
+    For the surface it is the displacement by rotation, for carried nodes the deviation from uniform motion.
     """
     largest = off = 0.0
     for n in range(turns.moment.size):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -10,13 +10,16 @@ from ..errors import InputError
 from ..tables import Several, Table, choice, integer, real, table, vector
 from .web import Web
 
+if TYPE_CHECKING:
+    from os import PathLike
+
 _PARALLEL = 1e-9
 """Sine of the angle below which two directions are parallel."""
 
 
 @table
 class SingleCable(Table):
-    """Single cable with both ends fixed, of lines of equal natural length.
+    """Single cable with both ends fixed, divided into lines of equal natural length.
 
     Groups of lines: ``anchors``, the first and the last; ``inner``, all others; one line alone is ``rim``, see
     `refweb.net.groups`.
@@ -55,8 +58,8 @@ class SingleCable(Table):
     length: float | None = real(default=None, above=0, unit="m")
     sag: Several = vector(default=None)
 
-    def check(self):
-        """Refuse ends at one place, a direction that is none, and one line that is longer than the distance."""
+    def check(self) -> None:
+        """Refuse equal ends, an invalid direction, and a single line that is longer than the distance."""
         with np.errstate(over="ignore"):
             distance = np.linalg.norm(np.subtract(self.end, self.start))
         if not 0 < distance < np.inf:
@@ -75,7 +78,7 @@ class SingleCable(Table):
         size = np.linalg.norm(aside)
         return aside / size if size > _PARALLEL else None
 
-    def web(self, base=None):
+    def web(self, base: str | PathLike[str] | None = None) -> Web:
         """The `Web`, nodes numbered from start to end."""
         n, start, end = self.elements, np.array(self.start), np.array(self.end)
         distance = np.linalg.norm(end - start)
@@ -93,7 +96,7 @@ class SingleCable(Table):
 
 
 def _arc(n, distance, length):
-    """Inner vertices of n equal chords on a circular arc: positions along and aside the line between its ends [m].
+    """Inner vertices of n equal chords on a circular arc: coordinates along and across the line of its ends [m].
 
     Half the angle φ of a chord solves sin nφ/sin φ = n·distance/length, which decreases from n to 0 on (0, π/n).
     """

@@ -1,46 +1,58 @@
 """Skeletons: the points, straight lines and arcs by which a body touches other bodies, each grown by a thickness.
 
-Two convex bodies touch with a corner on a face, a face on a corner, or with two edges: so what touches is a corner or
-an edge of one of them, held against the depth in the other. A sphere is a point and a capsule a line of great
-thickness, a box its edges, a cylinder its two rims. An edge has corners at its ends, each of which one edge owns: at
-the others it would count again.
+Two convex bodies touch with a corner on a face, a face on a corner, or with two edges. Contact is therefore found from
+corners and edges of one body and the depth in the other. The skeleton of a sphere is a point, that of a capsule a line,
+of a box its edges, and of a cylinder its two rims. A corner belongs to one of its edges only, which owns it: otherwise
+it would count several times.
 
-A rim is made of arcs in two rows, one half an arc behind the other. Each touches once, with a window sin²(π ξ); both
-windows together are 1 wherever the rim is deepest, so that it rolls without a bump.
+A rim consists of two rows of arcs, shifted by half an arc. Each arc has one contact with the weight sin²(π ξ). The
+weights of both rows add up to 1 at the deepest point of the rim, so that a rolling rim has a constant force.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from .rigid_body import Grown
+
 POINT, SEGMENT, ARC = 0.0, 1.0, 2.0
 """Kinds of a part."""
 _vectors = [(name, float, (3,)) for name in ("start", "end", "third")]
 PART = np.dtype([("kind", float), ("thickness", float), *_vectors, ("owns", float, (2,))])
-"""A part: its kind; thickness [m]; the point, both ends of a line, or the centre of an arc and two vectors at right
-angles of its radius, of which the places are start + end cos φ + third sin φ [m]; whether it owns its ends, or φ at
-both ends [rad]. All is from the centre of the shape along its axes."""
+"""A part: its kind; thickness [m]; the point, both ends of a line, or the centre of an arc and two radius vectors at
+right angles, with the points start + end cos φ + third sin φ [m]; flags of the ends that a line owns, or φ at both ends
+[rad]. Vectors are from the centre of the shape along its axes."""
 ARCS = 4
 """Number of arcs in a row around a rim."""
 FLAT = 1e-3
-"""Angle between two triangles below which they are one face [rad]."""
+"""Angle between two triangles up to which they are one face [rad]."""
 MOST = 3000
 """Largest number of edges of a surface."""
 
 
-def points(places, thickness):
+def points(places: NDArray[np.float64] | Sequence[Sequence[float]], thickness: float) -> NDArray[Any]:
     """Parts that are points (n, 3), an array of `PART`."""
     parts = np.zeros(len(places), PART)
     parts["kind"], parts["thickness"], parts["start"] = POINT, thickness, places
     return parts
 
 
-def edges(places, pairs, thickness):
+def edges(
+    places: NDArray[np.float64] | Sequence[Sequence[float]],
+    pairs: Sequence[Sequence[int]] | NDArray[np.int64],
+    thickness: float,
+) -> NDArray[Any]:
     """Parts that are the lines between pairs (n, 2) of points (n, 3), an array of `PART`.
 
     Each point belongs to the first line that ends there.
@@ -54,7 +66,7 @@ def edges(places, pairs, thickness):
     return parts
 
 
-def rim(radius, height, thickness):
+def rim(radius: float, height: float, thickness: float) -> NDArray[Any]:
     """Parts of a circle about the third axis, an array of 2 `ARCS` of `PART`."""
     parts = np.zeros(2 * ARCS, PART)
     parts["kind"], parts["thickness"] = ARC, thickness
@@ -64,8 +76,8 @@ def rim(radius, height, thickness):
     return parts
 
 
-def of_box(grown):
-    """Parts of a box that has grown, a `refweb.net.rigid_body.Grown`: also of a point or a line."""
+def of_box(grown: Grown) -> NDArray[Any]:
+    """Parts of a grown box, a `refweb.net.rigid_body.Grown`; also for a point or a line."""
     corners = np.array(list(itertools.product(*([-c, c] if c > 0.0 else [0.0] for c in grown.core))))
     pairs = [
         (i, j)
@@ -75,11 +87,11 @@ def of_box(grown):
     return edges(corners, pairs, grown.radius) if pairs else points(corners, grown.radius)
 
 
-def of_cylinder(grown):
-    """Parts of a cylinder about the third axis that has grown: its rims, and what fills it, for sides that cross.
+def of_cylinder(grown: Grown) -> NDArray[Any]:
+    """Parts of a grown cylinder about the third axis: its rims, and parts inside for crossed cylinders.
 
-    That is the capsule inside on the axis of a long one, or the thickest rim of a flat one, and rims of half that
-    thickness. Where sides cross between these one lies up to 0.03 of the radius in the other before they touch.
+    The parts inside are, for a long cylinder, the capsule on its axis, for a flat one the thickest rim, and rims of
+    half that thickness. Between these parts crossed cylinders overlap by up to 0.03 of the radius before they touch.
     """
     radius, _, half = grown.core
     if not radius > 0.0:
@@ -99,10 +111,10 @@ def of_cylinder(grown):
     return np.concatenate(parts)
 
 
-def of_surface(corners, triangles):
-    """Parts of a surface of triangles (t, 3), outward, of corners (n, 3): its edges that stand out, by `FLAT`.
+def of_surface(corners: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[Any]:
+    """Parts of a surface of triangles (t, 3), outward, with corners (n, 3): its convex edges, by `FLAT`.
 
-    Edges of one triangle, where parts of a solid pass into each other, do not stand out.
+    Edges of one triangle, at the intersection of parts of a solid, do not count.
 
     Raises
     ------

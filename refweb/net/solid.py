@@ -1,7 +1,7 @@
-"""Volume and moments of inertia of uniform bodies that are cores which have grown, in closed form.
+"""Volume and moments of inertia of uniform grown cores, in closed form.
 
-By Steiner, what grows about a box is its faces times a length, its edges times a disc and its corners times a ball; of
-each part the moments follow from those of the ball of that dimension.
+By Steiner's formula, a grown box consists of the box, its faces times a length, its edges times a disc and its corners
+times a ball. The moments of each part follow from those of the ball of that dimension.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Surfaces as points and triangles, outward."""
+"""Surfaces of a sphere and a tube as points and triangles, outward, for drawing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 @functools.cache
 def sphere():
-    """Unit sphere as points and triangles, which nobody may change."""
+    """Unit sphere as points and triangles; the arrays must not be changed."""
     level = 24
     polar = np.linspace(0.0, np.pi, level // 2 + 1)[1:-1]
     around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)
@@ -34,7 +34,7 @@ def sphere():
 
 @functools.cache
 def tube(radius, thin):
-    """Ring about the third axis, a tube of a thickness whose outer edge has the radius, as `sphere`."""
+    """Tube about the third axis with an outer radius and a thickness, as `sphere`."""
     level, sides = 48, 8
     around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)[:, None]
     across = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
@@ -52,5 +52,5 @@ def _fixed(values):
 
 
 def _band(ring, after, step):
-    """Triangles between a row of points, each with the one after it, and the row a step on."""
+    """Triangles between a closed row of points and the next row."""
     return [np.column_stack([ring, ring + step, after + step]), np.column_stack([ring, after + step, after])]

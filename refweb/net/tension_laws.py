@@ -6,7 +6,7 @@ Each law is a class of `refweb.net.laws`; `Law` evaluates one of them over array
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ..messages import nearest
 from ..registry import LAWS, known, load, possible
 from .laws.law import evaluate
 from .laws.line_data import LineData
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 def law_of(name) -> Any:
@@ -61,7 +64,7 @@ class Law:
 
     name: str = "smooth"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if law_of(self.name).columns:
             raise InputError(f'law = "{self.name}" has numbers of its own: evaluate it by a net of lines')
 
@@ -71,24 +74,53 @@ class Law:
         out = evaluate(getattr(law, which), strain.ravel(), LineData.of_law(*numbers), law.columns)
         return out.reshape(strain.shape)[()]
 
-    def stress(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
+    def stress(
+        self,
+        strain: float | NDArray[np.float64],
+        modulus: float | NDArray[np.float64] = 1.0,
+        slackness: float | NDArray[np.float64] = 0.0,
+        smoothing: float | NDArray[np.float64] = 0.0,
+    ) -> Any:
         """Stress σ = T/A [Pa]."""
         return self._evaluate("stress", strain, modulus, slackness, smoothing)
 
-    def strain(self, stress, modulus=1.0, slackness=0.0, smoothing=0.0):
+    def strain(
+        self,
+        stress: float | NDArray[np.float64],
+        modulus: float | NDArray[np.float64] = 1.0,
+        slackness: float | NDArray[np.float64] = 0.0,
+        smoothing: float | NDArray[np.float64] = 0.0,
+    ) -> Any:
         """Strain of a tension, stress σ > 0 [Pa]; of the linear law of any σ."""
         stress, *numbers = np.broadcast_arrays(stress, modulus, slackness, smoothing)
         return law_of(self.name).strain_of(stress.ravel(), LineData.of_law(*numbers)).reshape(stress.shape)[()]
 
-    def tangent(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
+    def tangent(
+        self,
+        strain: float | NDArray[np.float64],
+        modulus: float | NDArray[np.float64] = 1.0,
+        slackness: float | NDArray[np.float64] = 0.0,
+        smoothing: float | NDArray[np.float64] = 0.0,
+    ) -> Any:
         """Tangent modulus dσ/dε [Pa]."""
         return self._evaluate("tangent", strain, modulus, slackness, smoothing)
 
-    def energy_density(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
+    def energy_density(
+        self,
+        strain: float | NDArray[np.float64],
+        modulus: float | NDArray[np.float64] = 1.0,
+        slackness: float | NDArray[np.float64] = 0.0,
+        smoothing: float | NDArray[np.float64] = 0.0,
+    ) -> Any:
         """Energy per natural volume ∫σ dε, zero at ε = 0 [J/m³]."""
         return self._evaluate("energy_density", strain, modulus, slackness, smoothing)
 
-    def floor(self, modulus=1.0, slackness=0.0, smoothing=0.0):
+    def floor(
+        self,
+        modulus: float | NDArray[np.float64] = 1.0,
+        slackness: float | NDArray[np.float64] = 0.0,
+        smoothing: float | NDArray[np.float64] = 0.0,
+    ) -> Any:
         """Largest stress under compression, αE [Pa]; 0 for tension-only, infinite for laws without a floor."""
         numbers = np.broadcast_arrays(modulus, slackness, smoothing)
         return law_of(self.name).floor(LineData.of_law(*numbers)).reshape(numbers[0].shape)[()]

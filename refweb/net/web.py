@@ -1,9 +1,10 @@
-"""A web is nodes, lines between them and the lines' natural lengths."""
+"""Webs: nodes, lines between them and their natural lengths, and the selection of nodes and lines by name."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import chain
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from ..errors import InputError
 from ..messages import nearest, quote
 from ..tables import Several, node_number
 from .groups import by_place, members
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 SELECTIONS = ("centre", "rim", "corners", "all")
 _TIE = 1e-9  # two distances are equal if they differ by less than this part of the web's size
@@ -29,23 +33,22 @@ class Web:
     natural_length : ndarray of shape (lines,), optional
         Natural length of each line [m], by default the distance of its end nodes.
     rim : ndarray of shape (k,)
-        Nodes that the web's own rule supports, sorted.
+        Nodes that the generator of the web supports, sorted.
     kind : {"paper", "window", "layers", "cable", "inline", "file"}
-        The rule that made the web.
+        Generator of the web.
     cells : int, optional
         Number of meshes, by default lines − nodes + components.
     names : dict of str to tuple of int
         The user's names for nodes.
     groups : sequence of str or dict of str to sequence of int, optional
-        Group of each line, "" for none, or the lines of each group, which may share lines. As an attribute the lines of
-        each group, a dict of increasing int64 arrays, with those of `refweb.net.groups` that the web's own supports
-        make.
+        Group of each line, "" for none, or the lines of each group, which may share lines. The attribute is a dict of
+        increasing int64 arrays of the lines of each group, with the groups by supports of `refweb.net.groups`.
     length_given : bool, optional
         True if natural lengths are separate data, not distances; by default True if ``natural_length`` is given.
     broken : sequence of int
-        Lines that are broken and carry nothing, as an attribute increasing int64.
+        Lines that are broken and carry nothing; the attribute is an increasing int64 array.
     notes : sequence of refweb.findings.Finding
-        Remarks on how it was read from a file.
+        Findings on the reading of its file.
 
     Raises
     ------
@@ -69,7 +72,7 @@ class Web:
     broken: Several = ()
     notes: Several = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         points = np.array(self.points, dtype=np.float64, order="C")
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError(f"points of shape {points.shape} must have the shape (nodes, 3)")
@@ -112,18 +115,18 @@ class Web:
             object.__setattr__(self, "cells", len(lines) - len(points) + self.components()[0])
 
     @property
-    def cable_length(self):
+    def cable_length(self) -> float:
         """Sum of the natural lengths [m]."""
         return float(self.natural_length.sum())
 
     @property
-    def area(self):
-        """Area of the bounding box [m²]: the product of its two largest sides, for a flat web those in x and y."""
+    def area(self) -> float:
+        """Area of the bounding box [m²]: the product of its two largest sides, in x and y for a flat web."""
         return float(np.sort(np.ptp(self.points, axis=0))[1:].prod())
 
     @property
-    def centre(self):
-        """Number of the node nearest the origin, of a cable nearest half its length; ties go to lowest y, then x."""
+    def centre(self) -> int:
+        """Number of the node nearest the origin, for a cable its middle; among equal ones with least y, then x."""
         size = np.ptp(self.points, axis=0).max()
         if self.kind == "cable":
             near = np.unique([len(self.lines) // 2, (len(self.lines) + 1) // 2])
@@ -136,7 +139,7 @@ class Web:
         return int(near[0])
 
     @property
-    def corners(self):
+    def corners(self) -> NDArray[np.int64]:
         """Numbers of the hull's vertices, sorted, shape (k,); refused unless the web lies in z = 0."""
         from scipy.spatial import ConvexHull, QhullError
 
@@ -155,11 +158,11 @@ class Web:
         return np.sort(hull[turn > _TIE]).astype(np.int64)
 
     @property
-    def bare(self):
+    def bare(self) -> NDArray[np.int64]:
         """Numbers of the nodes that no line uses, sorted, shape (k,)."""
         return np.flatnonzero(np.bincount(self.lines.ravel(), minlength=len(self.points)) == 0)
 
-    def components(self):
+    def components(self) -> tuple[int, NDArray[np.int32]]:
         """Number of connected parts and the part each node belongs to, shape (nodes,)."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
@@ -168,7 +171,7 @@ class Web:
         graph = coo_array((np.ones(len(self.lines), dtype=np.int8), tuple(self.lines.T)), shape=(n, n))
         return connected_components(graph, directed=False)
 
-    def find(self, selection, name="node"):
+    def find(self, selection: Any, name: str = "node") -> NDArray[np.int64]:
         """Node numbers of a selection.
 
         Parameters
@@ -194,8 +197,8 @@ class Web:
             numbers = [self._find_one(name, selection)]
         return np.array(list(dict.fromkeys(chain(*numbers))), dtype=np.int64)
 
-    def find_around(self, selection):
-        """Find nodes, as `find`, in their order around: nodes of one name counterclockwise around their middle."""
+    def find_around(self, selection: Any) -> NDArray[np.int64]:
+        """Find nodes, as `find`; nodes of one name in counterclockwise order around their middle."""
         numbers = self.find(selection)
         if not isinstance(selection, str) or len(numbers) < 3:
             return numbers
@@ -204,7 +207,7 @@ class Web:
         turn = np.copysign(1.0, normal[np.abs(normal).argmax()] * np.linalg.det([first, second, normal]))
         return numbers[np.argsort(turn * np.arctan2(away @ second, away @ first), kind="stable")]
 
-    def find_lines(self, selection, name="lines"):
+    def find_lines(self, selection: Any, name: str = "lines") -> NDArray[np.int64]:
         """Line numbers of a selection.
 
         Parameters
@@ -222,7 +225,7 @@ class Web:
         Raises
         ------
         InputError
-            For a number out of range, or a name that is that of no line.
+            For a number out of range, or a name without lines.
         """
         if isinstance(selection, (list, tuple, np.ndarray)):
             numbers = [self._find_lines(f"{name}[{i}]", part) for i, part in enumerate(selection)]
@@ -264,7 +267,7 @@ def _first(bad):
     return np.flatnonzero(bad)[:1].tolist()
 
 
-def in_range(name, numbers, count):
+def in_range(name: str, numbers: Any, count: int) -> NDArray[np.int64]:
     """Numbers as int64; refuse those that are not 0 … count − 1."""
     numbers = np.asarray(numbers)
     if numbers.size and numbers.dtype.kind not in "iu":

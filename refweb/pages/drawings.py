@@ -1,4 +1,4 @@
-"""The parts of a page that are drawn: pictures, plots, and the web in space with its controls."""
+"""Drawn sections of a page: pictures, plots, and the three-dimensional view with its controls, as HTML."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from .space import space_of
 
 PEAK = "the frame nearest to the largest value of the first result"
 HEAVIEST = 150_000
-"""Bytes above which a plot is a picture of pixels."""
+"""Size of a plot above which it is stored as pixels [byte]."""
 LIKE_STRESS = ("tension-distance", "strain-distance")
-"""Plots that look like that of the stress."""
+"""Plots that are left out beside that of the stress, since they look alike."""
 MOST_PLOTS = 16
-"""Plots that a page has at most."""
+"""Largest number of plots on a page."""
 
 
 def frames_of(record, frames=None, progress=None):
-    """The `Space` of a record; None where none of its frames can be drawn."""
+    """The `Space` of a record; None if none of its frames can be drawn."""
     return space_of(record, record.chosen(), frames, progress) if record.times else None
 
 
 def space(record, drawn):
-    """The web in space, and the data it needs; ``drawn`` is what `frames_of` gives."""
+    """The three-dimensional view and its data; ``drawn`` is the result of `frames_of`."""
     if drawn is None:
         return section("space", "In space", tag("p", "No frame of this run can be drawn."))
     head, peak = drawn.head, record.chosen()
@@ -39,7 +39,7 @@ def space(record, drawn):
 
 
 def _on_frames(record, drawn, peak):
-    """Sentence on the frames that are shown, and on their accuracy."""
+    """Sentence on the shown frames and their accuracy."""
     count, total = len(drawn.numbers), len(record.times)
     words = [f"{count} of {total} frames." if count < total else f"All {total} frames." if total > 1 else "One frame."]
     left = total - count - len(drawn.missing)
@@ -116,7 +116,7 @@ def pictures(record):
 
 
 def plots(record):
-    """Histories, books and what else there is to plot."""
+    """Plots of histories, balances and other data of a record."""
     from ..pictures.plots import draw, kinds
 
     try:
@@ -137,7 +137,7 @@ def plots(record):
 
 
 def _plot(figure, words):
-    """A plot as strokes, or as pixels where that is smaller."""
+    """A plot as vector graphics, or as pixels if that is smaller."""
     from ..pictures.plots import as_svg
 
     text = as_svg(figure).encode()
@@ -145,7 +145,7 @@ def _plot(figure, words):
 
 
 def _png(page):
-    """A page of matplotlib in 256 colours."""
+    """A figure of matplotlib as PNG in 256 colours."""
     from PIL import Image
 
     small = io.BytesIO()

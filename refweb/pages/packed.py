@@ -1,7 +1,7 @@
-"""Arrays as one text: bytes one after the other, deflated and in base64, and a table that says what is where.
+"""Arrays as one text: their bytes, deflated and in base64, and a table of positions and types.
 
-Floats become integers where this is exact enough: `levels` of 16 bits for places, of 8 bits for what becomes a colour.
-The page unpacks them with the browser's own ``DecompressionStream``; `unpack` is the same in Python.
+Positions become integers of 16 bits, values for colours integers of 8 bits, see `levels`. The page unpacks them with
+the ``DecompressionStream`` of the browser; `unpack` does the same in Python.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import zlib
 import numpy as np
 
 PLACES, VALUES, UNKNOWN = 65534, 254, 255
-"""Steps of the range of a place and of a value, and the level of a value that is not finite."""
+"""Numbers of steps in the range of positions and of values, and the level for values that are not finite."""
 
 
 def levels(values, steps):
-    """Values as whole numbers of steps of their range.
+    """Values as integer numbers of steps of their range.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def levels(values, steps):
     levels : ndarray of int, shape of the values
         ``low + (high - low) * levels / steps`` is at most half a step away from a value.
     low, high : float
-        The range; 0 and 0 where nothing is finite.
+        The range; 0 and 0 if no value is finite.
     """
     finite = np.isfinite(values)
     low, high = (float(values[finite].min()), float(values[finite].max())) if finite.any() else (0.0, 0.0)
@@ -41,7 +41,7 @@ def levels(values, steps):
 
 
 def differences(frames):
-    """Levels of frames as bytes that deflate well: changes from frame to frame, the high bytes before the low ones.
+    """Levels of frames as bytes that compress well: changes from frame to frame, high bytes before low bytes.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def pack(arrays):
     text : str
         Base64 of the deflated bytes (zlib's format).
     table : dict
-        Of each name its ``type``, "uint8", "uint32" or "float32", and its first byte and number of entries.
+        For each name its ``type``, "uint8", "uint32" or "float32", first byte and number of entries.
     """
     table, parts, end = {}, [], 0
     for name, array in arrays.items():
@@ -74,13 +74,13 @@ def pack(arrays):
 
 
 def unpack(text, table):
-    """The arrays that `pack` has written, each in one row."""
+    """The arrays of a text of `pack`, each one-dimensional."""
     raw = zlib.decompress(base64.b64decode(text))
     kind = {name: np.dtype(entry["type"]).newbyteorder("<") for name, entry in table.items()}
     return {n: np.frombuffer(raw, kind[n], entry["length"], entry["start"]) for n, entry in table.items()}
 
 
 def summed(changes, shape):
-    """The levels that `differences` has written, of a shape (frames, ...)."""
+    """The levels from the result of `differences`, of a shape (frames, ...)."""
     high, low = np.asarray(changes, dtype=int).reshape(2, *shape)
     return np.cumsum((high << 8) + low, axis=0) & 0xFFFF

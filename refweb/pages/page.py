@@ -1,4 +1,4 @@
-"""The page of a run: one HTML file that needs nothing else."""
+"""The page of a run: one HTML file without other files, from a result folder or a solution."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def report(folder, out=None, frames=None, progress=None):
     Parameters
     ----------
     folder : path-like
-        A result folder of a run or of modes; one that failed or was killed has its page as well.
+        A result folder of a run or of modes; a run that failed or was killed has a page as well.
     out : path-like, optional
         The file; by default ``report.html`` in the folder.
     frames : int, optional
-        Number of frames that can be turned and played; by default as many as leave the page small.
+        Number of frames in the three-dimensional view; by default as many as keep the page small.
     progress : callable, optional
-        Called with a line of text and the share that is done, 0 to 1.
+        Called with a line of text and the finished share, 0 to 1.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def report(folder, out=None, frames=None, progress=None):
     Raises
     ------
     InputError
-        Where the folder is none of a run or of modes, the file cannot be written, or ``frames`` is below 1.
+        If the folder is not one of a run or of modes, the file cannot be written, or ``frames`` is below 1.
     """
     folder = Path(folder)
     record, unread = _record(folder)
@@ -77,7 +77,7 @@ def sheet(folder, out=None, packing=PACKING):
     Raises
     ------
     InputError
-        Where the folder is none of a run or of modes, or the file cannot be written.
+        If the folder is not one of a run or of modes, or the file cannot be written.
     """
     folder = Path(folder)
     if not 0.0 < packing <= 1.0:
@@ -89,12 +89,12 @@ def sheet(folder, out=None, packing=PACKING):
 
 
 def _sheet_of(record, unread="", packing=PACKING):
-    """The page of the sheet alone, as text."""
+    """The page with only the sheet, as text."""
     return filled(record.title, _status(record, unread), [sheets.sheet(record, packing)], "")
 
 
 def _record(folder):
-    """(Record, why it has no summary) of a result folder; refuses what is none of a run or of modes."""
+    """The record of a result folder of a run or of modes, and the reason of a missing summary; refuse other folders."""
     record = of_folder(folder, with_frames=False)
     record.refuse_others("pages")
     if record.status == "running":
@@ -103,7 +103,7 @@ def _record(folder):
 
 
 def report_of(solution, out=None, frames=None, only_sheet=False):
-    """Write the page of a solution, wherever it is, or its sheet alone, by default into its folder; see `report`."""
+    """Write the page of a solution, or its sheet only, by default into its folder; see `report`."""
     if out is None and solution.path is None:
         raise InputError("out is missing: this solution has no folder, so say where the page goes, such as report.html")
     if only_sheet and frames is not None:
@@ -114,7 +114,7 @@ def report_of(solution, out=None, frames=None, only_sheet=False):
 
 
 def _unread(path):
-    """Reason why a ``run.json`` gives no summary, in words."""
+    """Reason for which a ``run.json`` gives no summary, a text."""
     if not path.exists():
         return "there is no run.json"
     try:
@@ -125,7 +125,7 @@ def _unread(path):
 
 
 def _write(text, out):
-    """Write the page that ``text`` makes, once it is known that it can be written."""
+    """Check that a file can be written, then write the page from ``text()`` to it."""
     out = Path(out)
     if out.suffix[1:].lower() not in ENDINGS:
         raise InputError(f'out = "{out}" must end in .html')
@@ -134,7 +134,7 @@ def _write(text, out):
 
 
 def page_of(record, frames=None, progress=None, unread=""):
-    """The page of a record, as text; ``unread`` says why it has no summary, where it has none."""
+    """The page of a record, as text; ``unread`` is the reason of a missing summary."""
     frames_found = drawings.frames_of(record, frames, progress)
     lacking = list(_lacking(record, frames_found, unread))
     parts = [sheets.sheet(record), sections.results(record)]
@@ -146,7 +146,7 @@ def page_of(record, frames=None, progress=None, unread=""):
 
 
 def filled(title, status, parts, script):
-    """A page as text: its title, how it ended, its sections and its script."""
+    """A page as text, from its title, status, sections and script."""
     contents = [re.match(r'<section id="([^"]*)"><h2>(.*?)</h2>', part) for part in parts]
     script = "\n" + script
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
@@ -163,7 +163,7 @@ def filled(title, status, parts, script):
 
 
 def _lacking(record, drawn, unread):
-    """Sentences on what the page has nothing of: the summary, the history, the frames."""
+    """Sentences on missing data: summary, history, frames."""
     if unread:
         yield f"Results, warnings and how the run ended are not known: {unread}."
     try:
@@ -177,7 +177,7 @@ def _lacking(record, drawn, unread):
 
 
 def _status(record, unread):
-    """Sentence on the end of a run and its subject, as far as that is known."""
+    """Sentence on the status of a run and its scene, as far as they are known."""
     method = (record.summary.get("solver") or {}).get("method")
     known = [sections.KINDS.get(record.kind) or record.kind] if record.scene or record.kind != "dynamic" else []
     known += [str(method)] if method else []

@@ -1,4 +1,4 @@
-"""The parts of a page that are words and tables: results, warnings, what was simulated, cost, scene and versions."""
+"""Sections of text and tables of a page: results, warnings, model, cost, scene and versions, as HTML."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from ..results.summary_text import (
 from .markup import Html, html, listing, pairs, section, table, tag
 
 LONGEST = 1000
-"""Characters of a line of the scene that are shown."""
+"""Largest number of characters of a line of the scene."""
 KINDS = {"dynamic": "dynamics", "static": "statics", "modes": "modes"}
 
 
 def results(record):
-    """Results with their ±, and what is known of them."""
+    """Results with ±, time and position."""
     summary, said = record.summary, []
     steps, values = summary.get("steps") or [], summary.get("results") or {}
     if record.kind == "modes" and steps:
@@ -43,14 +43,14 @@ def results(record):
 
 
 def warnings(record, lacking=()):
-    """Warnings of the run, and sentences on the data that its folder lacks."""
+    """Warnings of the run, and sentences on missing data of its folder."""
     texts = [*record.summary.get("warnings", []), *lacking]
     body = listing(texts) if texts else tag("p", "None.")
     return section("warnings", "Warnings", tag("div", body, class_="warned") if texts else body)
 
 
 def simulated(record):
-    """Model of the run: sizes, cable, effects that are there and that are not, solver."""
+    """Model of the run: sizes, cable, effects present and absent, solver."""
     scene = record.scene
     if not scene:
         return section("simulated", "What was simulated", tag("p", "This folder holds no scene.toml that can be read."))
@@ -93,7 +93,7 @@ def cost(record):
 
 
 def scene(record):
-    """The scene file, all defaults filled in."""
+    """The scene file with all defaults."""
     if not record.scene:
         return ""
     lines = [
@@ -105,7 +105,7 @@ def scene(record):
 
 
 def versions(record):
-    """Versions of what solved it."""
+    """Versions of refweb and the libraries of the run."""
     libraries = record.summary.get("versions") or {}
     seed = record.summary.get("seed")
     rows = [*libraries.items(), *([("seed", seed)] if seed is not None else [])]
@@ -113,17 +113,17 @@ def versions(record):
 
 
 def _several(given):
-    """Tables of a name, which stands once or several times."""
+    """Tables of a name, a list also for one table."""
     return given if isinstance(given, list) else [given] if given else []
 
 
 def _keys(given):
-    """Keys of a table with their values, in one line."""
+    """Keys and values of a table, in one line."""
     return _listed({key: _value(value) for key, value in given.items() if value != {}})
 
 
 def _listed(words):
-    """Names and what they are, in one line."""
+    """Names and their values, in one line."""
     return html(
         [
             [", " if i else "", tag("span", f"{key} = {value}", class_="key")]
@@ -143,7 +143,7 @@ def _value(value):
 
 
 def _sizes(web):
-    """Sizes of a web, in words."""
+    """Sizes of a web, a text."""
     if not web:
         return ""
     return tag("div", "; ".join(on_web(web)))

@@ -1,4 +1,4 @@
-"""The sheet of a run: its sizes, its largest tension and margin of safety, and the worth of its results."""
+"""The sheet of a run as HTML: sizes, largest tension, margin of safety, and verdicts on the results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NAME = "sheet.html"
 
 
 def sheet(record, packing=words.PACKING):
-    """The section of a `refweb.pictures.record.Record`; ``packing`` is the share of a packed volume that is cable."""
+    """The sheet of a `refweb.pictures.record.Record`; ``packing`` is the volume of cable over the packed volume."""
     summary, dynamic = record.summary, record.kind == "dynamic"
     sizes = list(words.on_sizes(summary.get("web") or {}, packing))
     parts = [tag("h3", "What it is"), pairs(sizes) if sizes else tag("p", "The sizes are not known.")]
@@ -40,7 +40,7 @@ def _worth(summary):
 
 
 def of_frames(record):
-    """The `refweb.pictures.peaks.Largest` tension in the frames of a record, None where there are none."""
+    """The `refweb.pictures.peaks.Largest` tension in the frames of a record; None without frames."""
     best = None
     for number, time in record.times.items():
         try:

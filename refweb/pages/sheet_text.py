@@ -1,6 +1,6 @@
-"""Sheet of a run in words: sizes of the web, its largest tension, its margin of safety, and the worth of each result.
+"""Texts of the sheet of a run: sizes of the web, largest tension, margin of safety, and verdicts on results.
 
-All of it comes from the content of ``run.json`` and of ``scene.toml``.
+The input is the content of ``run.json`` and of ``scene.toml``.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from ..pictures.peaks import observed, when
 from ..results.units import readable, with_error
 
 PACKING = 0.5
-"""Share of a packed volume that is cable, where none is given."""
+"""Volume of cable over the packed volume, by default."""
 BESIDE = 1e-6
-"""Relative difference of two stresses of one line up to which they are the same."""
+"""Relative difference of two stresses of one line up to which they count as equal."""
 
 
 def on_sizes(web, packing=PACKING):
-    """(Name, sentence) of the sizes of a web, of ``web`` of ``run.json``; ``packing`` is cable over packed volume."""
+    """Pairs of name and sentence on the sizes of a web, from ``web`` of ``run.json``."""
     if "extent" in web:
         x, y, z = (f"{length:.4g}" for length in web["extent"])
         yield "overall size", f"{x} × {y} × {z} m along x, y and z, as the web is built"
@@ -37,7 +37,7 @@ def on_sizes(web, packing=PACKING):
 
 
 def on_tension(largest, dynamic):
-    """(Name, sentence) of the largest tension, a `Largest` or None."""
+    """Name and sentence of the largest tension, a `Largest` or None."""
     if largest is None:
         yield "largest tension", 'not known: give an [[observe]] with quantity = "tension" and reduce = "max"'
         return
@@ -48,7 +48,7 @@ def on_tension(largest, dynamic):
 
 
 def on_margin(summary, scene, dynamic):
-    """(Name, sentence) of the margin of safety and of the line that is stressed most."""
+    """Name and sentence of the margin of safety, and of the line with the largest stress."""
     margin: dict[str, Any] | None = summary.get("margin")
     if margin is None:
         lacking = "the run has no strength: give [cable] strength [Pa], or that of [cable.groups]"
@@ -76,14 +76,14 @@ def on_margin(summary, scene, dynamic):
 
 
 def _percent(value, error):
-    """A share in percent with its ±, which may not be known."""
+    """A share in percent with its ± or, if that is not known, a remark."""
     if error is None:
         return f"{100.0 * value:.3g} % (its ± is not known)"
     return f"{with_error(100.0 * value, 100.0 * error)} %"
 
 
 def decision(margin, error):
-    """(Lower, upper end, verdict) of a margin, of the ± of its stress [Pa]; "holds", "does not hold" or "undecided"."""
+    """Lower and upper end of a margin by ± of its stress [Pa], and "holds", "does not hold" or "undecided"."""
     stress, allowed = margin["stress"], margin["allowed"]
     error = error or 0.0
     lower = allowed / (stress + error) - 1.0
@@ -94,7 +94,7 @@ def decision(margin, error):
 def _decided(margin, error):
     """A margin with its ±, and the verdict.
 
-    The margin is not linear in the stress: ± is how far it may lie towards 0, and both ends follow it.
+    The margin is not linear in the stress: ± is the distance to the end nearer to 0, and both ends follow it.
     """
     lower, upper, verdict = decision(margin, error)
     value = margin["value"]
@@ -109,7 +109,7 @@ def _decided(margin, error):
 
 
 def _terms(margin, scene, stress):
-    """The margin as its terms, of its largest stress in words: the factors are those of the cable, or of its line."""
+    """The terms of the margin, a text; the factors are those of the cable or of the group of the line."""
     strength, allowed = (readable(float(f"{margin[key]:.4g}"), None, "Pa") for key in ("strength", "allowed"))
     cable = scene.get("cable") or {}
     safety, knot = cable.get("safety_factor", 1.0), cable.get("knot_factor", 1.0)
@@ -120,9 +120,9 @@ def _terms(margin, scene, stress):
 
 
 def _error_of(summary, scene, margin):
-    """± of the stress of the smallest margin [Pa], None where it is not known.
+    """± of the stress of the smallest margin [Pa]; None if it is not known.
 
-    It is that of a result that stands at its line, and else that of the margin itself.
+    It is the ± of a stress result at the same line, otherwise that of the margin itself.
     """
     for quantity, factor in (("stress", 1.0), ("tension", 1.0 / margin["area"])):
         largest = observed(summary, scene, quantity)
@@ -136,7 +136,7 @@ def _error_of(summary, scene, margin):
 
 
 def rows_of_worth(results):
-    """(Columns, rows) of results with ±, and where a run gives them, a verdict on each and its reason."""
+    """Columns and rows of results with ± and, if the run has them, verdicts with their reasons."""
     has_verdicts = any(result.get("verdict") or result.get("verdict_text") for result in results.values())
     rows = []
     for name, result in results.items():

@@ -1,9 +1,9 @@
-"""The web in space as a page holds it: some frames of a record, in few bytes, with how far they are from the record.
+"""Data of the three-dimensional view of a page: some frames of a record in few bytes, and their error.
 
-Points that are at the same place undeformed and in all frames are one. A point is where it is undeformed, in single
-precision, plus its displacement in 65 534 steps of the range that each axis has over all frames. Values are 254 steps
-of the range of their field in their frame, as many as a scale of colours shows. A body is its surface once, and how it
-has moved and turned since in each frame.
+Points with the same position in all frames are merged. The position of a point is its undeformed position, in single
+precision, plus a displacement in 65 534 steps of the range of each axis over all frames. Values have 254 steps of the
+range of their field in their frame, the resolution of the colour scale. A body is stored as one surface, with its
+translation and rotation in each frame.
 
 pyvista's ``export_html`` puts 1.0 MB of vtk.js, by trame-vtk 2.11, into each page, and shows one instant without a
 colour bar.
@@ -11,7 +11,7 @@ colour bar.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,11 +21,11 @@ from ..pictures.stage import BODIES, BROKEN, GREY_WHERE_SLACK, SLACK, SUPPORT, T
 from .packed import PLACES, UNKNOWN, VALUES, differences, levels, pack
 
 LARGEST = 2_400_000
-"""Bytes that the frames may take as text where their number is not asked for."""
+"""Largest size of the frames as text, if no number of frames is given [byte]."""
 MOST = 400
-"""Frames that a page has at most where their number is not asked for."""
+"""Largest number of frames, if no number is given."""
 HIDDEN = ("slack", "broken", "support", "line", "natural_length", "mass")
-"""Fields that do not change much, or are marked anyway; they stand last among the fields to choose from."""
+"""Fields at the end of the menu, since they change little or are marked in another way."""
 LEFT_OUT = ("support", "line")
 FIRST = ("shape", "stress", "tension", "strain", "displacement", "velocity", "reaction")
 
@@ -40,19 +40,19 @@ class Space(NamedTuple):
     text : str
         Arrays in the form of `refweb.pages.packed.pack`.
     error : float
-        Largest distance of a point from where it is in the record [m].
+        Largest distance of a point from its position in the record [m].
     extent : float
         Diagonal of the box around the web in all frames [m].
     numbers, missing : list of int
-        Numbers of the frames that are there, and of those that cannot be read.
+        Numbers of the frames in the data, and of frames that cannot be read.
     """
 
-    head: dict
+    head: dict[str, Any]
     text: str
     error: float
     extent: float
-    numbers: list
-    missing: list
+    numbers: list[Any]
+    missing: list[Any]
 
 
 def space_of(record, peak=None, limit=None, progress=None):
@@ -72,7 +72,7 @@ def space_of(record, peak=None, limit=None, progress=None):
     Returns
     -------
     Space or None
-        None where no frame can be read.
+        None if no frame can be read.
     """
     if limit is not None and limit < 1:
         raise InputError(f"frames = {limit} must be ≥ 1 [1]")
@@ -100,7 +100,8 @@ def space_of(record, peak=None, limit=None, progress=None):
 def chosen_of(numbers, count, peak=None):
     """Numbers of the frames to show: the first, the last, the frame ``peak``, and others evenly between them.
 
-    There are ``count`` in all, if there are so many. If ``count`` is 1 or 2, the peak precedes the first and the last.
+    The result has ``count`` frames, or all if there are fewer. For ``count`` 1 or 2 the peak is chosen before the first
+    and the last.
     """
     if count >= len(numbers):
         return list(numbers)
@@ -115,7 +116,7 @@ def chosen_of(numbers, count, peak=None):
 
 
 def _space(record, frames, missing):
-    """Some frames, packed."""
+    """The data of some frames."""
     first = frames[0]
     if any(frame.paths.shape != first.paths.shape for frame in frames):
         raise InputError(f"{record.name}: its frames have webs of different lines, which one page cannot show")
@@ -160,7 +161,7 @@ def _space(record, frames, missing):
 
 
 def _once(origin, steps):
-    """Points that differ: (their numbers, the place of each point among them), in the order of the lines."""
+    """Numbers of the different points, and the index of each point among them, in the order of the lines."""
     rows = np.concatenate(
         [origin.view(np.int32).astype(int), steps.transpose(1, 0, 2).reshape(len(origin), -1)], axis=1
     )
@@ -172,7 +173,7 @@ def _once(origin, steps):
 
 
 def _supports(frames):
-    """Numbers of the path points nearest to the supports, of the frame that knows most of them."""
+    """Numbers of the path points nearest to the supports, from the frame with the most supports."""
     from scipy.spatial import cKDTree
 
     frame = max(frames, key=lambda frame: len(frame.supports))
@@ -214,7 +215,7 @@ def _fields(frames, arrays):
 
 
 def _range(values):
-    """Least and largest finite value, None where there is none."""
+    """Least and largest finite value; None if there is none."""
     values = values[np.isfinite(values)]
     return [float(values.min()), float(values.max())] if len(values) else None
 
@@ -247,7 +248,7 @@ def _bodies(frames, arrays):
 
 
 def rotation_between(before, after):
-    """The rotation that takes points, shape (n, 3), best from one place to another, both around the origin.
+    """The rotation that maps points, shape (n, 3), best to other points, both about the origin.
 
     W. Kabsch, Acta Crystallographica A32 (1976) 922.
     """
@@ -257,7 +258,7 @@ def rotation_between(before, after):
 
 
 def _camera(frames, origin, moved):
-    """Axes of the first view, those of a picture; what it has to show; and the thickness of lines [m]."""
+    """Axes of the first view, as in a picture, the box that it shows, and the thickness of lines [m]."""
     points = (origin + moved).reshape(-1, 3)
     solid = np.concatenate([np.zeros((0, 3)), *(body.points for f in frames for body in f.bodies.values())])
     views, _ = choose(origin, points, solid, float(np.abs(moved).max()), frames[0].tree, 1.6)
@@ -272,7 +273,7 @@ def _camera(frames, origin, moved):
 
 
 def places(arrays, head, frame):
-    """Points of a frame as the page has them [m], shape (points, 3)."""
+    """Points of a frame from the data of the page [m], shape (points, 3)."""
     from .packed import summed
 
     points = arrays["origin"].reshape(-1, 3)
@@ -282,7 +283,7 @@ def places(arrays, head, frame):
 
 
 def values(arrays, field, frame):
-    """Values of a field in a frame as the page has them [SI], shape (lines,); NaN where they are not finite."""
+    """Values of a field in a frame from the data of the page [SI], shape (lines,); NaN if not finite."""
     low, high = field["ranges"][frame]
     values_read = arrays[field["array"]].reshape(
         -1 if field["constant"] else len(field["ranges"]), len(arrays["slack"]) // len(field["ranges"])

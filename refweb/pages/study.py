@@ -1,4 +1,4 @@
-"""The page of a study: what its rows say together, plots of each result, and the rows themselves."""
+"""The page of a study: statistics of its rows, a plot of each result, and the rows, as one HTML file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from . import page
 from .markup import figure, html, image, listing, pairs, section, table, tag
 
 MOST_ROWS = 500
-"""Rows that a page shows."""
+"""Largest number of rows on a page."""
 
 
 def report(folder, out=None):
@@ -25,7 +25,7 @@ def report(folder, out=None):
     Raises
     ------
     InputError
-        Where the folder holds no study, or the file cannot be written.
+        If the folder contains no study, or the file cannot be written.
     """
     folder = Path(folder)
     study = of_folder(folder)
@@ -98,7 +98,7 @@ def _cell(value):
 
 
 def _study(summary):
-    """The study itself, and what it cost."""
+    """The study file and the cost of the study."""
     import tomli_w
 
     varied, how = words.on_design(summary["study"])

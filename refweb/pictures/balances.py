@@ -1,8 +1,8 @@
-"""The books of a run as plots: where its energy is, and what gave it its momentum, with what each is open by."""
+"""Balances of energy and momentum of a run as panels of a plot, with their errors."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from .sheet import COLOURS, DARK, LOW, STYLES, TALL, Ink, Panel, dot, label, leg
 
 AXES = "xyz"
 FLOATING = ("potential_energy", "frame_energy", "orbit_energy")
-"""Energies that have no zero of their own."""
+"""Energies without a natural zero."""
 HATCHES = ("", "//", "..", "\\\\", "xx", "--", "++", "oo")
 SMALL = 1e-3
-"""Share of the largest momentum below which that along an axis has no panel."""
+"""Share of the largest momentum below which an axis has no panel."""
 STORED, LOST, GIVEN, TOTAL = "stored", "dissipated_energy", "work", "total_energy"
 
 
@@ -27,8 +27,7 @@ class EnergyBalance(NamedTuple):
     Attributes
     ----------
     parts : dict of str to ndarray
-        Energies that are stacked, by name [J], shape (rows,); energies without a natural zero count from their smallest
-        value.
+        Stacked energies by name [J], shape (rows,); energies without a natural zero count from their smallest value.
     smallest : dict of str to float
         Smallest value that was subtracted from each [J].
     top : ndarray
@@ -37,22 +36,22 @@ class EnergyBalance(NamedTuple):
         Energy at the start plus work [J]; it equals ``top`` if the energy balance closes.
     """
 
-    parts: dict
-    smallest: dict
+    parts: dict[str, Any]
+    smallest: dict[str, Any]
     top: np.ndarray
     given: np.ndarray
 
     @property
     def drift(self):
-        """Excess of energy [J]."""
+        """Error of the energy balance [J]: energy minus energy at the start and work."""
         return self.top - self.given
 
 
 def energy_book(runs):
     """The `EnergyBalance` of a run.
 
-    The total is the sum of what is stored and moves; what damping and friction took is stacked on it, so that the whole
-    changes by work alone.
+    The total is the sum of stored and kinetic energy. The energy dissipated by damping and friction is stacked on it,
+    so that the sum changes by work only.
     """
     table, names = runs.history, [name for name in runs.energies if name not in (GIVEN, TOTAL)]
     names.sort(key=lambda name: (name == LOST, name == "kinetic_energy"))
@@ -67,7 +66,7 @@ def energy_book(runs):
 
 
 def energy(runs):
-    """Panels of the book of energies: stacked of one run, of several a panel for each kind; and what it is open by."""
+    """Panels of the energy balance: stacked for one run, one for each energy of several runs; and its error."""
     if len(runs) > 1:
         return _energies_beside(runs)
     (s,) = runs
@@ -111,7 +110,7 @@ def energy(runs):
 
 
 def _white_on_dark(axes):
-    """Put the last entry of a legend, which is white on the drawing, on a dark line."""
+    """Draw the last entry of a legend, a white line, on a dark line."""
     from matplotlib.patheffects import Normal, Stroke
 
     for line in (axes.get_legend().get_lines()[-1], axes.get_lines()[-1]):
@@ -119,13 +118,13 @@ def _white_on_dark(axes):
 
 
 def _called(name, smallest):
-    """The name of an energy as a legend has it."""
+    """Name of an energy in a legend."""
     name = name.removesuffix("_energy").replace("_", " ")
     return f"{name} above {readable(smallest, None, 'J')}" if smallest else name
 
 
 def _drifts(runs, what, second, clock):
-    """The panel of what the book of energies is open by."""
+    """The panel of the error of the energy balance."""
     drifts = [energy_book(s).drift for s in runs]
     factor, unit = unit_of("J", *drifts)
 
@@ -144,13 +143,13 @@ def _drifts(runs, what, second, clock):
 
 
 def _share(s, key, what):
-    """Error of a balance, as ``run.json`` gives it for a run that has ended."""
+    """Text of the error of a balance from the ``run.json`` of a run that has ended."""
     error = None if s.record.status == "running" else (s.record.summary.get("solver") or {}).get(key)
     return "" if error is None else f"{what} drift {error:.1e} of the largest {what}"
 
 
 def _energies_beside(runs):
-    """A panel for each energy of several runs, and one for what their books are open by."""
+    """A panel for each energy of several runs, and one for the errors of their balances."""
     names = dict.fromkeys(name for s in runs for name in s.energies)
     dynamic = runs[0].record.kind == "dynamic"
     second, clock = clock_of(runs) if dynamic else (1.0, "")
@@ -178,34 +177,34 @@ def _energies_beside(runs):
 
 
 def names_of(axes, runs):
-    """Entries of a legend that name runs by their ink."""
+    """Entries of a legend with the names of runs."""
     return [
         (axes.plot([], [], color=s.ink.colour, linestyle=s.ink.style, linewidth=1.4)[0], s.name) for s in runs if s.name
     ]
 
 
 class MomentumBalancePlot(NamedTuple):
-    """The book of momentum along one axis [N s], all of shape (rows,): momentum and what gave it, by name.
+    """The momentum balance along one axis [N s], all of shape (rows,): momentum, and impulses by name.
 
     Attributes
     ----------
     momentum : ndarray
-        Of all that is free.
+        Momentum of all free nodes and bodies.
     impulses : dict of str to ndarray
         Impulses since the start, by name.
     """
 
     momentum: np.ndarray
-    impulses: dict
+    impulses: dict[str, Any]
 
     @property
     def given(self):
-        """Energy at the start, and work."""
+        """Momentum at the start plus all impulses."""
         return self.momentum[:1] + np.sum(list(self.impulses.values()), axis=0)
 
     @property
     def drift(self):
-        """Excess of momentum."""
+        """Error of the balance: momentum minus ``given``."""
         return self.momentum - self.given
 
 
@@ -228,7 +227,7 @@ def has_momentum(runs):
 
 
 def momentum(runs):
-    """Panels of the book of momentum: for each axis momentum against impulses, and what it is open by."""
+    """Panels of the momentum balance: for each axis momentum and impulses, and its error."""
     books = [momentum_book(s) for s in runs]
     sizes = {axis: max(_size(b[axis]) for b in books) for axis in AXES}
     drawn = [axis for axis in AXES if sizes[axis] > SMALL * max(sizes.values())] or ["z"]
@@ -259,7 +258,7 @@ def _size(book):
 
 
 def _ends(books):
-    """Ends of an axis on which all momenta and impulses are."""
+    """Limits of an axis that contain all momenta and impulses."""
     values = np.concatenate([v for book in books for v in (book.momentum, *book.impulses.values())])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
@@ -268,7 +267,7 @@ def _ends(books):
 
 
 def _momenta(axes, s, book, second, factor, several):
-    """Draw momentum and impulses along one axis; of several runs the latter thin. Entries of the legend."""
+    """Draw momentum and impulses along one axis, impulses of several runs thin; returns the entries of the legend."""
     at, entries = s.along / second, []
     curves = {"momentum of all that is free": book.momentum, **book.impulses}
     for number, (words, values) in enumerate(curves.items()):
@@ -287,7 +286,7 @@ def _momenta(axes, s, book, second, factor, several):
 
 
 def _momentum_drifts(runs, books, second, clock):
-    """The panel of what the book of momentum is open by."""
+    """The panel of the error of the momentum balance."""
     drifts = [(s, axis, book[axis].drift) for s, book in zip(runs, books, strict=True) for axis in AXES]
     factor, unit = unit_of("N s", *(drift for _, _, drift in drifts))
 

@@ -1,27 +1,28 @@
-"""Cameras: what of a scene goes where on a page, and how to choose a view that shows how a web deforms."""
+"""Cameras: projection of points to a page, and the choice of views that show the deformation of a web."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 TANGENT = np.tan(np.radians(10.0))
 ALONE, WHOLE = (0.07, 0.08, 0.79, 0.78), (0.02, 0.04, 0.85, 0.85)
-"""Position on the page of a view that stands alone [share of the page]: with axes in metres, and without axes."""
+"""Position of a single view [share of the page]: with axes in metres, and without axes."""
 LEFT, WIDTH, BOTTOM, HEIGHT, LEAST = 0.07, 0.79, 0.07, 0.79, 0.12
-"""Of two views that stand one above the other, and the least height of the lower one [share of the page]."""
+"""Positions of two views one above the other, and the least height of the lower one [share of the page]."""
 BESIDE = (0.02, 0.06, 0.40, 0.82), (0.48, 0.08, 0.37, 0.80)
 """Positions on the page of two views side by side [share of the page]."""
 MANY = 50_000
-"""Points above which a view is fitted to the `outermost` of them."""
+"""Number of points above which a view is fitted to the `outermost` of them."""
 VIEWS = ("oblique", "side", "front", "top")
 """Names of views: in perspective, from two sides along the web, and along its normal."""
 
 
 @dataclass(frozen=True)
 class View:
-    """A camera: where it is and what of the scene fits into its frame.
+    """A camera: its position and the part of the scene in its frame.
 
     `axes` are the unit vectors to the right, up and towards the viewer, shape (3, 3). In perspective, `centre` is the
     eye [m] and `half` the tangents of half the horizontal and vertical angle; in parallel projection `centre` is a
@@ -30,14 +31,14 @@ class View:
 
     axes: np.ndarray
     centre: np.ndarray
-    half: tuple
+    half: tuple[Any, ...]
     perspective: bool
 
     @classmethod
     def fit(cls, axes, points, aspect, tangent=None, margin=1.06):
-        """The view that just shows all points [m], shape (points, 3), in a frame of the given width/height.
+        """The closest view that shows all points [m], shape (points, 3), in a frame of the given width/height.
 
-        `tangent` of half the vertical angle: perspective, from the nearest such eye; None: parallel projection.
+        `tangent` of half the vertical angle is for perspective; None is for parallel projection.
         """
         right, up, near = (np.asarray(points) @ np.asarray(axes).T).T
         if tangent is None:
@@ -64,12 +65,12 @@ class View:
         return local[..., :2] * scale[..., None] + self.offset, depth, scale
 
     def point(self, x, y, depth):
-        """The place [m], shape (3,), at a share −1…1 of half the width and height and at a depth towards the viewer."""
+        """The point [m], shape (3,), at a share −1…1 of half the width and height and at a depth towards the viewer."""
         flat = np.array([x, y]) * self.half * (-depth if self.perspective else 1.0)
         return self.centre + np.array([*flat, depth]) @ self.axes
 
     def wider(self, factor):
-        """The view that shows more, by a factor; itself where that is less than 1."""
+        """The view enlarged by a factor; the view itself if the factor is below 1."""
         return replace(self, half=tuple(half * factor for half in self.half)) if factor > 1 else self
 
     def shows(self, points):
@@ -96,7 +97,7 @@ class View:
 
 
 def outermost(points):
-    """Those of points [m], shape (n, 3), that lie farthest in one of many directions."""
+    """The points of a set [m], shape (n, 3), that lie farthest in one of many directions."""
     if len(points) <= 300:
         return points
     if len(points) > MANY:
@@ -117,16 +118,16 @@ def nearby(points, solid, extent):
 
 
 def choose(origin, points, solid, moved, tree, aspect, named=None):
-    """The views that show a web best, and where on the page they stand.
+    """The views that show a web best, and their positions on the page.
 
     Parameters
     ----------
     origin : array, shape (n, 3)
         Points of the undeformed web [m].
     points : array, shape (m, 3)
-        Points of the web now, or in all frames of a film [m].
+        Points of the deformed web, or of all frames of a film [m].
     solid : array, shape (k, 3)
-        Points of bodies [m]; what is far from the web may lie outside of the pictures.
+        Points of bodies [m]; points far from the web may lie outside the picture.
     moved : float
         Largest component of a displacement [m].
     tree : bool
@@ -139,8 +140,8 @@ def choose(origin, points, solid, moved, tree, aspect, named=None):
     Returns
     -------
     views : list of `View`
-        In perspective and from the side; of what lies in a plane, one along its normal. A horizontal web that closes
-        loops counts as lying in a plane only once it has moved in it: it may be about to leave it.
+        One in perspective and one from the side; for a plane web one along its normal. A horizontal web with closed
+        loops counts as plane only if it has moved in its plane: otherwise it may be about to leave it.
     rectangles : list of (left, bottom, width, height)
         Shares of the page.
     """
@@ -170,9 +171,9 @@ def _named(named, side):
 
 
 def _pair(oblique, side, near, points, aspect):
-    """A view in perspective and one from the side, in which the web is as wide; above it, or beside it if it is tall.
+    """A view in perspective and one from the side with the same width of the web, one above the other or side by side.
 
-    The height of the lower one is such that both are as wide as each other; the larger pair is taken.
+    The height of the lower view gives both the same width; the larger pair of views is chosen.
     """
 
     def stacked(low):
@@ -196,7 +197,7 @@ def _pair(oblique, side, near, points, aspect):
 
 
 def _fitted(oblique, side, near, aspect, rectangles):
-    """The view in perspective and the one from the side that just fit into two rectangles."""
+    """The view in perspective and the one from the side that fit into two rectangles."""
     first, second = (aspect * r[2] / r[3] for r in rectangles)
     return View.fit(oblique, near, first, TANGENT), View.fit(side, near, second, margin=1.1)
 
@@ -218,7 +219,7 @@ def _principal(points):
 
 
 def _plane(points, extent):
-    """Unit normal of the plane that holds all points (of a straight line: the vertical plane), or None."""
+    """Unit normal of the plane that contains all points, for a straight line the vertical plane; or None."""
     axes, extents = _principal(points)
     if extents[2] > 1e-6 * extent:
         return None
@@ -239,7 +240,7 @@ def _side(origin):
 
 
 def _oblique(side):
-    """Axes of the view in perspective: a lying web from its front and above, a standing one well from its side."""
+    """Axes of the view in perspective: from front and above for a lying web, from the side for a standing web."""
     front, azimuth, elevation = (side[2], 28.0, 24.0)
     if abs(side[1, 2]) < 0.7:
         front, azimuth, elevation = side[1] * (-1 if np.argmax(abs(side[1])) == 1 else 1), 50.0, 14.0

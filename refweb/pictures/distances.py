@@ -1,4 +1,4 @@
-"""Stress, tension or strain of lines over their distance from the place that was hit or loaded."""
+"""Panel of stress, tension or strain of lines over their distance from the point of impact or load."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from .sheet import PALE, Panel, label, legend
 FIELDS = {"stress": "Pa", "tension": "N", "strain": "1"}
 """Fields that can be drawn, with their units."""
 MANY = 4000
-"""Lines above which their points are an image in files that are made of strokes."""
+"""Number of lines above which vector files store their points as an image."""
 
 
 class Spread(NamedTuple):
-    """Values of lines, and their distances.
+    """Values of lines, and their distances from a point.
 
     Attributes
     ----------
@@ -32,13 +32,13 @@ class Spread(NamedTuple):
     values : ndarray, shape (lines,)
         Their field [SI].
     distance : ndarray, shape (lines,)
-        Of the middle of each from the place, in the undeformed web [m].
+        Distance of the middle of each line from the point, in the undeformed web [m].
     slack : ndarray of bool, shape (lines,)
         Slack lines.
     origin : str
-        The place in words.
+        Name of the point.
     remark : str
-        Text of the instant, if the largest value belongs to another instant; else empty.
+        Remark on the time of the frame, if the largest value belongs to another time; else empty.
     """
 
     frame: Frame
@@ -65,7 +65,7 @@ def spread(record, field):
 
 
 def largest(record, field):
-    """(name, time) of the result of a field, of the first result where there is none; "" and the last time else."""
+    """Name and time of the result of a field, or of the first result; without results "" and the last time."""
     results = record.summary.get("results") or {}
     asked = {entry.get("name"): entry for entry in record.scene.get("observe") or []}
     names = [name for name in results if asked.get(name, {}).get("quantity") == field]
@@ -77,7 +77,7 @@ def largest(record, field):
 
 
 def _origin(record, frame, middles, values, field):
-    """Position of the hit or load [m], else of the largest value, its centre if all is slack; and its words."""
+    """Position [m] and name of the point of impact or load, of the largest value, or of the centre of the web."""
     numbers = np.asarray(frame.fields.get("line", np.arange(len(values))))
     touched = {
         name: body for name, body in (record.summary.get("bodies") or {}).items() if body.get("line") is not None
@@ -97,7 +97,7 @@ def _origin(record, frame, middles, values, field):
 
 
 def _loaded(record, frame, numbers):
-    """Position of the one node that is loaded, and its name; None where there is no such node."""
+    """Position and name of the loaded node; None unless exactly one node is loaded."""
     loads = record.scene.get("load") or []
     count = (record.summary.get("web") or {}).get("nodes", 0)
     nodes = np.zeros((int(frame.ends.max()) + 1, 3))
@@ -115,7 +115,7 @@ def _loaded(record, frame, numbers):
 
 
 def distances(runs, field):
-    """The panel of a field over the distance from the place that was hit or loaded."""
+    """The panel of a field over the distance from the point of impact or load."""
     spreads = [spread(s.record, field) for s in runs]
     factor, called = unit_of(FIELDS[field], *(item.values for item in spreads))
     metre, unit = unit_of("m", *(item.distance for item in spreads))
@@ -156,5 +156,5 @@ def distances(runs, field):
 
 
 def at(record, time):
-    """A time, or load step, in words."""
+    """Text of a time or load step."""
     return CLOCKS[record.kind].format(time)

@@ -1,4 +1,4 @@
-"""Picture of an error budget: the parts of ± of each result as a stacked bar, over its value."""
+"""Picture of an error budget: the parts of ± of each result as a stacked bar, relative to its value."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from ..results.error_budget import ALLOWED, OPEN, PARTS, WORDS
 from .sheet import COLOURS, LETTERS, Panel, legend, sheet
 
 MOST = 1.0
-"""± over the value to which longer bars are shrunk, with all their parts."""
+"""± over the value to which longer bars are scaled down, with all their parts."""
 
 
 def draw(results, title):
-    """Draw the budget of results by name, each a `refweb.results.solution.Result`; a `matplotlib.figure.Figure`."""
+    """Draw the error budgets of results by name; returns a `matplotlib.figure.Figure`."""
     names = list(results)
 
     def bars(axes):

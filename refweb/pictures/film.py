@@ -1,7 +1,7 @@
-"""Films of a run: all its frames, with one camera and one range of colours; of a mode a period of its swing.
+"""Films: all frames of a run with one camera and one range of colours, or one period of a mode.
 
-One renderer is kept for all frames. The surroundings of the web are drawn once; of each frame only the web and its time
-are drawn. Frames are read, drawn and written one after the other.
+One renderer draws all frames. Title, axes and legend are drawn once, and for each frame only the web and its time.
+Frames are read, drawn and written one after the other, so that memory holds one of them.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from .polygons import flat_images
 from .stage import DARK, PALE, Seen, Stage, colour_map
 
 SIZE = (1200, 750)
-"""Of a film [pixel]."""
+"""Size of a film [pixel]."""
 PHASES, SWINGS = 24, 12.0
-"""Images of a period of a mode, and of them in a second [1/s]."""
+"""Number of images of one period of a mode, and images per second [1/s]."""
 SAMPLES = 6
-"""Images that a GIF has its colours of."""
+"""Number of images from which the palette of a GIF is made."""
 LAST = 1.0
-"""How long the last image of what does not swing stays [s]."""
+"""Duration of the last image, except for modes [s]."""
 
 
 def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.0, view=None, fps=10.0, progress=None):
-    """Draw all frames of a run as a film, or one of its modes as it swings.
+    """Draw all frames of a run as a film, or one period of a mode.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.
     frame : int, optional
         The number of a mode.
     time : float, optional
-        The same; neither means anything for what is no mode.
+        The same as ``frame``; both are refused for a run that is no modes.
     fps : float
-        Frames per second [1/s], > 0 and ≤ 50; the last one stays for a second. A mode swings once in two seconds.
+        Frames per second [1/s], > 0 and ≤ 50; the last frame lasts a second. A period of a mode takes two seconds.
     progress : callable, optional
         Called with a line of text and the share that is done, 0 to 1.
 
@@ -75,7 +75,7 @@ def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.
 
 
 class Pose(NamedTuple):
-    """An image of a film: the number of its frame, and −1…1 of the swing of a mode."""
+    """An image of a film: the number of its frame, and the phase factor −1…1 of a mode."""
 
     number: int
     phase: float
@@ -91,7 +91,7 @@ def poses_of(record, frame, time):
 
 
 class _Film:
-    """The images of a film, and how they are written."""
+    """The images of a film, drawn one by one."""
 
     def __init__(self, record, poses, options, fps):
         self._record, self._poses, self._options = record, poses, options
@@ -101,7 +101,7 @@ class _Film:
         self._decimals = max((len(f"{t:.6g}".partition(".")[2]) for t in record.times.values()), default=0)
 
     def write(self, path, progress):
-        """Write it; ``progress`` is told how far it is."""
+        """Write the film; ``progress`` is called with the finished share."""
         self._stage = self._survey(progress)
         self._sizes = self._stage.pixels(SIZE)
         self._around = self._page()
@@ -125,7 +125,7 @@ class _Film:
         return self._record.frame(pose.number).held_as(self._last).posed(self._options.scale, pose.phase)
 
     def _survey(self, progress):
-        """The stage that shows all images; of a swing its two ends and its middle do."""
+        """The stage that contains all images; for a mode both extremes and the middle."""
         ends = {max, min}
         poses = [end(self._poses, key=lambda pose: pose.phase) for end in ends] if self._swings else self._poses
         limits = None
@@ -136,14 +136,14 @@ class _Film:
         return Stage.of(limits, self._options, SIZE[0] / SIZE[1])
 
     def _page(self):
-        """Image of everything around the web, with transparency, RGBA."""
+        """Image of title, axes and legend, with a transparent area for the web, RGBA."""
         page = blank_page(self._stage, self._record.title, SIZE)
         for patch in (page.patch, *(axes.patch for axes in page.axes)):
             patch.set_alpha(0.0)
         return pixels(page)
 
     def _image(self, renderer, pose):
-        """The whole page of a frame, an image, RGB."""
+        """The image of a whole page of a frame, RGB."""
         from PIL import Image, ImageDraw
 
         model = self._stage.model(self._frame(pose))
@@ -166,7 +166,7 @@ class _Film:
 
 @functools.cache
 def _letters(points):
-    """The letters of matplotlib, in points on a page of 16 inches."""
+    """Font of matplotlib, of a size in points on a page of 16 inches."""
     from matplotlib.font_manager import findfont
     from PIL import ImageFont
 

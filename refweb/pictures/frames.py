@@ -1,6 +1,6 @@
-"""Frames, the records that pictures draw: lines in space with values on them, supports and bodies.
+"""Frames, the data of one instant for drawing: lines with values, supports, masses and bodies.
 
-`read` takes one from a result folder, `frame_of` makes one of meshes in memory.
+`read` reads a frame of a result folder, `frame_of` makes one from meshes in memory.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import io
 import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class Frame(NamedTuple):
     time : float
         Time [s]; in statics the load step, of a mode its number.
     paths, origin : ndarray, shape (lines, points, 3)
-        Lines where they are and undeformed [m].
+        Lines in deformed and undeformed position [m].
     tree : bool
         True if the lines form no closed loop.
     fields : dict of str to ndarray, shape (lines,)
@@ -40,17 +40,17 @@ class Frame(NamedTuple):
     slack : ndarray of bool, shape (lines,)
         Slack lines.
     supports : ndarray, shape (n, 3)
-        Places of supported nodes [m].
+        Positions of supported nodes [m].
     bodies : dict of str to Body
         Bodies by name.
     ends : ndarray of int, shape (lines, 2)
-        Numbers of the nodes where lines begin and end.
+        Numbers of the first and last node of each line.
     lifted : ndarray, shape (n, 3)
         Displacements of supported nodes [m].
     swing : ndarray, shape (lines, points, 3), or None
-        Displacement of a mode along the paths [m]; None if there is no mode.
+        Displacement of a mode along the paths [m]; None for a run that is no modes.
     masses : Masses or None
-        Point masses; None where there are none.
+        Point masses; None if there are none.
     """
 
     number: int
@@ -58,10 +58,10 @@ class Frame(NamedTuple):
     paths: np.ndarray
     origin: np.ndarray
     tree: bool
-    fields: dict
+    fields: dict[str, Any]
     slack: np.ndarray
     supports: np.ndarray
-    bodies: dict
+    bodies: dict[str, Any]
     ends: np.ndarray
     lifted: np.ndarray
     swing: np.ndarray | None
@@ -73,11 +73,11 @@ class Frame(NamedTuple):
         return np.asarray(self.fields.get("broken", np.zeros(len(self.paths)))) > 0.5
 
     def held_as(self, last):
-        """The frame with the supports of the last one, where it knows none of its own."""
+        """The frame with the supports of the last frame, for a file that contains none."""
         return self if len(self.supports) else self._replace(supports=last.supports, lifted=last.lifted)
 
     def posed(self, scale=1.0, phase=1.0):
-        """The frame with displacements times a factor; of a mode, its shape times that and −1…1 of a swing."""
+        """The frame with displacements times a factor; a mode is also multiplied by its phase −1…1."""
         if self.swing is not None:
             further = scale * phase - 1.0
             swung = {
@@ -126,21 +126,21 @@ class Listed(NamedTuple):
     """A frame of ``web.pvd``: its time, and the path of each of its meshes by name."""
 
     time: float
-    paths: dict
+    paths: dict[str, Any]
 
 
 def listed(folder):
-    """The frames that ``web.pvd`` lists.
+    """Read the list of frames in ``web.pvd``.
 
     Returns
     -------
     dict of int to Listed
-        By their numbers, ascending; ``web`` is a mesh of each.
+        Frames by number, ascending; each has the mesh ``web``.
 
     Raises
     ------
     InputError
-        Where ``web.pvd`` cannot be read or lists no web.
+        If ``web.pvd`` cannot be read or lists no web.
     """
     if not Path(folder).is_dir():
         raise InputError(f"{folder} is not a folder")
@@ -163,7 +163,7 @@ def listed(folder):
 
 
 def number_of(frame, known):
-    """The number of a frame among those that are known, ascending; counted from the end where it is negative."""
+    """The number of a frame, checked against the known numbers; a negative number counts from the end."""
     if -len(known) <= frame < 0:
         return known[frame]
     if frame not in known:
@@ -178,7 +178,7 @@ def read(folder, number, known_paths=None):
     Raises
     ------
     InputError
-        Where it cannot be read or has positions that are not finite.
+        If the frame cannot be read or has positions that are not finite.
     """
     time, paths = (known_paths or listed(folder))[number]
     web = _mesh(paths["web"])
@@ -191,7 +191,7 @@ def read(folder, number, known_paths=None):
 
 
 def frame_of(number, time, meshes, supported, point_mass=None):
-    """A frame of meshes.
+    """Make a frame from meshes.
 
     Parameters
     ----------
@@ -234,9 +234,9 @@ def frame_of(number, time, meshes, supported, point_mass=None):
 
 
 def _amplitude(points, shape):
-    """Factor [m] of a mode's shape, for points [m] to which it has been added, both of shape (points, 3).
+    """Amplitude [m] of a mode that has been added to points [m], both of shape (points, 3).
 
-    It is a share of the diagonal of the box of the points before: what fixes it is found by iteration.
+    The amplitude is a share of the diagonal of the box around the undeformed points, which an iteration finds.
     """
     amplitude = 0.0
     for _ in range(100):
@@ -260,7 +260,7 @@ def _mesh(path):
 
 
 def _supported(folder, mesh):
-    """Mask of supported points: as the checkpoint has it, else those where a reaction acts."""
+    """Mask of supported points, from the checkpoint, else the points with a reaction."""
     count = len(mesh.points)
     try:
         with np.load(Path(folder) / "checkpoint.npz") as checkpoint:
@@ -270,7 +270,7 @@ def _supported(folder, mesh):
 
 
 def _point_masses(folder):
-    """Point mass on each node [kg], as the checkpoint has it; None where it has none."""
+    """Point mass on each node [kg] from the checkpoint; None if it has none."""
     try:
         with np.load(Path(folder) / "checkpoint.npz") as checkpoint:
             return checkpoint["point_masses"] if "point_masses" in checkpoint else None
@@ -279,12 +279,12 @@ def _point_masses(folder):
 
 
 def _size(data):
-    """Magnitudes of vectors, shape (n, 3); numbers, shape (n,), as they are."""
+    """Magnitudes of vectors, shape (n, 3); numbers, shape (n,), are unchanged."""
     return np.linalg.norm(data.reshape(len(data), -1), axis=1) if data.ndim > 1 else data
 
 
 def _fields(mesh, blocks):
-    """Cell data, and point data as the largest over the nodes of each line; of vectors the magnitude."""
+    """Values of lines: cell data, and the largest point data over the nodes of a line; magnitudes of vectors."""
     fields = {name: np.concatenate([_size(data[i]) for i, _ in blocks]) for name, data in mesh.cell_data.items()}
     for name, data in mesh.point_data.items():
         if name not in fields:

@@ -1,4 +1,4 @@
-"""Histories of a run over time, results of its load steps and frequencies of its modes, with ± where it is known."""
+"""Panels of histories over time, of results over load steps and of frequencies of modes, with known ±."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .sheet import COLOURS, DARK, LETTERS, MARKERS, PALE, STYLES, Panel, dot, la
 
 OF_ALL = "Points: results of all steps, with ± where it is known. Lines: rows of the history."
 MOST_TICKS = 12
-"""Number of load steps up to which each has its own mark on the axis."""
+"""Largest number of load steps with a mark each on the axis."""
 
 
 def history(runs, name):
-    """The panel of a column of the history over time: its result stands as a point with ± where it was found."""
+    """The panel of a column of the history over time, with its result as a point with ±."""
     having = [s for s in runs if name in s.units]
     unit = having[0].units[name]
     values = [s.results[name].value for s in having if name in s.results]
@@ -70,13 +70,13 @@ def across(runs, name, against):
 
 
 def bounds_of(runs, name, factor):
-    """Least and largest possible value of a column in all of some runs, in units of the axis."""
+    """Least and largest possible value of a column in several runs, in units of the axis."""
     lower, upper = zip(*(s.bounds.get(name, (-np.inf, np.inf)) for s in runs), strict=True)
     return min(lower) / factor, max(upper) / factor
 
 
 def clock_of(runs):
-    """(factor, name) of the unit of time of some runs: seconds, but for runs of less than a tenth of one."""
+    """Factor and name of the unit of time of some runs: s, with a prefix for runs below 0.1 s."""
     longest = max((float(np.abs(s.along).max(initial=0.0)) for s in runs), default=0.0)
     return (1.0, "s") if longest >= 0.1 else scale_of(longest, "s")
 
@@ -86,7 +86,7 @@ def _time(value, factor, name):
 
 
 def marks(axes, runs, second):
-    """Mark events by lines across, with their names where one run is shown."""
+    """Mark events by vertical lines, with their names if one run is shown."""
     for s in runs:
         for name, time in s.events:
             axes.axvline(time / second, color=s.ink.colour if s.name else PALE, linestyle=":", linewidth=1.2)
@@ -125,7 +125,7 @@ def steps(runs, name):
 
 
 def tick_steps(axes, steps):
-    """Mark load steps on the axis where they are few."""
+    """Mark each load step on the axis if there are few."""
     if len(steps := sorted(set(steps))) <= MOST_TICKS:
         axes.set_xticks(steps, [f"{step:g}" for step in steps])
 
@@ -140,7 +140,7 @@ def of_modes(runs, name):
 
 
 def _columns(runs, name, along, pairs):
-    """The panel of pairs of what a column is over and its values, without ±."""
+    """The panel of a column over its abscissa, without ±."""
     factor, called = unit_of(runs[0].units[name], *(values for _, values in pairs))
 
     def draw(axes):
@@ -159,7 +159,7 @@ def _columns(runs, name, along, pairs):
 
 
 def frequencies(runs):
-    """The panel of natural frequencies with their ±: over the mode, of several load steps over the step."""
+    """The panel of natural frequencies with ±: over the mode number, or over load steps if there are several."""
     several = any(len(np.unique(s.history["step"])) > 1 for s in runs)
     largest = max(float(np.abs(s.history["frequency"]).max(initial=0.0)) for s in runs)
     factor, called = scale_of(largest, "Hz")
@@ -214,7 +214,7 @@ def _over_steps(axes, table, errors, s):
 
 
 def _number_modes(axes, table):
-    """Number the lines of modes at their ends; those that lie on each other together."""
+    """Write numbers of modes at the ends of lines, one text for lines that coincide."""
     last = table["step"] == table["step"][-1]
     values, modes = table["frequency"][last], table["mode"][last].astype(int)
     near = 0.03 * max(float(np.ptp(table["frequency"])), 1e-300)

@@ -1,4 +1,4 @@
-"""Limits of axes: they come from the values, and a bar of ± that goes beyond them is cut, with an arrow and its ±."""
+"""Limits of axes, from values without ±; a bar of ± beyond a limit is cut and marked by an arrow and its ±."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ..results.solution import Result
 from .sheet import DARK, LETTERS
 
 MARGIN = 0.1
-"""Share of the range of values that an axis is longer at each end."""
+"""Extension of an axis at each end, over the range of values."""
 MOST_NUMBERS = 4
-"""Bars that are cut at one end of an axis whose ± are printed one by one."""
+"""Largest number of cut bars at one end of an axis with a printed ± each."""
 
 NEAR = 0.2
 """Share of the horizontal axis within which two ± are printed one below the other."""
 
 
 class Bar(NamedTuple):
-    """A value with its ±, in units of the axes: its position along, the value, and how far ± goes below and above."""
+    """A value with ±, in units of the axes: abscissa, value, and lengths of ± below and above."""
 
     along: float
     value: float
@@ -27,12 +27,12 @@ class Bar(NamedTuple):
     above: float
 
     def end(self, sign):
-        """The upper end, sign = 1, or the lower one, sign = −1."""
+        """The upper end of the bar, sign = 1, or the lower one, sign = −1."""
         return self.value + self.above if sign > 0 else self.value - self.below
 
 
 def bar_of(along, result: Result, factor, error):
-    """The `Bar` of a result at a position; ``error`` is what `refweb.pictures.plot_data.bar` gives, None without ±."""
+    """The `Bar` of a result at an abscissa; ``error`` is from `refweb.pictures.plot_data.bar`, None without ±."""
     below, above = (0.0, 0.0) if error is None else error.ravel().tolist()
     return Bar(along, result.value / factor, below, above)
 
@@ -45,15 +45,15 @@ def window(values, bars=(), bounds=(-np.inf, np.inf)):
     values : ndarray
         All values that are drawn, in units of the axis.
     bars : sequence of Bar
-        Values with ±. An end of a bar is inside where it is at most as far from its value as the range of all values.
+        Values with ±. The axis contains the end of a bar if the bar is at most as long as the range of all values.
     bounds : (float, float)
-        Least and largest value that are possible, in the same units: an axis of values that are not negative begins at
-        0 or above.
+        Least and largest possible value, in the same units: an axis of values that cannot be negative begins at 0 or
+        above.
 
     Returns
     -------
     (float, float) or None
-        Lower and upper end; None where no value is finite.
+        Lower and upper end; None if no value is finite.
     """
     values = np.concatenate([np.ravel(values), [bar.value for bar in bars]]).astype(float)
     values = values[np.isfinite(values)]
@@ -93,7 +93,7 @@ def limit(axes, values, bars=(), bounds=(-np.inf, np.inf), unit=""):
 
 
 def limit_along(axes, values, errors, bounds=(-np.inf, np.inf), unit=""):
-    """The same for the horizontal axis, of values with ± one above the other; the arrow has the largest ± that is cut.
+    """Set the horizontal axis, for values with ± one above the other; an arrow shows the largest ± that is cut.
 
     ``values`` and ``errors`` have the shape (n,).
     """

@@ -1,4 +1,4 @@
-"""Numbers of lines on a picture: those of the largest values first, and none that covers another one."""
+"""Numbers of lines on a picture: lines with the largest values first, without overlaps."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import numpy as np
 from .stage import LARGEST
 
 SIZE, WIDE, HIGH = 9, 0.75, 1.5
-"""Size of the numbers [pt], and over that the width of a digit and the height, with room between them."""
+"""Font size of the numbers [pt]; width and height of a digit over it, with spacing."""
 MOST, LOOKED_AT = 200, 20_000
-"""Lines that are numbered at most, and those of the largest values that are looked at."""
+"""Largest number of numbered lines, and of candidates."""
 
 
 def number_lines(page, views, frame, field):
@@ -29,7 +29,7 @@ def number_lines(page, views, frame, field):
     Returns
     -------
     str
-        Words on the lines that have no number; empty where all have one.
+        Remark on lines without a number; empty if all have one.
     """
     from matplotlib.patheffects import withStroke
 
@@ -55,7 +55,7 @@ def number_lines(page, views, frame, field):
 
 
 def _apart(places, order, width):
-    """Numbers of places [pt], shape (n, 2), that are apart from those before them in an order, `MOST` at most."""
+    """Indices of at most `MOST` positions [pt], shape (n, 2), that do not overlap earlier ones in an order."""
     chosen: list = []
     for index in order[:LOOKED_AT]:
         beside = np.abs(places[chosen] - places[index])

@@ -1,8 +1,9 @@
-"""Models, lists of what is drawn of a frame: tubes, balls and surfaces."""
+"""Elements of a model, the list of all that is drawn of a frame: tubes, balls and surfaces."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ class Balls:
     """Markers: centres [m], shape (balls, 3); one colour in 0…1; radius [m]."""
 
     centres: np.ndarray
-    colour: tuple
+    colour: tuple[Any, ...]
     radius: float
 
 
@@ -34,4 +35,4 @@ class Surface:
 
     points: np.ndarray
     triangles: np.ndarray
-    colour: tuple
+    colour: tuple[Any, ...]

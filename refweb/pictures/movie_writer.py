@@ -1,8 +1,8 @@
-"""Moving pictures: GIF by pillow, which stores what differs from image to image, and MP4 by imageio and PyAV.
+"""Writer of moving pictures: GIF by pillow, which stores differences of images, and MP4 by imageio and PyAV.
 
-pyvista's ``open_gif`` takes the picture of one of its windows: here two views, axes and letters make a page. A palette
-for each image, as imageio and pillow make it, takes 2.7 MB for the film of ``capture-stage``, in colours that change
-from image to image; one palette for all takes 1.5 MB.
+The ``open_gif`` of pyvista records one window of pyvista, but a page here has two views, axes and texts. One palette
+for each image, the default of imageio and pillow, makes a file of 2.7 MB for the film of ``capture-stage``, with
+colours that change from image to image; one palette for all images makes 1.5 MB.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 ENDINGS = ("gif", "mp4")
 COLOURS = 255
-"""Of a GIF; pillow takes one more for what stays as it is."""
+"""Number of colours of a GIF; pillow adds one for unchanged pixels."""
 ALMOST_WHITE = 247
 """Level of all channels above which a colour stands for white: pillow looks colours up in steps of four levels."""
 
@@ -24,13 +24,13 @@ def write(path, images, seconds, samples, certain):
     path : pathlib.Path
         The file.
     images : iterator of PIL.Image.Image
-        RGB. A GIF holds 1 byte of each pixel of all of them in memory, an MP4 one image.
+        Images, RGB. A GIF needs 1 byte of memory for each pixel of all images, an MP4 the memory of one image.
     seconds : list of float
-        How long each stays [s]; that of the first is the shortest.
+        Duration of each image [s]; the first is the shortest.
     samples : list of PIL.Image.Image
-        Images of which a GIF has its colours.
+        Images from which the palette of a GIF is made.
     certain : ndarray of int, shape (colours, 3)
-        Colours that it has in any case, 0 to 255.
+        Colours that the palette contains in any case, 0 to 255.
     """
     if path.suffix.lower() == ".gif":
         palette = _palette(samples, certain)
@@ -49,7 +49,7 @@ def write(path, images, seconds, samples, certain):
 
 
 def _palette(samples, certain):
-    """An image whose palette has white, colours that are certain, and those of images."""
+    """An image whose palette has white, the certain colours, and colours of sample images."""
     from PIL import Image
 
     number = COLOURS - 1 - len(certain)

@@ -1,4 +1,4 @@
-"""Models drawn by pyvista: in a window, or off screen as images of one view after the other."""
+"""Drawing of models by pyvista, in a window or off screen as an image of each view."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ ROUND = {"specular": 0.15, "smooth_shading": True, "culling": "back"}
 LIGHTS = (((-0.45, 0.75, 1.0), 0.62), ((0.7, -0.3, 0.8), 0.28), ((0.0, 0.0, 1.0), 0.22))
 """Directions and intensities of the lights, which move with the camera: from above to the left, beside, the viewer."""
 MOST_CORNERS = 1_000_000
-"""Corners of tubes above which lines are drawn as wires: they are then a few pixels wide, and no roundness is seen."""
+"""Number of corners of tubes above which lines are drawn as flat wires, since they are few pixels wide."""
 MOST_OF_BALLS = 200_000
-"""Corners of all balls together; many are coarser."""
+"""Number of corners of all balls together; many balls are coarser."""
 
 _off_screen = []
 
@@ -25,7 +25,7 @@ _off_screen = []
 def open_off_screen(*job):
     """Prepare this process for `images`; ``job`` are views, their sizes [pixel] and the sides of a tube.
 
-    Whatever a library writes goes nowhere.
+    Output of libraries is discarded.
     """
     silence = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silence, 1)
@@ -40,7 +40,7 @@ def images(model):
     Raises
     ------
     OSError
-        Where the window stays blank.
+        If the window stays blank.
     """
     from PIL import Image
 
@@ -59,7 +59,7 @@ def images(model):
 
 
 def pixels_of(views, sizes, point):
-    """Pixels that a metre takes at a point [m], shape (3,): the mean over views of some sizes [pixel]."""
+    """Pixels per metre at a point [m], shape (3,), the mean over views of some sizes [pixel]."""
     return np.mean(
         [v.project(point)[2] * height / (2 * v.half[1]) for v, (_, height) in zip(views, sizes, strict=True)]
     )
@@ -70,14 +70,14 @@ def plotter_of(size, off_screen=False):
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), lighting="none")
-    plotter.background_color = "white"
+    plotter.set_background("white")
     for position, intensity in LIGHTS:
         plotter.add_light(pyvista.Light(position=position, intensity=intensity, light_type="camera light"))
     return plotter
 
 
 def aim(plotter, view, middle=None):
-    """Let a plotter show a `refweb.pictures.camera.View`, which is turned about the depth of a ``middle`` [m]."""
+    """Set the camera of a plotter to a `refweb.pictures.camera.View`, with its focus at the depth of ``middle`` [m]."""
     camera, position = plotter.camera, view.centre + (0 if view.perspective else view.axes[2] * sum(view.half))
     away = 1.0 if middle is None else (position - middle) @ view.axes[2]
     camera.position, camera.focal_point, camera.up = position, position - away * view.axes[2], view.axes[1]
@@ -90,7 +90,7 @@ def aim(plotter, view, middle=None):
 
 
 def show(plotter, model, sides, pixels):
-    """Put a model in the place of the one before; ``pixels`` says how many a metre takes at a point [m]."""
+    """Replace the model of a plotter; ``pixels`` gives the pixels per metre at a point [m]."""
     for number in range(len(model), len(plotter.actors)):
         plotter.remove_actor(f"part {number}", render=False)
     for number, part in enumerate(model):
@@ -102,7 +102,7 @@ def show(plotter, model, sides, pixels):
 
 
 def _lines(part, sides, pixels):
-    """Tubes, or wires of the width of a tube in the middle of the web: by software a tube takes a hundredfold."""
+    """Tubes, or wires of the same width at the middle of the web: without OpenGL a tube takes a hundredfold time."""
     import pyvista
 
     paths = np.asarray(part.paths, dtype=float)
@@ -122,7 +122,7 @@ def _lines(part, sides, pixels):
 
 
 def _surface(part, sides, pixels):
-    """A body, smooth but at sharp edges."""
+    """A body, with smooth shading except at sharp edges."""
     import pyvista
 
     mesh = pyvista.PolyData(part.points, faces=np.insert(part.triangles, 0, 3, axis=1).ravel()).clean()

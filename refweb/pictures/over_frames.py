@@ -1,4 +1,4 @@
-"""Fields over all frames of a run: the largest value of each line, and the peak of the run that frames miss."""
+"""Fields over all frames of a run: the largest value of each line, and peaks of the run between frames."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from .peaks import Largest, observed, when
 from .stage import LARGEST, UNITS
 
 MISSED = 1e-3
-"""Share by which the peak of a run is above all frames where that is said."""
+"""Relative excess of the peak of a run over all frames above which a remark says so."""
 
 
 def with_largest(record, field):
-    """A record whose frames have the field ``largest_NAME``: of each line the largest NAME of all frames.
+    """A record whose frames have the field ``largest_NAME``: the largest NAME of each line over all frames.
 
     Parameters
     ----------
     record : refweb.pictures.record.Record
         The record.
     field : str or None
-        The field that is asked for; the record is returned as it is where this is no such field.
+        The field to draw; for other fields the record is returned unchanged.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def with_largest(record, field):
 
 
 def _values_of(record, field):
-    """(Number, values) of a field in each frame that can be read."""
+    """Number of each readable frame, and values of a field in it."""
     shape = None
     for number in record.times:
         try:
@@ -61,13 +61,13 @@ def _values_of(record, field):
 
 
 def on_frames(record, field):
-    """Words that a field over all frames is of those that were written; empty for another field."""
+    """Remark on a field over all frames; empty for another field."""
     count = len(record.times)
     return f"largest over the {count} frames written" if field.startswith(LARGEST) else ""
 
 
 def on_peak(record, field, high):
-    """Sentence on the peak of a field over the run where all frames are below it; empty where they are not.
+    """Sentence on the peak of a field over the run, if all frames are below it; else empty.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def on_peak(record, field, high):
 
 
 def _peak(record, name):
-    """The largest value of a field over the run, a `refweb.pictures.peaks.Largest`; None where it is not known."""
+    """The largest value of a field over the run, a `refweb.pictures.peaks.Largest`; None if it is not known."""
     summary = record.summary
     try:
         if name != "utilisation":

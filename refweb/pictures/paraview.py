@@ -1,4 +1,4 @@
-"""A script that sets ParaView up for a run: tubes, one range of colours, slack lines grey, bodies, time, camera."""
+"""Script that shows a run in ParaView: tubes, one range of colours, grey slack lines, bodies, time, camera."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, colour_map, sc
 
 NAME, TEMPLATE = "web_in_paraview.py", Path(__file__).with_name("for_paraview.template")
 SIZE = (1600, 1000)
-"""Of the view [pixel]."""
+"""Size of the view [pixel]."""
 
 
 def script(folder, field=None, out=None):
@@ -28,8 +28,8 @@ def script(folder, field=None, out=None):
     field : str, optional
         Field of the colours, as in `refweb.picture`.
     out : path-like, optional
-        A ``.py`` to write; default ``web_in_paraview.py`` in the folder. It finds the folder beside itself, or
-        else where it was when the script was written.
+        A ``.py`` to write; default ``web_in_paraview.py`` in the folder. The script looks for the result folder beside
+        itself, then at the path at which it was written.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def script(folder, field=None, out=None):
     Raises
     ------
     InputError
-        Where the folder is no result folder or has no such field, and for a place that cannot be written.
+        If the folder is no result folder or has no such field, and if the file cannot be written.
     """
     folder = Path(folder)
     record = of_folder(folder)
@@ -90,7 +90,7 @@ def _arrays(folder, number):
 def camera_of(stage, size, margin=1.0):
     """The first view of a stage in a window of some size [pixel], as plain values.
 
-    Beside what it shows there is room for a colour bar, and ``margin`` times its height.
+    The window leaves space for a colour bar, and a ``margin`` relative to its height.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""The largest value of a quantity over a run, as ``run.json`` and ``scene.toml`` have it, and the largest tension."""
+"""The largest value of a quantity over a run, in particular of tension, from ``run.json`` and ``scene.toml``."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..results.observables.observe import observes_of
 
@@ -15,15 +15,15 @@ class Largest(NamedTuple):
     value : float
         The value [SI].
     error : float or None
-        Its ±, None where none is known.
+        Its ±; None if it is not known.
     line : int or None
-        Number of its line, of a quantity of nodes of its node; None where it is not known.
+        Number of its line, or node for a nodal quantity; None if it is not known.
     time : float or None
-        When it was [s], in statics the load step; None where it is not known.
+        Its time [s], in statics the load step; None if it is not known.
     source : str
-        A remark on where it is from; empty where a result holds it.
+        Remark on its origin; empty for the value of a result.
     within : tuple or None
-        Least and largest value that are possible, where ± goes beyond them.
+        Least and largest possible value, if ± extends beyond them.
     """
 
     value: float
@@ -31,7 +31,7 @@ class Largest(NamedTuple):
     line: int | None
     time: float | None
     source: str = ""
-    within: tuple | None = None
+    within: tuple[Any, ...] | None = None
 
     def times(self, factor, source):
         """The same with all values times a factor."""
@@ -50,12 +50,12 @@ def largest_tension(summary, scene, of_frames=None):
     scene : dict
         The tables of the scene file.
     of_frames : callable, optional
-        Gives the `Largest` of the frames, or None; it is called where nothing else is known.
+        Returns the `Largest` of the frames, or None; called if no other value is known.
 
     Returns
     -------
     Largest or None
-        None where it is not known.
+        None if it is not known.
     """
     if (largest := observed(summary, scene, "tension")) is not None:
         return largest
@@ -73,7 +73,7 @@ def largest_tension(summary, scene, of_frames=None):
 
 
 def observed(summary, scene, quantity):
-    """The `Largest` of the results of a quantity over all lines, or over all nodes; None where there is none."""
+    """The `Largest` of the results of a quantity over all lines or all nodes; None if there is none."""
     steps = summary.get("steps") or []
     tables = [step.get("results") or {} for step in steps] or [summary.get("results") or {}]
     results_found = []
@@ -93,5 +93,5 @@ def observed(summary, scene, quantity):
 
 
 def when(time, dynamic):
-    """A time, or a load step, in words."""
+    """Text of a time or load step."""
     return f"t = {time:.6g} s" if dynamic else f"load step {time:g}"

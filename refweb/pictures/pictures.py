@@ -1,9 +1,9 @@
-"""Pictures of a run: the web, its lines coloured by a field, drawn of a result folder or of a solution in memory.
+"""Pictures of a run from a result folder or a solution in memory: the web, with lines coloured by a field.
 
-A web is seen twice: in perspective, and from the side with metres along the axes. A web that lies in a plane, such as a
-hanging cable, is seen once, along the normal of the plane. Colours have one range in all frames of a run, so that two
-pictures of it can be compared. Slack lines are grey where the field is a tension, stress or strain. Nothing needs a
-display: `refweb.pictures.render` renders by OpenGL off screen, and `refweb.pictures.polygons` where it cannot.
+A picture has two views: in perspective, and from the side with metres along the axes. A plane web, such as a hanging
+cable, has one view along the normal of the plane. Colours have one range in all frames of a run, so that two pictures
+of it can be compared. Slack lines are grey if the field is a tension, stress or strain. No display is needed:
+`refweb.pictures.render` renders by OpenGL off screen, and `refweb.pictures.polygons` where it cannot.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import functools
 import io
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,15 +28,31 @@ from .polygons import polygons
 from .record import of_folder, of_solution
 from .stage import DARK, PALE, Look, Seen, Stage, limits_of
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from os import PathLike
+
+    from matplotlib.figure import Figure
+
 SIZE = (1600, 1000)
-"""Of a picture [pixel]."""
+"""Size of a picture [pixel]."""
 LABELS = ("lines",)
-"""Parts of a web that can be numbered."""
+"""Parts of a web that may be numbered."""
 MOST_SCALED = 1e6
-"""Largest factor on displacements."""
+"""Largest factor on displacements [1]."""
 
 
-def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, view=None, out=None, labels=None):
+def picture(
+    source: SolutionData | str | PathLike[str],
+    frame: int | None = None,
+    time: float | None = None,
+    field: str | None = None,
+    range: Sequence[float] | str | None = None,
+    scale: float = 1.0,
+    view: Sequence[float] | str | None = None,
+    out: str | PathLike[str] | None = None,
+    labels: str | None = None,
+) -> Figure:
     """Draw one frame of a run.
 
     Parameters
@@ -114,14 +131,14 @@ def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view
 
 
 def record_of(source):
-    """The record of a solution or a folder."""
+    """The record of a solution or a result folder."""
     if not isinstance(source, str | os.PathLike | SolutionData):
         raise InputError(f"source = {quote(source)} must be a Solution or a result folder")
     return of_folder(source) if isinstance(source, str | os.PathLike) else of_solution(source)
 
 
 def look_of(record, frame, field, limits, scale, view):
-    """Check the options and make a `Look`; without limits [SI] they are those of all frames."""
+    """Check the options and make a `Look`; limits [SI] are by default those of all frames."""
     field, asked = _field(frame, field), limits
     if not isinstance(scale, int | float) or not 0.0 < scale <= MOST_SCALED:
         raise InputError(f"scale = {quote(scale)} must be a number > 0 and ≤ {MOST_SCALED:g}")
@@ -132,19 +149,19 @@ def look_of(record, frame, field, limits, scale, view):
 
 
 def stage_of(record, frame, field, size):
-    """The stage of a frame by itself, in a view of some size [pixel], as without any other option."""
+    """The stage of a single frame with default options, for a view of some size [pixel]."""
     options = look_of(record, frame, field, None, 1.0, None)
     return Stage.of(Seen.of(frame, options.field), options, size[0] / size[1])
 
 
 def with_supports(record, frame):
-    """The frame, with the supports of the last one where it knows none."""
+    """The frame, with the supports of the last frame if its file contains none."""
     last = max(record.times)
     return frame if len(frame.supports) or frame.number == last else frame.held_as(record.frame(last))
 
 
 def clock_line(record, number, options, decimals=None):
-    """Line below the title: the time, the exaggeration, and how a run that is not solved ended."""
+    """Line below the title: time, factor on displacements, and status of a run that is not solved."""
     parts = [record.clock(number, decimals)]
     if options.scale != 1:
         parts.append(f"{'shape' if record.kind == 'modes' else 'displacements'} × {options.scale:g}")
@@ -152,7 +169,7 @@ def clock_line(record, number, options, decimals=None):
 
 
 def blank_page(stage, title, size):
-    """A page with its title, a labelled and empty axes for each view, colour bar and legend."""
+    """A page with title, empty labelled axes for each view, colour bar and legend."""
     from matplotlib.figure import Figure
 
     title = title[:100]
@@ -168,13 +185,13 @@ def blank_page(stage, title, size):
 
 
 def shows_itself(figure):
-    """A figure, which notebooks show from here on."""
+    """Let notebooks show a figure; returns it."""
     setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what they look for
     return figure
 
 
 def with_clear_white(image):
-    """An image, shape (height, width, 3), whose white can be seen through, shape (height, width, 4)."""
+    """Make the white of an image, shape (height, width, 3), transparent, shape (height, width, 4)."""
     return np.dstack([image, np.uint8(255) * (image < 255).any(axis=2)])
 
 
@@ -196,7 +213,7 @@ def pixels(figure):
 
 
 def target(out, endings=None):
-    """The path to write, with an ending that is known, in a folder that is there."""
+    """Check the path of a file to write: its ending, its folder and permission; returns a `pathlib.Path`."""
     from matplotlib.figure import Figure
 
     out = Path(out)
@@ -212,7 +229,7 @@ def target(out, endings=None):
 
 
 def _field(frame, name):
-    """The field to show: the one asked for, else a mode's shape, else stress, else the first."""
+    """Name of the field to show: the given one, else the shape of a mode, else stress, else the first."""
     if name is None:
         name = next((known for known in ("shape", "stress", *frame.fields) if known in frame.fields), "stress")
     if name not in frame.fields:
@@ -221,7 +238,7 @@ def _field(frame, name):
 
 
 def _limits(record, frame, field, limits):
-    """The range of colours [SI] that is asked for."""
+    """The given range of colours [SI]."""
     if limits is None or field == "slack":
         if limits is not None:
             raise InputError('range: the field "slack" has two colours and no range, leave it out')
@@ -238,7 +255,7 @@ def _limits(record, frame, field, limits):
 
 
 def _view(view):
-    """The view that is asked for: a name, or a direction of shape (3,)."""
+    """The given view: a name, or a direction of shape (3,)."""
     if view is None or (isinstance(view, str) and view in VIEWS):
         return view
     try:

@@ -1,4 +1,4 @@
-"""Data of a record for plots: its history with units, its results with ±, and its style beside other records."""
+"""Data of a record for plots: history with units, results with ±, and the style among several records."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """A record beside others in a plot.
+    """Record in a plot, with its name and style.
 
     Attributes
     ----------
     record : refweb.pictures.record.Record
         Record to draw.
     name : str
-        Name that distinguishes it from other records; empty if there are none.
+        Name among other records; empty for a single record.
     ink : refweb.pictures.sheet.Ink
-        How its lines look.
+        Style of its lines.
     """
 
     record: Record
@@ -39,7 +39,7 @@ class Shown:
 
     @functools.cached_property
     def units(self):
-        """Unit of each column of the history by name, "1" of numbers; the first is time, load step or mode."""
+        """Unit of each column of the history by name, "1" for numbers; the first is time, load step or mode."""
         columns = self.record.table()[0]
         if not all(column.endswith("]") and " [" in column for column in columns):
             raise InputError(f"{self.record.name}: the columns of its history have no names with units")
@@ -63,18 +63,18 @@ class Shown:
 
     @property
     def energies(self):
-        """Names of the columns of the book of energies [J]: what is stored or lost, work, and the total."""
+        """Names of the columns of the energy balance [J]: stored and dissipated energies, work, and the total."""
         names = [name for name in list(self.units)[1 + len(self.observables) :] if self.units[name] == "J"]
         return names if "total_energy" in names else []
 
     @functools.cached_property
     def results(self):
-        """Results by name, each a `refweb.results.solution.Result`; none while the run goes on."""
+        """Results by name, each a `refweb.results.solution.Result`; empty during the run."""
         return _results(self.record.summary)
 
     @functools.cached_property
     def bounds(self):
-        """Least and largest possible value of columns of the history by name, as far as the scene says."""
+        """Least and largest possible value of columns of the history by name, as far as the scene determines them."""
         try:
             return bounds_by_name(self.record.scene)
         except (InputError, TypeError, AttributeError):  # of a file that no run has written
@@ -92,12 +92,12 @@ class Shown:
         return [(step["step"], _results(step)) for step in self.record.summary.get("steps") or []]
 
     def other_errors(self, name):
-        """Errors of a result besides ±, in words."""
+        """Text of the errors of a result besides ±."""
         result = self.results.get(name)
         return [self.said(text) for text in other_errors({name: result.plain()})] if result is not None else []
 
     def said(self, words):
-        """Words about it, behind its name where there are others."""
+        """A text about the record, with its name if there are several."""
         return f"{self.name}: {words}" if self.name and words else self.name or words
 
 
@@ -106,7 +106,7 @@ def _results(summary):
 
 
 def refuse_spoilt(record):
-    """Refuse a record whose ``run.json`` or ``scene.toml`` is not what a run writes."""
+    """Refuse a record with a ``run.json`` or ``scene.toml`` that no run has written."""
     run, scene = record.summary, record.scene
     lists = [run.get("steps"), run.get("events"), scene.get("observe"), scene.get("load")]
     tables = [run.get("web"), run.get("solver"), run.get("bodies"), scene.get("web")]
@@ -124,7 +124,7 @@ def refuse_spoilt(record):
 
 
 def unit_of(unit, *values):
-    """(factor, name) of the readable unit of the largest of some values, a power of ten where no prefix makes one."""
+    """Factor and name of a unit in which the largest of some values is readable, with a prefix or a power of ten."""
     size = float(max((np.abs(v[np.isfinite(v)]).max(initial=0.0) for v in map(np.atleast_1d, values)), default=0.0))
     factor, name = scale_of(size, unit)
     if size == 0.0 or 1e-2 <= size / factor < 1e5:
@@ -134,7 +134,7 @@ def unit_of(unit, *values):
 
 
 def bar(result: Result, factor=1.0):
-    """± of a result as lengths below and above it, shape (2, 1); None where it is not known."""
+    """± of a result as lengths below and above it, shape (2, 1); None if it is not known."""
     if (between := result.interval or result.within) is not None:
         ends = [result.value - between[0], between[1] - result.value]
         return np.array([[end if np.isfinite(end) else 0.0] for end in ends]) / factor
@@ -142,7 +142,7 @@ def bar(result: Result, factor=1.0):
 
 
 def text_of(result: Result):
-    """A result in words, with its ±."""
+    """Text of a result with its ±."""
     words = readable(result.value, result.error, result.unit, result.within)
     if result.interval is not None:
         lower, upper = (readable(end, None, result.unit) if np.isfinite(end) else "any" for end in result.interval)

@@ -1,6 +1,6 @@
-"""Plots of runs: histories with ±, books, spectra, stress over distance, load steps and frequencies, one or overlaid.
+"""Plots of one or several runs: histories with ±, balances, spectra, stress over distance, load steps, frequencies.
 
-`kinds` says what there is to draw of a record, `draw` draws it as a figure, `plot` writes that of some folders.
+`kinds` lists the plots of a record, `draw` makes a figure of records, and `plot` writes a figure of result folders.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from .sheet import Ink, sheet
 ENDINGS = ("png", "svg", "pdf")
 """Formats of plots."""
 LETTERS_STAY: dict[Any, Any] = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg.hashsalt": "refweb"}
-"""Settings that keep text as text in vector files, and give their elements the same names each time."""
+"""Settings for vector files: text stays text, and elements have the same names in each run."""
 BESIDE: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata of a file, by format: no dates, so that equal plots are equal files."""
 SPECTRUM, DISTANCE = "spectrum:", "-distance"
 
 
 def kinds(record):
-    """Plots that a record has: names that `draw` takes, and a line on each, the most useful first.
+    """Plots of a record: names for `draw` with a description each, the most useful first.
 
-    Besides these any column of its table can be drawn, and ``spectrum:`` before one of a dynamic run.
+    `draw` also takes any column of the history, and for a dynamic run ``spectrum:`` before a column.
     """
     refuse_spoilt(record)
     run = Shown(record, "", Ink.of(0))
@@ -54,7 +54,7 @@ def kinds(record):
 
 
 def usual(record):
-    """Names of what is drawn of a record where nothing is asked for."""
+    """Names of the plots that are drawn by default."""
     run = Shown(record, "", Ink.of(0))
     if record.kind == "modes":
         return ["frequencies"]
@@ -64,7 +64,7 @@ def usual(record):
 
 
 def draw(records, what=None, title=None, against=None):
-    """Draw some of the `kinds` of one record, or of several over each other.
+    """Draw some of the `kinds` of one record, or of several records in the same panels.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ def draw(records, what=None, title=None, against=None):
         Runs of one kind.
     what : str or sequence of str, optional
         Names of `kinds`, or of columns of their tables; by default observables and the energy balance, in statics the
-        results over load steps, of one load step stress over distance, of modes their frequencies. A spectrum alone is
-        that of the first observable, a field of lines alone that over distance.
+        results over load steps, of one load step stress over distance, of modes their frequencies. ``spectrum`` is that
+        of the first observable, and a field of lines is drawn over distance.
     title : str, optional
         Title above the plot; by default the titles of the scenes, with the status of runs that are not solved.
     against : str, optional
@@ -82,18 +82,18 @@ def draw(records, what=None, title=None, against=None):
     Returns
     -------
     matplotlib.figure.Figure
-        Panels one below the other; a notebook shows it.
+        Panels one below the other; a notebook shows the figure.
 
     Raises
     ------
     InputError
-        For a name that no record has, with the nearest; records of several kinds, or without rows.
+        For a name that no record has, with the nearest known name; for records of several kinds, and without rows.
     """
     return _drawn([records] if isinstance(records, Record) else list(records), what, title, against)[0]
 
 
 def _drawn(records, what, title=None, against=None):
-    """The figure of some records, and which of them lack what, in words."""
+    """The figure of some records, and a text on missing data of records."""
     runs, notes = _beside(records)
     panels, missing, asked = [], {}, {}
     if against is not None and what is None:
@@ -113,7 +113,7 @@ def _drawn(records, what, title=None, against=None):
 
 
 def _asked(runs, what):
-    """Names of what is to be drawn, as they were typed; the usual ones where there are none."""
+    """Names of the plots to draw as given, or the default ones."""
     several = isinstance(what, Iterable) and not isinstance(what, str)
     names = _usual_of_all(runs) if what is None else list(what) if several else [what]
     for name in names:
@@ -123,12 +123,12 @@ def _asked(runs, what):
 
 
 def _known(runs):
-    """Names of all that can be drawn of some records, and of the columns of their tables."""
+    """All names that can be drawn of some records, with the columns of their histories."""
     return dict.fromkeys(name for s in runs for name in (*kinds(s.record), *s.units))
 
 
 def _refuse(runs, name, typed, against=None):
-    """Say why there is nothing to draw of a name that stands for nothing here."""
+    """Raise an `InputError` for a name that cannot be drawn, with the reason."""
     if against is not None:
         columns = dict.fromkeys(column for s in runs for column in s.units)
         key, missing = ("quantity", typed) if against in columns else ("against", against)
@@ -143,7 +143,7 @@ def _refuse(runs, name, typed, against=None):
 
 
 def _meant(runs, name):
-    """Full meaning of a name: a spectrum is of the first observable there is, a field is over distance."""
+    """Full name: ``spectrum`` becomes that of the first observable, and a field that over distance."""
     if any(name in s.units for s in runs):
         return name
     if name == "spectrum":
@@ -152,13 +152,13 @@ def _meant(runs, name):
 
 
 def _usual_of_all(runs):
-    """Names of what is drawn of several records where nothing is asked for: what two have at least, else all."""
+    """Names of the default plots of several records: those of two records at least, else all."""
     names = [name for s in runs for name in usual(s.record)]
     return [name for name in names if names.count(name) > 1] or names
 
 
 def _beside(records):
-    """Records as they are drawn beside others, and what is to be said of them."""
+    """Records with names and styles for one plot, and remarks on them."""
     if not records:
         raise InputError("there is nothing to plot: name a result folder")
     for record in records:
@@ -177,7 +177,7 @@ def _beside(records):
 
 
 def _remark(s):
-    """Remark below a run that is not solved: its message, and its status where other runs are drawn."""
+    """Remark on a run that is not solved: its message, and its status among several runs."""
     message = str(s.record.summary.get("message") or "")[:200] if s.record.ending else ""
     return s.said(": ".join(filter(None, [s.record.ending if s.name else "", message])))
 
@@ -190,14 +190,14 @@ def _title(runs):
 
 
 def _has(s, name):
-    """Tell if a record has the data that a name stands for."""
+    """Tell if a record has the data of a name."""
     if name.startswith(SPECTRUM) and name not in s.units:
         return s.record.kind == "dynamic" and name.removeprefix(SPECTRUM) in list(s.units)[1:]
     return name in s.units or (name in kinds(s.record) and name != "spectrum")
 
 
 def _panels(runs, name):
-    """Panels of what a name stands for: columns before all else."""
+    """Panels of a name: columns have priority."""
     kind = runs[0].record.kind
     if any(name in s.units for s in runs):
         if kind == "dynamic":
@@ -213,14 +213,14 @@ def _panels(runs, name):
 
 
 class Plotted(NamedTuple):
-    """The file that holds a plot, and which folders lack what was asked for, in words."""
+    """The file of a plot, and a text on missing data of folders."""
 
     path: Path
     lacking: tuple[str, ...]
 
 
 def plot(folders, quantity=None, out=None, against=None):
-    """Draw result folders over each other, and write the figure.
+    """Draw result folders in the same panels, and write the figure.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def plot(folders, quantity=None, out=None, against=None):
     Raises
     ------
     InputError
-        As for `draw`, for what is no result folder, and a place or format that cannot be written.
+        As for `draw`; also for a folder without results, and a file or format that cannot be written.
     """
     folders = [Path(folder) for folder in folders]
     records = [of_folder(folder, with_frames=False) for folder in folders]

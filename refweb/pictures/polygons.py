@@ -1,4 +1,4 @@
-"""Tubes, balls and surfaces as depth-sorted polygons of matplotlib, where OpenGL is not to be had."""
+"""Tubes, balls and surfaces as depth-sorted polygons of matplotlib, for machines without OpenGL."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from .model import Balls, Surface
 
 PIECES = 3000
-"""Long lines, and large triangles, are cut for depth sorting while there are fewer."""
+"""Number of polygons up to which long lines and large triangles are cut for depth sorting."""
 
 
 def flat_images(model, views, sizes):
@@ -76,7 +76,7 @@ def _flat_surface(part, view):
 
 
 def _flat_tubes(part, view, pixel):
-    """A dark and, on it, a narrower bright strip for each straight piece of each line."""
+    """A dark strip with a narrower bright strip on it, for each straight piece of each line."""
     ends = np.stack([part.paths[:, :-1], part.paths[:, 1:]], axis=2).reshape(-1, 2, 1, 3)
     cuts = np.linspace(0, 1, 1 + int(np.clip(PIECES / max(len(ends), 1), 1, 16)))[:, None]
     points = ends[:, 0] + cuts * (ends[:, 1] - ends[:, 0])

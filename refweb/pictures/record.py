@@ -1,4 +1,4 @@
-"""Records, what pictures, plots and pages show of a run: its summary, history and frames, of a folder or of memory."""
+"""Records: summary, history and frames of a run, from a folder or memory, for pictures, plots and pages."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import tomllib
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,17 +19,17 @@ from ..results.units import readable
 from .frames import Frame, frame_of, listed, number_of, read
 
 CLOCKS = {"modes": "mode {:g}", "static": "step {:g}", "dynamic": "t = {:.6g} s"}
-"""How the time of a frame reads, by kind of run."""
+"""Format of the time of a frame, by kind of run."""
 
 OTHERS = {
     "cost": "its diagram is cost.png there, by refweb cost",
     "sweep": "its plots are there already, by refweb sweep, one a result; refweb report writes its page",
 }
-"""Remedies for folders that hold something else."""
+"""Remedies for result folders of other kinds."""
 
 
 FRAMES_KEPT = 64
-"""Frames that are held in memory: a film and a page look at each more than once."""
+"""Number of frames kept in memory, since a film and a page use each more than once."""
 
 
 class Record(NamedTuple):
@@ -38,28 +38,28 @@ class Record(NamedTuple):
     Attributes
     ----------
     name : str
-        Name that distinguishes it from others: that of its folder, in memory the title of its scene.
+        Name among other records: that of its folder, in memory the title of its scene.
     kind : {"static", "dynamic", "modes"}
         Kind of the run.
     summary : dict
-        The content of ``run.json``; empty where a folder has none.
+        The content of ``run.json``; empty if a folder has none.
     scene : dict
-        The tables of its scene file; empty where there is none.
+        The tables of its scene file; empty if there is none.
     times : dict of int to float
         Times of its frames [s] by number, ascending; in statics load steps, of modes their numbers.
     frame : callable
-        Gives the `Frame` of a number.
+        Returns the `Frame` of a number.
     table : callable
-        Gives (names of columns with units, history by name), read once.
+        Returns the names of columns with units, and the history by name, which is read once.
     """
 
     name: str
     kind: str
-    summary: dict
-    scene: dict
-    times: dict
+    summary: dict[str, Any]
+    scene: dict[str, Any]
+    times: dict[int, float]
     frame: Callable[[int], Frame]
-    table: Callable[[], tuple]
+    table: Callable[[], tuple[Any, ...]]
 
     @property
     def title(self):
@@ -73,19 +73,19 @@ class Record(NamedTuple):
 
     @property
     def ending(self):
-        """End of a run that is not solved, in words; empty for one that is."""
+        """Text on the end of a run that is not solved; empty for a solved run."""
         return {"solved": "", "running": "run not ended"}.get(self.status, f"run {self.status}")
 
     def refuse_others(self, drawn):
-        """Refuse what holds neither a run nor modes; ``drawn`` is what is made of these, such as "plots"."""
+        """Refuse a record of neither a run nor modes; ``drawn`` names the output, such as "plots"."""
         if (kind := self.summary.get("kind")) not in (None, "modes"):
             words = OTHERS.get(kind, f"{drawn} are of runs and of modes")
             raise InputError(f"{self.name}: holds {short(str(kind))}, not a run: {words}")
 
     def clock(self, number, decimals=None):
-        """Time of a frame, in words: its time or load step, of a mode its number and frequency with ±.
+        """Text of the time of a frame: time, load step, or number and frequency of a mode with ±.
 
-        ``decimals`` of a time are six digits less those before the point, or as many as are asked for.
+        Without ``decimals`` a time has six digits.
         """
         text = CLOCKS.get(self.kind, CLOCKS["dynamic"]).format(self.times[number])
         if self.kind == "dynamic" and decimals is not None and decimals <= 6:
@@ -103,13 +103,13 @@ class Record(NamedTuple):
         frame : int, optional
             Its number; −1 is the last.
         time : float, optional
-            The frame nearest a time [s], in statics a load step, is taken. Without either it is that nearest the
-            largest value of the first observable; of modes the first, and where no result has a time the last.
+            The frame nearest a time [s], in statics a load step, is taken. Default: the frame nearest the time of the
+            largest value of the first observable; for modes the first, and without such a time the last.
 
         Raises
         ------
         InputError
-            Where there are no frames, or not this one: names the nearest.
+            If there are no frames, or not this one, with the nearest.
         """
         if frame is not None and time is not None:
             raise InputError(f"frame = {frame} and time = {time:g} exclude each other: leave one out")
@@ -130,7 +130,7 @@ class Record(NamedTuple):
         return self.summary.get("steps") or []
 
     def _time_of_the_largest(self):
-        """Time, or load step, of the largest value of the first observable; None where there is none."""
+        """Time, or load step, of the largest value of the first observable; None if there is none."""
         if self.kind == "modes":
             return next(iter(self.times.values()))
         if self.kind == "static":
@@ -153,7 +153,8 @@ def of_folder(folder, with_frames=True):
     Raises
     ------
     InputError
-        Where it is no result folder, or lists no frames; its ``frame`` and ``table`` where they cannot be read.
+        If the folder is no result folder or lists no frames. ``frame`` and ``table`` raise it if their files cannot be
+        read.
     """
     folder = Path(folder)
     summary = read_summary(folder) or {}
@@ -173,7 +174,7 @@ def of_folder(folder, with_frames=True):
 
 
 def _listed(folder, with_frames):
-    """The frames of a folder by number; none of a run that has a summary and no frames, where that may be."""
+    """The frames of a folder by number; empty for a run without frames, if that is allowed."""
     try:
         return listed(folder)
     except InputError:
@@ -183,7 +184,7 @@ def _listed(folder, with_frames):
 
 
 def of_solution(solution, with_frames=True):
-    """The record of a `refweb.results.solution.SolutionData`, of its folder where it holds no frames in memory."""
+    """The record of a `refweb.results.solution.SolutionData`, from its folder if it has no frames in memory."""
     summary = solution.summary()
     states = {number: (state, None) for number, state in solution.frames}
     if summary.get("kind") == "modes" and solution.table is not None and solution.spectra:

@@ -1,10 +1,9 @@
-"""Tubes, balls and surfaces seen through cameras, as images by pyvista off screen.
+"""Images of models by pyvista off screen, in a child process; input are models, views and sizes.
 
-VTK 9.7, which pyvista draws by, needs libEGL, libOSMesa or a display. Where a server has none of them it ends the
-process by a segmentation fault, with each kind of window. A `Renderer` therefore renders in a child process, see
-`refweb.pictures.opengl`, which it keeps for all frames of a film, tries each kind of off-screen window in turn and
-gives None if none works; `refweb.pictures.polygons` then draws the same model through the same
-`refweb.pictures.camera.View`.
+VTK 9.7, the library below pyvista, needs libEGL, libOSMesa or a display. On a server without any of them it ends the
+process with a segmentation fault. A `Renderer` therefore renders in a child process, see `refweb.pictures.opengl`,
+which it keeps for all frames of a film. It tries each kind of off-screen window in turn and returns None if none works.
+`refweb.pictures.polygons` then draws the same model with the same `refweb.pictures.camera.View`.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from typing import Any
 from .model import FINE
 
 SECONDS_PER_FRAME = 120.0
-"""Longest that a child may take for an image, the first of which starts it [s]."""
+"""Longest time of a child for an image, with its start [s]."""
 
 
 def windows():
-    """Kinds of window to try, as (VTK class or None for its default, whether it may use the display)."""
+    """Kinds of window to try: VTK class, or None for the default, and True if it may use the display."""
     if not sys.platform.startswith("linux"):
         return [(None, True)]
     display = [("vtkXOpenGLRenderWindow", True)] if os.environ.get("DISPLAY") else []
@@ -61,7 +60,7 @@ class Renderer:
     views, sizes
         As for `images`.
     sides : int
-        Of a tube.
+        Sides of a tube.
     """
 
     def __init__(self, views, sizes, sides=FINE):
@@ -83,7 +82,7 @@ class Renderer:
 
         while self._child is not None or self._kinds:
             if self._child is None:
-                self._start(*self._kinds.pop(0))
+                self._child = self._start(*self._kinds.pop(0))
             try:
                 return self._child.submit(images, model).result(SECONDS_PER_FRAME)
             except (OSError, BrokenExecutor, TimeoutError) as error:
@@ -93,7 +92,7 @@ class Renderer:
         return None
 
     def _start(self, window, display):
-        """Start a child."""
+        """Start a child, an executor of one process."""
         from loky import ProcessPoolExecutor
 
         from .opengl import open_off_screen
@@ -101,7 +100,7 @@ class Renderer:
         environment = {} if display else {"DISPLAY": "", "WAYLAND_DISPLAY": ""}
         if window:
             environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
-        self._child = ProcessPoolExecutor(1, initializer=open_off_screen, initargs=self._job, env=environment)
+        return ProcessPoolExecutor(1, initializer=open_off_screen, initargs=self._job, env=environment)
 
     def _end(self):
         if self._child is not None:

@@ -1,40 +1,40 @@
-"""Sheets: panels of a plot one below the other, their inks, units and letters, legible on a phone as well."""
+"""Sheets: layout of the panels of a plot one below the other, styles, labels and fonts, readable on a phone."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 WIDTH, RESOLUTION = 6.4, 150
 """Width of a sheet [inch] and pixels in an inch."""
 LETTERS = 11
-"""Size of letters [pt]."""
+"""Font sizes [pt]."""
 TALL, LOW = 2.3, 1.6
 """Heights of panels [inch]."""
 DARK, PALE, GRID = "#222222", "#888888", "#dddddd"
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
-"""Colours that colour-blind people tell apart, by Okabe and Ito (2008)."""
+"""Colours that colour-blind people distinguish, by Okabe and Ito (2008)."""
 STYLES = ("-", "--", "-.", ":", (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 2)), (0, (9, 2, 2, 2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 NARROWEST = 1e-3
-"""Least height of a panel over the largest value on its axis: below it ticks would need too many digits."""
+"""Least range of an axis over its largest value; for smaller ranges ticks would need too many digits."""
 MOST = 1000
-"""Parts of a long history whose extremes are drawn: about one for each pixel."""
+"""Number of parts of a long history whose extremes are drawn, about one for each pixel."""
 
 
 class Ink(NamedTuple):
     """Style of one of several curves: colour, style of lines, marker."""
 
     colour: str
-    style: str | tuple
+    style: str | tuple[Any, ...]
     marker: str
 
     @classmethod
     def of(cls, number):
-        """Style of a number from 0 on: beyond the colours, these with another style and marker."""
+        """Style number n, from 0 on; after the last colour the colours repeat with another line and marker."""
         again, colour = divmod(number, len(COLOURS))
         return cls(COLOURS[colour], STYLES[(colour + again) % len(STYLES)], MARKERS[(colour + again) % len(MARKERS)])
 
@@ -54,14 +54,14 @@ class Panel(NamedTuple):
         Notes below the sheet, each once.
     """
 
-    draw: Callable
+    draw: Callable[..., Any]
     along: str
     height: float = TALL
     notes: tuple[str, ...] = ()
 
 
 def sheet(panels, title, notes=()):
-    """The `matplotlib.figure.Figure` of some panels, with a title and, below them, what else is to be known."""
+    """The `matplotlib.figure.Figure` of some panels, with a title above and notes below."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -92,7 +92,7 @@ def sheet(panels, title, notes=()):
 
 
 def true_ticks(axes):
-    """Let ticks show values as they are: no offset and no power of ten beside the axis, in a window wide enough."""
+    """Let ticks show full values, without offset or power of ten, in a wide enough range."""
     from matplotlib.ticker import ScalarFormatter
 
     if axes.get_yscale() == "linear":
@@ -107,7 +107,7 @@ def true_ticks(axes):
 
 
 def legend(axes, entries, columns=1):
-    """Name what is drawn above the axes, where it covers nothing; ``entries`` are (handle, words)."""
+    """Draw a legend above the axes; ``entries`` are pairs of handle and text."""
     if entries:
         handles, words = zip(*entries, strict=True)
         style = {
@@ -125,19 +125,19 @@ def legend(axes, entries, columns=1):
 
 
 def label(axes, name, unit=""):
-    """Name the vertical axis, with its unit."""
+    """Label the vertical axis with its unit."""
     axes.set_ylabel(f"{name} [{unit}]" if unit else name, size=LETTERS, color=DARK, parse_math=False)
 
 
 def dot(rows):
-    """The marker of a line through some rows: a dot where there is one row, of which a line shows nothing."""
+    """The marker of a line through some rows: a dot for a single row, else none."""
     return "." if len(rows) == 1 else ""
 
 
 def telling(*columns, limit=MOST):
-    """Numbers of the rows that a drawing of long columns needs: extremes of each column in each of ``limit`` parts.
+    """Numbers of the rows to draw of long columns: extremes of each column in each of ``limit`` parts.
 
-    All rows of columns that are short; the first and the last row in any case.
+    These are all rows of short columns, and the first and last row in any case.
     """
     rows = len(columns[0])
     if rows <= 4 * limit:

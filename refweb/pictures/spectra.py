@@ -1,4 +1,4 @@
-"""Spectra of histories: amplitudes by frequency, of rows that are equally far apart."""
+"""Spectra of histories with equal intervals: amplitude over frequency."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from .plot_data import unit_of
 from .sheet import DARK, Panel, label, legend, telling
 
 FEWEST = 32
-"""Number of rows below which a spectrum tells nothing: it would have a dozen frequencies."""
+"""Least number of rows; with fewer a spectrum would have a dozen frequencies."""
 EVEN = 1e-6
-"""Share of the interval by which rows may be off."""
+"""Largest deviation of the time of a row, over the interval."""
 WIDTH_OF_A_LINE = 2.0
-"""Resolution of the window over 1/duration: two equal sines that are farther apart are two peaks."""
+"""Resolution of the window over 1/duration: two equal sines farther apart make two peaks."""
 STANDS_OUT = 2.0
-"""Factor by which a peak is above the valleys on both of its sides."""
+"""Ratio of a peak to the minima on both sides above which it stands out."""
 DECADES = 5
-"""Powers of ten below the largest amplitude that are drawn."""
+"""Number of decades below the largest amplitude that are drawn."""
 
 
 class Spectrum(NamedTuple):
@@ -29,14 +29,14 @@ class Spectrum(NamedTuple):
     Attributes
     ----------
     frequency : ndarray
-        From 0 on to half the number of rows in a second [Hz].
+        Frequencies from 0 to half the number of rows in a second [Hz].
     amplitude : ndarray
-        Of a sine of that frequency [unit of the history].
+        Amplitude of a sine of that frequency [unit of the history].
     resolution : float
-        How far apart two frequencies have to be to be told apart [Hz].
+        Least distance of two frequencies that are resolved [Hz].
     peak : int, optional
-        Number of the highest peak at or above the resolution that stands out by `STANDS_OUT` from the valleys on both
-        sides; None where there is none, as in a history that only grows.
+        Index of the highest peak at or above the resolution that stands out by `STANDS_OUT` from the minima on both
+        sides; None if there is none, as in a history that only grows.
     """
 
     frequency: np.ndarray
@@ -51,7 +51,7 @@ def spectrum_of(time, values, name="history"):
     Parameters
     ----------
     time : ndarray, shape (rows,)
-        Times [s]. The last row, that of the end or of an event, may be nearer than the others and is left out then.
+        Times [s]. The last row, at the end or at an event, may have a shorter interval and is then left out.
     values : ndarray, shape (rows,)
         Values at these times.
     name : str
@@ -60,7 +60,7 @@ def spectrum_of(time, values, name="history"):
     Raises
     ------
     InputError
-        For fewer than `FEWEST` rows, rows that are not equally far apart, and values that are not finite.
+        For fewer than `FEWEST` rows, unequal intervals, and values that are not finite.
     """
     if len(time) > 2 and time[-1] - time[-2] < (1.0 - EVEN) * (time[1] - time[0]):
         time, values = time[:-1], values[:-1]
@@ -86,7 +86,7 @@ def spectrum_of(time, values, name="history"):
 
 
 def _stands_out(amplitude, number):
-    """Tell if both valleys between a peak and higher values are low; frequency 0 is none, as the mean is left out."""
+    """Tell if both minima between a peak and higher values are low; frequency 0 does not count, without the mean."""
     height = amplitude[number]
     for side in (amplitude[number - 1 : 0 : -1], amplitude[number + 1 :]):
         higher = np.flatnonzero(side > height)
@@ -127,7 +127,7 @@ def spectrum(runs, name):
 
 
 def _peak(spectrum_, unit):
-    """The peak of a spectrum in words, and where it is highest if that is elsewhere."""
+    """Text on the peak of a spectrum, and on its largest amplitude if that is at another frequency."""
     if spectrum_.peak is None:
         return "no peak stands out"
     error = 0.5 * spectrum_.resolution
@@ -137,7 +137,7 @@ def _peak(spectrum_, unit):
 
 
 def _near(spectrum_, number, unit, error):
-    """A frequency with ± and its amplitude, in words."""
+    """Text of a frequency with ± and its amplitude."""
     height = float(spectrum_.amplitude[number])
     factor, name = scale_of(height, unit)
     return f"{with_error(float(spectrum_.frequency[number]), error)} Hz: {height / factor:.3g} {name}".rstrip()

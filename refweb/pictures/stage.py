@@ -1,10 +1,10 @@
-"""The stage of a picture: what all pages of a film share, and how a frame is drawn and labelled on it."""
+"""The stage of a picture: the common parts of all pages of a film, and the drawing and labels of a frame."""
 
 from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,16 +18,16 @@ BODIES = ((0.45, 0.55, 0.68), (0.70, 0.55, 0.45), (0.55, 0.62, 0.50))
 TWO = {"taut": (0.11, 0.37, 0.55), "slack": (0.90, 0.62, 0.10)}
 """Colours of the field ``slack``."""
 BROKEN, THIN = (0.86, 0.36, 0.30), 0.4
-"""Colour of broken lines, which are drawn straight between their ends, and their radius over that of others."""
+"""Colour of broken lines, which are drawn straight between their ends, and their relative radius."""
 GREY_WHERE_SLACK = ("tension", "stress", "strain")
 UNITS = {"tension": "N", "reaction": "N", "stress": "Pa", "natural_length": "m", "displacement": "m"}
 UNITS |= {"velocity": "m/s", "mass": "kg"}
 LARGEST = "largest_"
 """Prefix of the names of fields over all frames."""
 MASSES, MASS_RADIUS, MASS_SIZES = (0.55, 0.16, 0.42), 5.0, 6
-"""Colour of point masses, the radius of the largest over that of lines, and the number of their sizes."""
+"""Colour of point masses, radius of the largest over that of lines, and number of sizes."""
 MOST_UNDEFORMED = 20_000
-"""Undeformed lines that are drawn as lines of matplotlib; more are first looked at, and marked pixel by pixel."""
+"""Largest number of undeformed lines drawn by matplotlib; more lines are drawn as pixels."""
 
 
 class Look(NamedTuple):
@@ -42,15 +42,15 @@ class Look(NamedTuple):
     scale : float
         Factor on displacements.
     view : str, ndarray of shape (3,) or None
-        The only view; None for those that show the web best.
+        The only view; None for the best views.
     remark : str
-        Words on the field, which stand beside the time.
+        Remark on the field beside the time.
     missed : bool
-        True if the largest value of the run is above the range, since no frame has it.
+        True if the largest value of the run is above the range, since it is between frames.
     """
 
     field: str
-    limits: tuple
+    limits: tuple[Any, ...]
     scale: float = 1.0
     view: object = None
     remark: str = ""
@@ -77,14 +77,14 @@ class Seen(NamedTuple):
     broken : bool
         True if a line is broken.
     lower, upper : float
-        Values of lines that are not [SI].
+        Least and largest value of lines that are not drawn as slack [SI].
     masses : tuple
-        Least and largest point mass [kg]; empty where there is none.
+        Least and largest point mass [kg]; empty if there is none.
     """
 
     points: np.ndarray
     supports: np.ndarray
-    bodies: dict
+    bodies: dict[str, Any]
     origin: np.ndarray
     moved: float
     tree: bool
@@ -92,7 +92,7 @@ class Seen(NamedTuple):
     broken: bool
     lower: float
     upper: float
-    masses: tuple = ()
+    masses: tuple[Any, ...] = ()
 
     @classmethod
     def of(cls, frame, field):
@@ -124,12 +124,12 @@ class Seen(NamedTuple):
         )
 
     def spanned(self):
-        """The same with only those points that span the others, to two hundredths of their extent."""
+        """The same limits by fewer points, which span the others to two hundredths of their extent."""
         bodies = {name: outermost(points) for name, points in self.bodies.items()}
         return self._replace(points=outermost(self.points), supports=outermost(self.supports), bodies=bodies)
 
     def joined(self, second):
-        """Limits of both together."""
+        """Limits of two together."""
         bodies = {
             name: np.concatenate([*(limits.bodies[name] for limits in (self, second) if name in limits.bodies)])
             for name in {**self.bodies, **second.bodies}
@@ -151,13 +151,12 @@ class Stage:
     """Common parts of all pages.
 
     Drawing `options`; the `views` and their `rectangles`; the `radius` of lines; the undeformed lines `origin`, shape
-    (lines, points, 3), empty where nothing has moved; the `middle` of the web, shape (3,) [m]; the `limits` of all
-    frames.
+    (lines, points, 3), empty if nothing has moved; the `middle` of the web, shape (3,) [m]; the `limits` of all frames.
     """
 
     options: Look
-    views: list
-    rectangles: list
+    views: list[Any]
+    rectangles: list[Any]
     radius: float
     origin: np.ndarray
     middle: np.ndarray
@@ -165,7 +164,7 @@ class Stage:
 
     @classmethod
     def of(cls, limits, options, aspect):
-        """The stage that shows what has been seen, on a page of this width/height."""
+        """The stage for some limits, on a page of a given width/height."""
         solid = np.concatenate([np.zeros((0, 3)), *limits.bodies.values()])
         origin = limits.origin
         some = origin[:: 1 + len(origin) // MANY].reshape(-1, 3)
@@ -179,11 +178,11 @@ class Stage:
 
     @property
     def beneath(self):
-        """True if the undeformed web lies below the web: seen from above it would cover it."""
+        """True if the undeformed web is drawn below the web, which it would cover in a view from above."""
         return self.options.view is not None
 
     def pixels(self, size):
-        """(width, height) of each view on a page of this size [pixel]."""
+        """Width and height of each view on a page of some size [pixel]."""
         return [tuple(round(r * s) for r, s in zip(rect[2:], size, strict=True)) for rect in self.rectangles]
 
     def model(self, frame):
@@ -206,14 +205,14 @@ class Stage:
         return model
 
     def _dots(self, masses):
-        """Balls on the nodes that have point masses, whose volumes are as these, to `MASS_SIZES` sizes."""
+        """Balls on nodes with point masses, with volumes in proportion to mass, in `MASS_SIZES` sizes."""
         shares = np.cbrt(masses.mass / masses.mass.max())
         sizes = np.ceil(MASS_SIZES * shares - 1e-9) / MASS_SIZES
         radius = MASS_RADIUS * self.radius
         return [Balls(masses.points[sizes == size], MASSES, float(size) * radius) for size in np.unique(sizes)]
 
     def annotate(self, axes, view):
-        """Metres along the axes of a parallel view, and the undeformed web; a triad of known length in perspective."""
+        """Label the axes of a parallel view in metres, and draw the undeformed web; in perspective draw a triad."""
         from matplotlib.collections import LineCollection
 
         if view.perspective:
@@ -235,7 +234,7 @@ class Stage:
         axes.set_ylabel(f"{_axis_name(view.axes[1])} [m]", size=13, color=DARK)
 
     def legend(self, figure):
-        """Colour bar, and names for what is drawn and not on it."""
+        """Draw the colour bar, and a legend of slack and broken lines, bodies and masses."""
         from matplotlib.lines import Line2D
 
         parallel = [view for view in self.views if not view.perspective]
@@ -287,9 +286,9 @@ class Stage:
 
 
 def distinct_lines(lines):
-    """Those of lines on a page, shape (lines, points, 2), that lie beside each other, to a few thousandths of it.
+    """The lines on a page, shape (lines, points, 2), that differ by more than a few thousandths of its size.
 
-    A flat web from its side is a single line, on which a million lie.
+    A million lines of a flat web seen from its side make a single line.
     """
     if len(lines) <= MOST_UNDEFORMED:
         return lines
@@ -300,7 +299,7 @@ def distinct_lines(lines):
 
 
 def marked_pixels(lines, extent, width, height):
-    """An image, RGBA, shape (height, width, 4), of lines on a page, shape (lines, points, 2): the pixels they meet."""
+    """An image, RGBA, shape (height, width, 4), of the pixels of lines on a page, shape (lines, points, 2)."""
     from matplotlib.colors import to_rgb
 
     left, right, bottom, top = extent
@@ -325,7 +324,7 @@ def _grey(frame, field):
 
 
 def _triad(axes, view, corner, length):
-    """Arrows along x, y and z from a corner [m], as long as the note below them says [m]."""
+    """Arrows along x, y and z from a corner [m], and their length [m]."""
     for arm, name in zip(length * np.eye(3), "xyz", strict=True):
         start, end, tip = view.project(np.array([corner, corner + arm, corner + 1.2 * arm]))[0]
         axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": DARK, "lw": 1.4, "shrinkA": 0})
@@ -343,9 +342,9 @@ def colour_map():
 
 
 def limits_of(record, field, numbers):
-    """Range of a field [SI] in frames of a record: that of lines that are not grey, from 0 where this wastes no half.
+    """Range of a field [SI] in the frames of a record without slack lines; from 0 if that wastes less than half.
 
-    Frames that cannot be read, as those that a run has left half-written, have no part in it.
+    Frames that cannot be read are left out.
     """
     low, high = np.inf, -np.inf
     for number in numbers:
@@ -360,7 +359,7 @@ def limits_of(record, field, numbers):
 
 
 def scaled_unit(field, largest):
-    """Factor and unit that make the largest value [SI] a number of one to three digits."""
+    """Factor and unit in which the largest value [SI] has one to three digits before the point."""
     field = field.removeprefix(LARGEST)
     unit = UNITS.get(field, "")
     if field == "strain":

@@ -1,11 +1,11 @@
-"""Plots of a study: each result over what varies, with ± and chances, one figure a result."""
+"""Plots of a study: one figure for each result, over the varying parameters, with ± and probabilities."""
 
 from __future__ import annotations
 
 import math
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from .plots import write
 from .sheet import DARK, PALE, Ink, Panel, label, legend, sheet
 
 MOST_PANELS = 6
-"""Largest number of parameters that a result is drawn over."""
+"""Largest number of parameters over which a result is drawn."""
 MOST_GROUPS = 8
-"""Largest number of groups that are told apart by their ink."""
+"""Largest number of groups with a style each."""
 
 
 class Rows(NamedTuple):
@@ -37,9 +37,9 @@ class Rows(NamedTuple):
         Names of columns.
     """
 
-    summary: dict
-    rows: list
-    columns: list
+    summary: dict[str, Any]
+    rows: list[Any]
+    columns: list[Any]
 
     @property
     def results(self):
@@ -48,7 +48,7 @@ class Rows(NamedTuple):
 
     @property
     def groups(self):
-        """(Words, rows) of each combination of what is no number."""
+        """Text and rows of each combination of parameters that are no numbers."""
         named = [path for path, values in self.summary["study"]["parameters"].items() if _is_named(values)]
         groups_found = {}
         for row in self.rows:
@@ -58,7 +58,7 @@ class Rows(NamedTuple):
 
 
 def _is_named(values):
-    """Tell if a parameter is a list of several items that are no numbers."""
+    """Tell if a parameter has several values that are no numbers."""
     return isinstance(values, list) and len(values) > 1 and not all(isinstance(v, int | float) for v in values)
 
 
@@ -67,7 +67,7 @@ def _word(value):
 
 
 def of_folder(folder):
-    """The `Rows` of the folder of a study; refuses one that holds none."""
+    """The `Rows` of the folder of a study; refuse a folder without study."""
     folder = Path(folder)
     summary = read_summary(folder)
     if summary is None or summary.get("kind") != "sweep":
@@ -78,7 +78,7 @@ def of_folder(folder):
 
 
 def draw(study, result):
-    """A result of a study over each number that varies, and of samples the share of cases below a value.
+    """Draw a result of a study over each varying number, and for samples its cumulative distribution.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def _is_number(values):
 
 
 def _inked(study):
-    """(Words, rows, `Ink`) of each group, as many as can be told apart."""
+    """Text, rows and `Ink` of each group, up to the largest number of styles."""
     return [(words, rows, Ink.of(n)) for n, (words, rows) in enumerate(study.groups[:MOST_GROUPS])]
 
 
@@ -138,7 +138,7 @@ def _over(study, result, column, path, factor, unit):
 
 
 def _shares(study, result, column, factor, unit):
-    """The panel of the share of cases below a value; its band is what ± leaves."""
+    """The panel of the share of cases below a value, with the band of ±."""
 
     def plot(axes):
         groups = []
@@ -168,7 +168,7 @@ def _bounds(study, result):
 
 
 def _limit(text, name):
-    """The number that a condition compares a result with, where it does no more."""
+    """The limit in a condition that only compares a result with a number."""
     match = re.fullmatch(rf"\s*{re.escape(name)}\s*[<>]=?\s*([-+\d.eE]+)\s*", text)
     try:
         value = float(match[1]) if match else math.nan
@@ -178,7 +178,7 @@ def _limit(text, name):
 
 
 def plot(folder):
-    """Write a plot of each result of a study, ``NAME.png``, into its folder; returns the files."""
+    """Write a plot ``NAME.png`` of each result of a study into its folder; returns the files."""
     folder, study = Path(folder), of_folder(folder)
     written = []
     for result in study.results if study.rows else []:

@@ -1,4 +1,4 @@
-"""A run in a window of pyvista: lines as tubes, slack ones grey, bodies, supports, and a slider over the frames."""
+"""Window of pyvista for a run: lines as tubes, slack lines grey, bodies, supports, and a slider over frames."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .record import of_folder
 from .stage import DARK, TWO, colour_map, scaled_unit
 
 SIZE = (1400, 900)
-"""Of the window [pixel]."""
+"""Size of the window [pixel]."""
 
 
 def window(folder, field=None):
@@ -31,7 +31,7 @@ def window(folder, field=None):
     Raises
     ------
     InputError
-        Where the folder is no result folder or has no such field, and where there is no display.
+        If the folder is no result folder or has no such field, and if there is no display.
     """
     record = of_folder(folder)
     record.chosen()
@@ -45,14 +45,14 @@ def window(folder, field=None):
 
 
 def prepared(record, field=None, off_screen=False):
-    """The plotter of a record, and what shows one of its frames by its place among them.
+    """The plotter of a record, and a function that shows one of its frames.
 
     Returns
     -------
     plotter : pyvista.Plotter
-        It shows the frame of `refweb.pictures.record.Record.chosen`.
+        Plotter with the frame of `refweb.pictures.record.Record.chosen`.
     show : callable
-        Called with the place of a frame.
+        Called with the index of a frame.
     """
     from . import opengl
 
@@ -88,7 +88,7 @@ def prepared(record, field=None, off_screen=False):
 
 
 def _legend(plotter, options):
-    """Colour bar, or the two colours of slackness."""
+    """Draw the colour bar, or the two colours of slackness."""
     import pyvista
 
     field, (low, high) = options.field, options.limits

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from dataclasses import MISSING
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..errors import InputError
 from ..messages import nearest
@@ -45,8 +45,8 @@ class Key(NamedTuple):
 class Listing(NamedTuple):
     """Rows of words below a page's keys."""
 
-    columns: tuple
-    rows: list
+    columns: tuple[Any, ...]
+    rows: list[Any]
 
 
 class Page(NamedTuple):
@@ -75,8 +75,8 @@ class Page(NamedTuple):
     name: str
     header: str
     summary: str
-    prose: list
-    keys: list
+    prose: list[Any]
+    keys: list[Any]
     refused: str
     example: str
     listing: Listing | None = None

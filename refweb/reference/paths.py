@@ -52,7 +52,7 @@ def _read(path, word):
     return word
 
 
-def with_value(given, path, value) -> dict:
+def with_value(given, path, value) -> dict[str, Any]:
     """The dict of a scene file with another value at a path.
 
     Parameters

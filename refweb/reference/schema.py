@@ -33,7 +33,7 @@ def schema():
     }
 
 
-def accepted(f, like=None) -> dict:
+def accepted(f, like=None) -> dict[str, Any]:
     """The schema of what a field accepts; that of anything where its reader says nothing.
 
     ``like`` is the class of tables whose keys are described where a table in the field says nothing of its own.

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -47,8 +47,8 @@ class Probe(NamedTuple):
         forces on bodies; −1 for none.
     """
 
-    kernel: Callable
-    rows: list | np.ndarray
+    kernel: Callable[..., Any]
+    rows: list[Any] | np.ndarray
     data: np.ndarray
     sign: float = 0.0
     average: float = 0.0
@@ -135,7 +135,7 @@ def _size(x, q):
     return x[q] * x[q] + x[q + np.uint64(1)] * x[q + np.uint64(1)] + x[q + np.uint64(2)] * x[q + np.uint64(2)]
 
 
-def plain_of(probe):
+def plain_of(probe: Probe) -> tuple[tuple[int, ...], float]:
     """Quantity of a probe if it is so simple that the loop needs no kernel for it.
 
     Returns

@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..findings import texts
+from ..findings import Finding, texts
 from ..messages import nearest
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
     from ..scene import Scene
 
-SOLVER = dict.fromkeys(
+SOLVER: dict[str, Any] = dict.fromkeys(
     "method factorization nsteps nfev njev nlu residual duality_gap above_lowest smallest_pivot slack_nodes "
     "energy_drift momentum_drift angular_momentum_drift".split()
 )
@@ -24,10 +28,10 @@ OTHER_ERRORS = {"smoothing": "smoothing moves", "discretisation": "discretisatio
 """Errors of a result with separate keys, and the words before them; ± contains the first two."""
 
 
-class Names(dict):
+class Names(dict[str, Any]):
     """A dict whose errors on unknown keys name the nearest key."""
 
-    def __missing__(self, key):
+    def __missing__(self, key: str) -> Any:
         raise KeyError(f"{key!r} is not among them, {nearest(key, self)}")
 
 
@@ -63,7 +67,7 @@ class Result(NamedTuple):
     digits: int | None = None
     proven: bool = False
 
-    def bounded(self, lower, upper):
+    def bounded(self, lower: float, upper: float) -> Result:
         """The result with ± cut to the possible values from ``lower`` to ``upper``."""
         if self.error is None or not np.isfinite(self.error):
             return self
@@ -72,7 +76,7 @@ class Result(NamedTuple):
         cut = (low < lower or high > upper) and lower <= self.value <= upper
         return self._replace(error=error, within=(max(low, lower), min(high, upper)) if cut else None)
 
-    def plain(self):
+    def plain(self) -> dict[str, Any]:
         """Convert to a dict, without errors that were not computed; an infinite end of an interval is None."""
         extra = {key: value for key in OTHER_ERRORS if (value := getattr(self, key)) is not None}
         if self.where is not None:
@@ -88,7 +92,7 @@ class Result(NamedTuple):
         return {key: getattr(self, key) for key in ("value", "error", "unit", "time", "where")} | extra
 
 
-def read_results(given):
+def read_results(given: dict[str, Any]) -> dict[str, Result]:
     """Results by name from their dicts in ``run.json``; raise a `TypeError` for other content."""
     results = {name: Result(**entry) for name, entry in given.items()}
     for name, entry in results.items():
@@ -178,33 +182,35 @@ class SolutionData:
 
     scene: Scene
     state: Any = None
-    table: dict | None = None
+    table: dict[str, NDArray[np.float64]] | None = None
     path: Any = None
-    columns: list = field(default_factory=list)
-    steps: list = field(default_factory=list)
-    solver: dict = field(default_factory=SOLVER.copy)
-    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "compile_s": 0.0, "by_effect": {}})
-    web: dict = field(default_factory=dict)
-    versions: dict = field(default_factory=dict)
+    columns: list[str] = field(default_factory=list)
+    steps: list[dict[str, Any]] = field(default_factory=list)
+    solver: dict[str, Any] = field(default_factory=SOLVER.copy)
+    cost: dict[str, Any] = field(
+        default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "compile_s": 0.0, "by_effect": {}}
+    )
+    web: dict[str, Any] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)
     status: str = "running"
     message: str = ""
-    findings: list = field(default_factory=list)
-    events: list = field(default_factory=list)
-    throw: dict = field(default_factory=dict)
-    breaks: list | None = None
-    broken_before: list = field(default_factory=list)
-    twin_end: tuple | None = None
-    frames: list = field(default_factory=list)
-    reduced: dict = field(default_factory=dict)
-    horizon: dict = field(default_factory=dict)
+    findings: list[Finding] = field(default_factory=list)
+    events: list[dict[str, Any]] = field(default_factory=list)
+    throw: dict[str, Any] = field(default_factory=dict)
+    breaks: list[dict[str, Any]] | None = None
+    broken_before: list[int] = field(default_factory=list)
+    twin_end: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    frames: list[tuple[int, Any]] = field(default_factory=list)
+    reduced: dict[str, Result] = field(default_factory=dict)
+    horizon: dict[str, Any] = field(default_factory=dict)
     divergence: Any = None
-    further: list = field(default_factory=list)
+    further: list[dict[str, Any]] = field(default_factory=list)
     utilisation: Any = None
-    margin: dict | None = None
-    bodies: dict = field(default_factory=dict)
-    pairs: dict = field(default_factory=dict)
-    lines: dict = field(default_factory=dict)
-    passage: dict = field(default_factory=dict)
+    margin: dict[str, Any] | None = None
+    bodies: dict[str, Any] = field(default_factory=dict)
+    pairs: dict[str, Any] = field(default_factory=dict)
+    lines: dict[str, Any] = field(default_factory=dict)
+    passage: dict[str, Any] = field(default_factory=dict)
 
     @property
     def warnings(self) -> list[str]:
@@ -217,7 +223,7 @@ class SolutionData:
         return Names(self.steps[-1]["results"] if self.steps else self.reduced)
 
     @property
-    def history(self) -> dict[str, np.ndarray]:
+    def history(self) -> dict[str, NDArray[np.float64]]:
         """Columns of the history by name, a dict of arrays with one entry per row.
 
         The first column is ``time`` [s], in statics ``step``. Then follow all observables and the energies [J], in
@@ -229,7 +235,7 @@ class SolutionData:
         rows = np.loadtxt(self.path / "history.csv", delimiter=",", skiprows=1, ndmin=2)
         return as_history(self.columns, rows)
 
-    def summary(self):
+    def summary(self) -> dict[str, Any]:
         """The content of ``run.json``, a dict of plain values."""
 
         def plain(results):
@@ -264,7 +270,7 @@ class SolutionData:
         }
 
 
-def as_history(columns, rows):
+def as_history(columns: Sequence[str], rows: Any) -> Names:
     """Rows of numbers as a dict by name; ``columns`` are names with units."""
     names = [column.rsplit(" [", 1)[0] for column in columns]
     table = np.asarray(rows, dtype=float).reshape(len(rows), len(names))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +11,14 @@ from ..compiled.rows import records_of
 from ..effects.base import TOUCH
 from ..findings import Finding
 from .columns import static_energies
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from ..net.net import Net
+    from ..system.system import System
 
 
 class State:
@@ -27,9 +36,13 @@ class State:
         Velocity [m/s], zero by default.
     """
 
-    def __init__(self, system, time, x, v=None):
-        self.system, self.time, self.x = system, time, x
-        self.v = np.zeros_like(x) if v is None else v
+    def __init__(
+        self, system: System, time: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None
+    ) -> None:
+        self.system: System = system
+        self.time: float = time
+        self.x: NDArray[np.float64] = x
+        self.v: NDArray[np.float64] = np.zeros_like(x) if v is None else v
 
     @cached_property
     def _forces(self):
@@ -39,7 +52,7 @@ class State:
         felt = self.system.contact_forces.of(per_cell) if any(f.contact.felt for f in self.system.terms) else None
         return force, per_cell.tension, contact, felt
 
-    def overlap(self, body):
+    def overlap(self, body: Any) -> NDArray[np.float64]:
         """Depth of the deepest contact of each element with a body [m], 0 without contact, shape (cells,)."""
         term, cells = self.system.contact_forces.lines_on(body)
         return self._forces[2][term][cells]
@@ -52,27 +65,27 @@ class State:
         return largest
 
     @cached_property
-    def position(self):
+    def position(self) -> NDArray[np.float64]:
         """Positions [m], shape (rows, 3)."""
         return self.system.net.points + self.x
 
     @cached_property
-    def element_tension(self):
+    def element_tension(self) -> NDArray[np.float64]:
         """Tension of each element [N], shape (cells,)."""
         return self._forces[1]
 
     @cached_property
-    def tension(self):
+    def tension(self) -> NDArray[np.float64]:
         """Tension [N], shape (lines,)."""
         return self._by_line(self.element_tension)
 
     @cached_property
-    def stress(self):
+    def stress(self) -> NDArray[np.float64]:
         """Nominal stress T/A [Pa], shape (lines,)."""
         return self._by_line(self.element_tension / self.system.net.area)
 
     @cached_property
-    def element_strain(self):
+    def element_strain(self) -> NDArray[np.float64]:
         """Strain of each element, the largest over its quadrature points [1], shape (cells,)."""
         from ..effects.elasticity import strains
 
@@ -81,7 +94,7 @@ class State:
         return strain
 
     @cached_property
-    def element_slack(self):
+    def element_slack(self) -> NDArray[np.bool_]:
         """True for each element that is slack all along, as `slack`, shape (cells,); none of form finding is."""
         return (self.element_strain <= self._slack_below) & ~self.system.net.forming
 
@@ -100,26 +113,26 @@ class State:
         return plastic_strain(self.system.at(self.time).net, self.x).max(axis=1)
 
     @cached_property
-    def strain(self):
+    def strain(self) -> NDArray[np.float64]:
         """Engineering strain [1], shape (lines,)."""
         return self._by_line(self.element_strain)
 
     @cached_property
-    def slack(self):
+    def slack(self) -> NDArray[np.bool_]:
         """True for each line whose strain is ≤ ε0 (laws without slackness: ≤ 0), shape (lines,)."""
         return np.bincount(self.system.net.line, ~self.element_slack) == 0.0
 
     @cached_property
-    def slack_nodes(self):
+    def slack_nodes(self) -> NDArray[np.int64]:
         """Free nodes without a taut line or a bar, whose position is not unique."""
         net = self.system.net
-        fixed = self.system.supported.all(axis=1)
+        fixed = np.all(self.system.supported, axis=1)
         fixed[net.web.bare] = True  # by a link
         fixed[net.cells[net.law_is("bar") | ~self.element_slack].ravel()] = True
         return np.flatnonzero(~fixed[: net.nodes])
 
     @cached_property
-    def reaction(self):
+    def reaction(self) -> NDArray[np.float64]:
         """Force of the supports on nodes, and of contact on bodies [N], shape (rows, 3)."""
         force = np.where(self.system.supported, -self.system.balance(self.time, self.x, self.v)[0], 0.0)
         felt = self._forces[3]
@@ -128,7 +141,7 @@ class State:
         return force
 
     @cached_property
-    def utilisation(self):
+    def utilisation(self) -> NDArray[np.float64] | None:
         """Stress over strength, shape (lines,); None if no line has a strength."""
         net = self.system.net
         if not np.isfinite(net.strength).any():
@@ -136,7 +149,7 @@ class State:
         return self._by_line(self.element_tension / (net.area * net.strength))
 
     @cached_property
-    def margin(self):
+    def margin(self) -> dict[str, Any] | None:
         """Smallest margin of safety, see `margin_of`; None if no line has a strength."""
         net = self.system.net
         if not np.isfinite(net.strength).any():
@@ -145,7 +158,7 @@ class State:
         return margin_of(net, int(used.argmax()), float(used.max()), self.time)
 
     @cached_property
-    def energies(self):
+    def energies(self) -> dict[str, float]:
         """Energies of the effects by column of the energy balance, and their total [J].
 
         Work is that of dead loads. It is left out if other loads act, since their work depends on the path.
@@ -159,7 +172,7 @@ class State:
         return {name: book[name] for name in static_energies(self.system)}
 
 
-def margin_of(net, element, used, time):
+def margin_of(net: Net, element: int, used: float, time: float) -> dict[str, Any]:
     """The margin of safety at an element, as in ``run.json``.
 
     Parameters
@@ -199,7 +212,7 @@ MUCH = 0.2
 """Strain above which a finding warns: real cables break below it, and a linear law does not describe them."""
 
 
-def strain_remark(net, strain):
+def strain_remark(net: Net, strain: tuple[float, int]) -> Iterator[Finding]:
     """Find a largest strain, (value, line), above `MUCH`, of a line that does not yield."""
     if strain[0] > MUCH and not net.law_is("plastic")[net.line == strain[1]].any():
         yield Finding(
@@ -210,7 +223,7 @@ def strain_remark(net, strain):
         )
 
 
-def curve_remark(net, share, element):
+def curve_remark(net: Net, share: float, element: int) -> Iterator[Finding]:
     """Find a strain beyond the last point of the curve of an element, by the largest ``share`` of that strain."""
     if share > 1.0:
         last = net.line_data.last_strain[element]
@@ -222,7 +235,7 @@ def curve_remark(net, share, element):
         )
 
 
-def floor_remark(net, stress):
+def floor_remark(net: Net, stress: float) -> Iterator[Finding]:
     """Find a floor of the smooth law above 1 % of the largest stress [Pa]."""
     for number in (number for number, law in enumerate(net.laws) if law.smoothed):
         smooth = net.law_index == number

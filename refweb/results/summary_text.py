@@ -5,7 +5,7 @@ A summary is the content of ``run.json``. The console and the page of a run show
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .error_budget import DETERMINED, shares
 from .units import larger, other_errors, position_text, readable, scale_of, with_error
@@ -17,9 +17,9 @@ FEW_BREAKS = 5
 class Rows(NamedTuple):
     """Rows of text below names of columns; an optional `last` row is a remark on the columns."""
 
-    columns: list
-    rows: list
-    last: list
+    columns: list[Any]
+    rows: list[Any]
+    last: list[Any]
 
 
 def rows_of_results(results, dynamic):

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..errors import InputError
 from ..messages import nearest, quote
 from ..tables import Table, real, table, text
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..settings import Dynamic, Static
+    from ..system.system import System
+    from .observables.observe import Observe
+    from .state import State
 
 NO_TWIN = "there is no step refinement"
 UNITS = {"largest_area": "m²", "deployment_time": "s", "travelled": "m", "effective_period": "s", "covered": "1"}
@@ -73,13 +83,13 @@ class Throw(Table):
     closed: float = real(default=0.05, at_least=0, at_most=1)
 
     @property
-    def numbers(self):
+    def numbers(self) -> list[str]:
         """Names of the numbers."""
         of_target = ["inside", "closed", "covered"] if self.target is not None else []
         travelled = ["travelled"] if self.travel is not None else []
         return ["largest_area", "deployment_time", *travelled, "effective_period", *of_target]
 
-    def on(self, observables, system, solve):
+    def on(self, observables: Sequence[Observe], system: System, solve: Static | Dynamic) -> None:
         """Refuse observables and bodies that the scene does not have."""
         if solve.kind != "dynamic":
             raise InputError("a throw has no meaning in statics: leave it out")
@@ -104,7 +114,15 @@ class Throw(Table):
             hint = nearest(self.target, bodies) if bodies else "the scene has no [[body]]"
             raise InputError(f"target = {quote(self.target)} is not a body, {hint}")
 
-    def results(self, observables, rows, state, twin=None, factor=0.0, known=np.inf):
+    def results(
+        self,
+        observables: Sequence[Observe],
+        rows: Any,
+        state: State,
+        twin: Any = None,
+        factor: float = 0.0,
+        known: float = np.inf,
+    ) -> dict[str, dict[str, Any]]:
         """Results of a throw, a dict of dicts for ``run.json``.
 
         Parameters
@@ -258,11 +276,6 @@ def depth_in_hull(points, point):
         *_, axes = np.linalg.svd(points - middle)
         return -float(abs(axes[-1] @ (point - middle)))
     return -float((hull.equations[:, :3] @ point + hull.equations[:, 3]).max())
-
-
-def in_hull(points, point):
-    """Tell if a position is in the convex hull of points; the hull of points in a plane has no inside."""
-    return depth_in_hull(points, point) > 0.0
 
 
 def side_of_mouth(outline, nodes, centre):

@@ -8,11 +8,17 @@ solved.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError, SolverError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .duality_bound import DualityBound
+    from .floating import Floating
 
 TOLERANCE = 1e-10
 """Residual at which an iteration stops; `LIMIT` is what it may end at when rounding allows no further step."""
@@ -82,13 +88,13 @@ class Equilibrium:
     """
 
     step: float
-    x: np.ndarray
-    tension: np.ndarray
-    force: np.ndarray
-    stats: dict = field(default_factory=dict)
-    duality_bound: object = None
-    deviations: object = None
-    floating: object = None
+    x: NDArray[np.float64]
+    tension: NDArray[np.float64]
+    force: NDArray[np.float64]
+    stats: dict[str, Any] = field(default_factory=dict)
+    duality_bound: DualityBound | None = None
+    deviations: NDArray[np.float64] | None = None
+    floating: Floating | None = None
     stability: Stability | None = None
     may_turn_over: bool = False
 

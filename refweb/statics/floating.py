@@ -11,12 +11,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from .bars import Bars
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 SAMPLES = 3
 """Number of random moves without stiffness that represent all such moves."""
@@ -43,7 +47,7 @@ class Floating:
     parts: Parts | None = None
 
     @property
-    def rows(self):
+    def rows(self) -> NDArray[np.int64]:
         """Rows with an open component."""
         return np.flatnonzero(self.free.any(axis=1))
 
@@ -76,7 +80,7 @@ class Parts:
     straight: bool
 
     @cached_property
-    def reach(self):
+    def reach(self) -> NDArray[np.float64]:
         """Least and largest position of each row that chains of lines allow [m], shape (2, rows, 3).
 
         The distance of a floating row from a fixed row is at most the length of the lines between them. This is an
@@ -103,7 +107,7 @@ class Parts:
                 limits[side, open_, axis] = sign * far[open_]
         return limits
 
-    def limits(self, row, axis):
+    def limits(self, row: int, axis: int) -> tuple[float, float] | None:
         """Least and largest position of a row along an axis [m], infinite where nothing holds it; None if unknown."""
         if not self.straight:
             return None

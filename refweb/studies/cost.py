@@ -7,7 +7,7 @@ import math
 import pathlib
 from dataclasses import dataclass, field
 from itertools import takewhile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,11 @@ from ..results.provenance import versions
 from . import dop853
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from os import PathLike
+
+    from matplotlib.figure import Figure
+
     from ..results.observables.observe import Observe
     from ..scene import Scene
 
@@ -64,23 +69,23 @@ class Cost:
 
     scene: Scene
     observable: Observe
-    trials: list
-    web: dict
-    references: tuple = ()
+    trials: list[Any]
+    web: dict[str, Any]
+    references: tuple[Any, ...] = ()
     independent: bool = False
-    apart: tuple = (np.nan, np.nan)
-    trust: tuple = (np.nan, np.nan)
+    apart: tuple[float, float] = (np.nan, np.nan)
+    trust: tuple[float, float] = (np.nan, np.nan)
     scale: float = np.nan
     status: str = "running"
     message: str = ""
-    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0})
+    cost: dict[str, Any] = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0})
 
     @property
-    def sentence(self):
+    def sentence(self) -> str:
         """Cost of digits, in words."""
         return " ".join(_sentence(self))
 
-    def price(self, digits, method=None):
+    def price(self, digits: int, method: str | None = None) -> Any:
         """The cheapest `Trial` with so many digits, which finer trials of its method have as well; else None.
 
         It is that of one method, or of all methods but DOP853, which no scene can ask for. The result is None if the
@@ -96,13 +101,13 @@ class Cost:
             best += takewhile(lambda t: t.error_observable <= limit, reversed(ladder))
         return min(best, key=lambda t: t.cpu_s, default=None)
 
-    def rows(self):
+    def rows(self) -> Iterator[list[Any]]:
         """Rows of ``cost.csv`` below its header, `COLUMNS`."""
         for t in self.trials:
             work = [t.work[key] for key in ("nfev", "njev", "nlu", "nsteps")]
             yield [t.method, t.setting, t.error_observable, t.error_state, t.cpu_s, *work, t.status]
 
-    def summary(self):
+    def summary(self) -> dict[str, Any]:
         """The content of ``run.json``, a dict of plain values; ``kind`` is "cost"."""
         none = lambda value: value if math.isfinite(value) else None  # noqa: E731
         runs = [dict(zip(COLUMNS, row, strict=True)) for row in self.rows()]
@@ -124,13 +129,13 @@ class Cost:
             "versions": versions(),
         }
 
-    def draw(self):
+    def draw(self) -> Figure:
         """The work-precision diagram, a `matplotlib.figure.Figure`."""
         from .diagram import diagram
 
         return diagram(self)
 
-    def save(self, folder, force=False):
+    def save(self, folder: str | PathLike[str], force: bool = False) -> None:
         """Write ``cost.csv``, ``cost.png``, ``scene.toml`` and ``run.json``.
 
         Raises

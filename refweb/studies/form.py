@@ -13,6 +13,7 @@ Mech. Eng. 3 (1974) 115–134, doi:10.1016/0045-7825(74)90045-0.
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,11 @@ from ..scene import Scene
 from ..statics.equilibrium import LIMIT, force_scale, residual
 from ..system.static_system import at_rest
 
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from ..net.cable import Cable
+
 ROUNDS = 100
 """Largest number of shapes that are found in turn with natural lengths."""
 SETTLED, STAYS = 1e-14, 1e-10
@@ -32,7 +38,7 @@ SELECTED = ("node", "nodes", "clamp")
 """Keys of tables that select nodes."""
 
 
-def form(scene, cable=None):
+def form(scene: Scene | str | PathLike[str], cable: Cable | None = None) -> Scene:
     """Make a scene of elastic lines whose equilibrium is the shape that a scene finds.
 
     Parameters

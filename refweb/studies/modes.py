@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +24,13 @@ from ..tables import checked, integer
 from .mode_remarks import left_out, remarks_on
 from .spectrum import spectrum
 
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from numpy.typing import NDArray
+
+    from ..system.system import System
+
 MAX_MODES = 1000
 """Largest number of modes."""
 COLUMNS = ["step [1]", "mode [1]", "frequency [Hz]", "error [Hz]", "omega_squared [1/s²]", "residual [1]"]
@@ -40,20 +48,20 @@ class Modes(Solution):
         its equilibrium at t = 0.
     """
 
-    spectra: list = field(default_factory=list)
+    spectra: list[Any] = field(default_factory=list)
 
     @property
-    def frequency(self):
+    def frequency(self) -> NDArray[np.float64]:
         """Natural frequencies at the last load step [Hz], shape (modes,); negative ones are imaginary: unstable."""
         return self.spectra[-1].frequency
 
     @property
-    def error(self):
+    def error(self) -> NDArray[np.float64]:
         """± of each frequency [Hz], shape (modes,): the error of the solver, without the discretisation error."""
         return self.spectra[-1].error
 
     @property
-    def shapes(self):
+    def shapes(self) -> NDArray[np.float64]:
         """Displacement of each node in each mode at the last load step, shape (modes, nodes, 3); the largest is 1.
 
         In a rotating frame nodes move on ellipses: ``spectra[-1].later`` is the displacement a quarter of a period
@@ -61,15 +69,15 @@ class Modes(Solution):
         """
         return self.spectra[-1].shapes[:, : self.state.system.net.nodes]
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         frequencies = ", ".join(f"{f:.6g}" for f in self.frequency[:4]) if self.spectra else ""
         return f'<Modes of "{self.scene.title}": {self.status}; {frequencies} Hz>'
 
-    def summary(self):
+    def summary(self) -> dict[str, Any]:
         """The content of ``run.json``, a dict of plain values; ``kind`` is "modes"."""
         return {"kind": "modes", **super().summary()}
 
-    def save(self, folder, force=False):
+    def save(self, folder: str | PathLike[str], force: bool = False) -> None:
         """Write the result folder: ``modes.csv``, and as frame k the shape of mode k on the equilibrium.
 
         Parameters
@@ -94,7 +102,14 @@ class Modes(Solution):
         out.summary(self.summary())
 
 
-def modes(scene, number=10, out=None, force=False, progress: bool | Callable | None = True, announce=None) -> Modes:
+def modes(
+    scene: Scene | str | PathLike[str],
+    number: int = 10,
+    out: str | PathLike[str] | None = None,
+    force: bool = False,
+    progress: bool | Callable[..., Any] | None = True,
+    announce: Callable[[Scene, System], object] | None = None,
+) -> Modes:
     """The lowest natural frequencies and mode shapes about an equilibrium, without damping.
 
     Of a static scene the equilibrium is that of each load step; of a dynamic one that at t = 0 under gravity, loads,

@@ -13,7 +13,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -81,11 +81,11 @@ class Trial:
     status: str = "budget"
     message: str = ""
     kind: str = ""
-    make: Callable | None = None
+    make: Callable[..., Any] | None = None
     cpu_s: float = np.nan
     values: np.ndarray | None = None
     x: np.ndarray | None = None
-    work: dict = field(default_factory=lambda: dict(nfev=0, njev=0, nlu=0, nsteps=0))
+    work: dict[str, Any] = field(default_factory=lambda: dict(nfev=0, njev=0, nlu=0, nsteps=0))
     error_observable: float = np.nan
     error_state: float = np.nan
 
@@ -111,9 +111,9 @@ class Ladder(NamedTuple):
     """
 
     key: str
-    settings: tuple
+    settings: tuple[Any, ...]
     kind: str
-    make: Callable | None = None
+    make: Callable[..., Any] | None = None
 
 
 def _by_newton(trial, system, steps, tell):

@@ -8,6 +8,7 @@ kind.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, SolverError, in_file
 from ..messages import nearest, quote
@@ -24,9 +25,20 @@ from .budget import climb, compile_all
 from .cost import Cost
 from .references import compare
 
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from ..system.system import System
+
 
 def cost(
-    scene, observe=None, budget=120.0, out=None, force=False, progress: bool | Callable | None = True, announce=None
+    scene: Scene | str | PathLike[str],
+    observe: str | None = None,
+    budget: float = 120.0,
+    out: str | PathLike[str] | None = None,
+    force: bool = False,
+    progress: bool | Callable[..., Any] | None = True,
+    announce: Callable[[Scene, System], object] | None = None,
 ) -> Cost:
     """Run a scene by every method that takes it, from coarse to fine, and compare errors and CPU times.
 

@@ -1,9 +1,8 @@
-"""Many runs of one scene: cases, workers, rows and chances; it knows the desk, and nothing of the command line.
+"""Many runs of one scene: cases, workers, rows and statistics; it knows scenes and runs, and no command line.
 
-A study says which values of a scene vary (`refweb.sweeps.study`); its cases follow from that alone
-(`refweb.sweeps.design`). A case is a scene and nothing else: it is run wherever there is a worker
-(`refweb.sweeps.case`, `refweb.sweeps.workers`), and what comes back is a row of ``results.csv``
-(`refweb.results.case_rows`). A row is known by the content of its scene, so that a study that goes on, or one whose
-parameters have changed, runs what is missing and nothing else (`refweb.sweeps.sweep`). `refweb.sweeps.chances`
-evaluates all rows together, with spread and numerical ± apart.
+A study names the values of a scene that vary (`refweb.sweeps.study`). Its cases follow from that alone
+(`refweb.sweeps.design`). A case is a scene, which any worker may run (`refweb.sweeps.case`, `refweb.sweeps.workers`).
+Its result is a row of ``results.csv`` (`refweb.results.case_rows`). The key of a row is a digest of its scene: a study
+that continues, or whose parameters have changed, runs only the missing cases (`refweb.sweeps.sweep`).
+`refweb.sweeps.chances` computes statistics of all rows, with spread and numerical ± apart.
 """

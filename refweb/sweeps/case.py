@@ -1,7 +1,7 @@
-"""A case where it is run: a `Job` comes in, and its `Outcome` goes out, and no disk is shared.
+"""Run of one case in a worker: it takes a `Job` and returns an `Outcome`, without a shared disk.
 
-The process may be anywhere. The files that it needs travel with the job. The outcome travels back: as cells of a row,
-as ``run.json``, or as one archive of the result folder.
+The worker may be a process on another machine. The job contains the files that it needs. The outcome contains the cells
+of a row, and on demand ``run.json`` or an archive of the result folder.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import socket
 import tempfile
 import warnings
 import zipfile
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..errors import InputError, SolverError
 from ..messages import one_line
@@ -33,9 +33,9 @@ class Job(NamedTuple):
     key : str
         Key of the case.
     given : dict
-        Its scene as a file would have it.
+        Its scene as the dict of a scene file.
     folder, file : str
-        Where paths in it start, and what it is called in messages.
+        Folder at which its relative paths start, and its name in messages.
     keeps : {"none", "json", "all"}
         Data to return besides cells.
     home : tuple
@@ -45,20 +45,20 @@ class Job(NamedTuple):
     """
 
     key: str
-    given: dict
+    given: dict[str, Any]
     folder: str | None
     file: str
     keeps: str
-    home: tuple
-    files: dict
+    home: tuple[Any, ...]
+    files: dict[str, Any]
 
 
 class Outcome(NamedTuple):
-    """Outcome of a case: cells of its row, the content of its ``run.json``, its result folder as an archive."""
+    """Result of a case: cells of its row, the content of its ``run.json``, and its result folder as an archive."""
 
     key: str
-    cells: dict
-    summary: dict | None = None
+    cells: dict[str, Any]
+    summary: dict[str, Any] | None = None
     archive: bytes | None = None
 
 
@@ -68,7 +68,7 @@ def machine():
 
 
 def solve(job):
-    """Run a case; whatever becomes of it is an `Outcome`."""
+    """Run a case and return its `Outcome`, also for an error."""
     from ..results.run_status import Clock
 
     if job.home != machine():
@@ -89,7 +89,7 @@ def solve(job):
 
 
 def _values_text(job, error):
-    """A message without the name of the file and the values, which the row has anyway."""
+    """A message without the name of the file and the values, which the row contains."""
     text = one_line(str(error))
     head = f"{job.file}: " if job.file else ""
     text = text.removeprefix(head)
@@ -98,7 +98,7 @@ def _values_text(job, error):
 
 @functools.cache
 def _settle():
-    """Make a process one of many: twins have no thread."""
+    """Prepare a worker process: step-refinement runs get no thread."""
     from ..dynamics import twin_error
 
     warnings.simplefilter("ignore", RuntimeWarning)  # overflow: what it leads to is found and named
@@ -106,7 +106,7 @@ def _settle():
 
 
 def _run(job):
-    """(Content of ``run.json``, archive of the result folder or None) of a case."""
+    """Content of ``run.json`` of a case, and the archive of the result folder or None."""
     from ..runner import run
     from ..scene import Scene
 
@@ -123,7 +123,7 @@ def _run(job):
 
 
 def _brought(job, directory):
-    """The scene of a job whose files are on this machine, in a folder where they are not there already."""
+    """The scene of a job; files that this machine lacks are written to a folder."""
     moved = {}
     for number, (path, content) in enumerate(job.files.items()):
         source = pathlib.Path(path)
@@ -163,11 +163,11 @@ def unpacked(content, folder):
 
 
 def cells_of(summary):
-    """Cells of a row from the content of a ``run.json``: results and, where none has their names, those of a throw.
+    """Cells of a row from the content of a ``run.json``: results, and numbers of a throw if no result has the name.
 
-    A statement of a throw, such as "inside", is 1 or 0 as in this run; it may be anything from 0 to 1 where ± leaves it
-    undecided. Results after the horizon are one draw of many. So are numbers of a throw for which the step-refinement
-    run shows no ±.
+    A statement of a throw, such as "inside", is 1 or 0 as in this run; if ± leaves it undecided, it is bounded by 0 and
+    1. Results after the horizon of the motion are random samples. Numbers of a throw for which the step-refinement run
+    gives no ± are random samples too.
     """
     cells = {"status": summary["status"], "message": summary["message"]}
     horizon = summary.get("horizon") or {}
@@ -209,7 +209,7 @@ def kept_files(folder, job_key):
 
 
 def keep_outcome(folder, outcome):
-    """Put what came of a case into the folder of a study, whole."""
+    """Write the files of a case into the folder of a study, atomically."""
     from ..results.files import write_text
 
     as_json, archive = kept_files(folder, outcome.key)

@@ -1,18 +1,16 @@
 """Statistics of the rows of a study: spread and numerical ± apart, probabilities with their confidence intervals.
 
-Two things are not known of the mean of a result. One is which cases there might have been: that is the spread, and its
-share in the mean falls with the number of samples. The other is how far the solution of each case is from the truth:
-that is ±, which no number of samples lets fall. They are told beside each other and never added.
+The mean of a result has two errors. The spread of the cases makes one, which decreases with the number of samples. The
+numerical error ± of each case makes the other, which does not. Both are given side by side and never added.
 
 The probability of a condition has an interval by Clopper and Pearson (1934), which covers it at least as often as its
-level says, of independent samples; of samples that are evenly spread it is that of as many independent ones, and
-mostly wider than it need be. A case that its ± leaves undecided, and one that has failed, may count either way: the
-interval holds for both, and the share of cases lies between a lower and an upper one. Results behind the horizon of
-their motion are draws, and their ± says nothing. Where they have an ensemble, its mean and spread join those of the
-cases. Of samples a case counts by its one run, as the trials of Clopper and Pearson do: what differs between runs of
-one case is one chance more among those that are sampled. Of cases that are not drawn a condition says what holds of
-each: with an ensemble that is `LIKELY` of its spread, and without one a draw counts with its ±, and as undecided where
-it has none.
+level says, of independent samples; for evenly spread samples the same interval is used, and is mostly too wide. A case
+that ± leaves undecided, and a case that has failed, may count as true or false: the interval covers both, and the share
+of cases has a lower and an upper value. Results after the horizon of a chaotic motion are random samples, and their ±
+has no meaning. If they have an ensemble, its mean and spread are used. In a study with samples a case counts by its one
+run, as a trial of Clopper and Pearson does: the difference between runs of one case is one more random variable. In a
+study without samples a condition is evaluated for each case: with an ensemble within `LIKELY` standard deviations,
+without one by the value and its ±, and as undecided if there is no ±.
 """
 
 from __future__ import annotations
@@ -27,11 +25,11 @@ from .expressions import Expression, Interval
 from .study import SAMPLES
 
 RESAMPLES = 999
-"""Number of samples with replacement that intervals of Sobol's indices are taken of."""
+"""Number of bootstrap samples for the intervals of Sobol's indices."""
 LIKELY = 2.0
-"""Standard deviations about the mean of an ensemble within which most of its runs are."""
+"""Number of standard deviations about the mean of an ensemble that contain most of its runs."""
 UNDONE = ("skipped", "waiting")
-"""Status of rows that say nothing of a condition, as their cases have not been run."""
+"""Status of rows without a value of a condition, since their cases have not been run."""
 
 
 def chances(study, rows, columns, names):
@@ -51,9 +49,9 @@ def chances(study, rows, columns, names):
     Returns
     -------
     list of dict
-        Of each group ``of``, its values by path; ``cases``, how many have which status; ``results``, by name what
-        `_spread` finds; ``conditions``, by name what `_share` finds; ``indices``, by name what `_indices` finds, or
-        None with the reason.
+        For each group: ``of``, its values by path; ``cases``, the number of rows by status; ``results``, the results of
+        `_spread` by name; ``conditions``, those of `_share` by name; ``indices``, those of `_indices` by name, or None
+        with the reason.
     """
     results, sampled = results_among(columns), study.sample in SAMPLES
     known = [*study.parameters, *(result_item.name for result_item in results)]
@@ -79,17 +77,17 @@ def chances(study, rows, columns, names):
 
 
 def column_of(row, result):
-    """(Value, ±, statistical) of a result in a row; its mean over the ensemble where there is one."""
+    """Value, ± and statistical flag of a result in a row; the mean of the ensemble if there is one."""
     value, error = row.get(f"{result.name} [{result.unit}]"), row.get(f"{result.name} ±")
     statistical = result.name in (row.get("statistical") or "").split()
     return value, error, statistical
 
 
 def _spread(study, result, rows, sampled):
-    """Mean, spread and quantiles of a result, each with what ± makes of it; None where no row has it.
+    """Mean, spread and quantiles of a result, each with its part from ±; None if no row has the result.
 
-    A standard deviation is the norm of what is left of the values without their mean, over √(n − 1): it changes by no
-    more than the norm of their errors over that.
+    A standard deviation is the norm of the values minus their mean, over √(n − 1): it changes by at most the norm of
+    their errors, over √(n − 1).
     """
     values, errors, within, means = [], [], [], []
     for row in rows:
@@ -124,7 +122,7 @@ def _spread(study, result, rows, sampled):
 
 
 def _quantile(values, errors, q, level):
-    """A quantile; least and most of it that ± leaves, as quantiles rise with values; its interval by ranks."""
+    """A quantile; its bounds from ±, since quantiles increase with the values; its confidence interval by ranks."""
     ordered, n = np.sort(values), len(values)
     at = {"q": q, "value": float(np.quantile(values, q)), "least": None, "most": None, "interval": None}
     if errors is not None:
@@ -135,9 +133,9 @@ def _quantile(values, errors, q, level):
 
 
 def _ranks(n, q, level):
-    """Places of the ordered samples between which a quantile is with a probability; None where too few say nothing.
+    """Ranks of the ordered samples that enclose a quantile with a probability; None if there are too few samples.
 
-    So many of n samples are below a quantile as a binomial variable is: no distribution is assumed.
+    The number of n samples below a quantile is binomial: no distribution of the values is assumed.
     """
     from scipy.stats import binom
 
@@ -147,10 +145,10 @@ def _ranks(n, q, level):
 
 
 def bounds(row, results, values, sampled):
-    """Values by name for a condition: parameters, and results as intervals, exact where ± is not known.
+    """Values by name for a condition: parameters, and results as intervals of ±, without width if ± is not known.
 
-    Draws are exact where cases are ``sampled``. Else they are `LIKELY` standard deviations about the mean of their
-    ensemble, or without one as wide as their ±, and any number where that is not known.
+    Random samples have no width if cases are ``sampled``. Otherwise the interval is `LIKELY` standard deviations about
+    the mean of the ensemble, without an ensemble that of ±, and unbounded if ± is not known.
     """
     values_found = dict(values)
     for result in results:
@@ -172,10 +170,10 @@ def bounds(row, results, values, sampled):
 def _share(study, condition, results, cases, sampled):
     """Share of the cases for which a condition holds, and of samples its probability.
 
-    ``true`` and ``false`` count cases that are decided whatever ± does, ``undecided`` those that it or the spread of
-    an ensemble leaves open, and ``failed`` those without a result; ``unproven`` of the decided have a result without ±
-    and bounds, and ``statistical`` have one that is a draw. ``share`` is by values alone. Cases that are undecided or
-    have failed count as false in ``lower`` and as true in ``upper``.
+    ``true`` and ``false`` count cases that are decided within ±, ``undecided`` the cases that ± or the spread of an
+    ensemble leaves undecided, and ``failed`` the cases without a result. ``unproven`` counts decided cases with a
+    result without ±, and ``statistical`` decided cases with a result that is a random sample. ``share`` is computed
+    from the values without ±. Undecided and failed cases count as false in ``lower`` and as true in ``upper``.
     """
     used = [item for item in results if item.name in condition.used]
     count: dict[str, int] = dict.fromkeys(
@@ -223,8 +221,8 @@ def clopper_pearson(successes, count, level):
 def _indices(study, result, cases):
     """Sobol's indices of a result, of first order and total, with their intervals; None with the reason.
 
-    Intervals are those of samples with replacement, percentile by percentile; ± is not in them: ``error`` is the
-    largest ± over the spread, and indices mean little where that is not small.
+    Intervals are bootstrap percentiles. They do not contain ±: ``error`` is the largest ± over the spread, and the
+    indices are meaningful only if it is small.
     """
     from scipy.stats import sobol_indices
 

@@ -1,4 +1,4 @@
-"""The cases of a study: which values each of them has, and the scene that they make of the base."""
+"""The cases of a study: the values of each case, and its scene, made of the base scene."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import itertools
 import json
 import pathlib
 import warnings
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from .expressions import Expression
 from .study import MOST_CASES, Distribution
 
 KEY = 16
-"""Number of hexadecimal digits that a case is known by."""
+"""Number of hexadecimal digits of the key of a case."""
 
 
 class Case(NamedTuple):
@@ -32,34 +32,34 @@ class Case(NamedTuple):
     values : dict
         Values by path.
     group : int
-        Number of the combination of lists that it belongs to: its samples have a distribution of their own.
+        Number of its combination of lists; statistics of samples are computed for each combination.
     draw : int
         Number of its sample, −1 in designs without samples.
     part : str
-        Of Sobol's indices, which matrix of samples it is of: "A", "B", or the path in which A has a column of B.
+        Matrix of samples for Sobol's indices: "A", "B", or the path of the column of A that is replaced by that of B.
     key : str
-        Key of the content of its scene; empty for a skipped case.
+        Digest of its scene; empty for a skipped case.
     given : dict, optional
-        Its scene as a file would have it.
+        Its scene as the dict of a scene file.
     """
 
-    values: dict
+    values: dict[str, Any]
     group: int
     draw: int
     part: str = ""
     key: str = ""
-    given: dict | None = None
+    given: dict[str, Any] | None = None
 
 
 class Base(NamedTuple):
-    """The scene that cases differ from: what a file says, the folder that paths in it start at, and its name."""
+    """The base scene of all cases: the dict of its file, the folder at which relative paths start, and its name."""
 
-    given: dict
+    given: dict[str, Any]
     folder: pathlib.Path | None
     file: str
 
     def scene(self, case_values):
-        """(What a file would say, scene) of some values by path."""
+        """The dict of a scene file with some values by path, and its scene."""
         given, name = self.given, self.file
         text = ", ".join(f"{short(key)} = {quote(value)}" for key, value in case_values.items())
         with in_file(f"{name} with {text}" if text else name):
@@ -69,7 +69,7 @@ class Base(NamedTuple):
 
 
 def points(study):
-    """Values of all cases, each a `Case` without its scene, in their order."""
+    """All cases in their order, each a `Case` with values and without scene."""
     lists = study.listed
     combinations = list(zip(*lists.values(), strict=True)) if study.sample == "zip" else None
     count = (
@@ -89,7 +89,7 @@ def points(study):
 
 
 def groups(study):
-    """Values of the lists in each group, as (path, value) pairs; one group without any where there are no samples."""
+    """Values of the lists in each group, as (path, value) pairs; without samples one group without values."""
     if not study.drawn:
         return [{}]
     varied = {path: values for path, values in study.listed.items() if len(values) > 1}
@@ -126,7 +126,7 @@ def _uniform(study, width):
 
 
 def _placed(drawn, shares):
-    """Values by path, a dict for each sample, at shares of their distributions, shape (samples, paths)."""
+    """Values by path, a dict for each sample, from probabilities of the distributions, shape (samples, paths)."""
     columns = []
     for distribution, column in zip(drawn.values(), shares.T, strict=True):
         if isinstance(distribution, Distribution):
@@ -138,12 +138,12 @@ def _placed(drawn, shares):
 
 
 def cases_of(study, base):
-    """All cases with their scenes; of those that are skipped ``given`` is None.
+    """All cases with their scenes; ``given`` of a skipped case is None.
 
     Raises
     ------
     InputError
-        Where values do not make a scene: names them, and what may be done.
+        If values do not make a valid scene; the message names the values and a remedy.
     """
     skips = None
     if study.skip is not None:
@@ -167,17 +167,17 @@ def cases_of(study, base):
 
 
 def key_of(scene, known=None):
-    """Key that tells a scene apart from all others, by whatever its results depend on.
+    """Digest of everything on which the results of a scene depend.
 
-    That is all of its tables with their defaults, the content of files that it reads, and the version of refweb; not
-    its title, which a page or plot has and no result.
+    This is all tables with their defaults, the content of the files that it reads, and the version of refweb. The title
+    is not part of it.
 
     Parameters
     ----------
     scene : refweb.Scene
         The scene.
     known : dict, optional
-        Digests of files that have been read, by path; filled.
+        Digests of files by path; new ones are added.
     """
     tables = scene.to_dict()
     del tables["title"]
@@ -189,7 +189,7 @@ def key_of(scene, known=None):
 
 
 def files_of(given):
-    """Files that the scene of a dict with absolute paths reads."""
+    """Files that a scene reads, given as a dict with absolute paths."""
     files, start = paths_of(given), given["solve"].get("start", "web")
     if pathlib.Path(start).is_absolute():
         files += [str(pathlib.Path(start) / name) for name in ("run.json", "scene.toml", "checkpoint.npz")]

@@ -1,17 +1,16 @@
-"""Conditions in words, such as ``max_stress > 2e8 and speed < 3``: read by a reader of its own, never by Python's.
+"""Conditions such as ``max_stress > 2e8 and speed < 3``: a parser and interval evaluation, without Python's eval.
 
 A condition holds arithmetic, comparisons, ``and``, ``or``, ``not``, the functions `FUNCTIONS`, numbers, texts in quotes
-and names. Names may have dots and numbers in them, as paths have, ``body.0.mass``, and an index behind them,
-``body.0.velocity[2]``.
+and names. Names may contain dots and numbers, as the paths of scenes do, ``body.0.mass``, and may have an index,
+``body.0.velocity[2]``. The value of a name is a number or an `Interval`, a result with its ±. Expressions are evaluated
+by interval arithmetic. A comparison is true or false only if it is so for all values in the intervals; otherwise it is
+None, undecided (Kleene's logic). A computed interval may be wider than the exact one if a name occurs twice. It is
+never narrower, except for rounding.
 
-A name stands for a value or for an `Interval`: that of a result with its ±. Numbers follow by interval arithmetic, so
-that a comparison is true or false only where it is so of all values in the intervals, and None where ± leaves it
-undecided (Kleene's logic). An interval may come out wider than it is, where a name stands twice, and never narrower,
-but for rounding.
-
-simpleeval 1.0, with the functions of intervals, decides ``and`` by Python's truth: with y from 1 to 3 and x = 2 it
-leaves ``y > 2 and x > 3`` undecided, which is false. Its methods for ``and``, ``or`` and comparisons are private, and
-it looks at what an expression holds only where it is evaluated. asteval puts 387 names within reach of a condition.
+The library simpleeval 1.0, with functions of intervals, evaluates ``and`` by Python's truth values: with y from 1 to 3
+and x = 2 it leaves ``y > 2 and x > 3`` undecided, though it is false. Its methods for ``and``, ``or`` and comparisons
+are private, and it checks an expression only during evaluation. The library asteval gives a condition access to 387
+names.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from ..messages import nearest, quote
 LONGEST = 2000
 """Largest number of characters of a condition."""
 DEEPEST = 50
-"""Largest depth of what stands in each other."""
+"""Largest depth of nested expressions."""
 _NAME = re.compile(r"""("[^"]*"|'[^']*')|(?<![\w.])([A-Za-z_][\w-]*(?:\.[\w-]+)+|[A-Za-z_]\w*)""")
 
 
@@ -40,7 +39,7 @@ class Interval(NamedTuple):
 
 
 ANY = Interval(-math.inf, math.inf)
-"""Whatever number there is."""
+"""The interval of all numbers."""
 
 
 def exact(number):
@@ -112,12 +111,12 @@ class Expression:
     text : str
         The condition.
     names : collection of str
-        Names that it may use; the last part of a path stands for the path where no other has it.
+        Names that it may use; the last part of a path is an abbreviation of the path if no other path has it.
 
     Raises
     ------
     InputError
-        For what is no condition, and for a name that is none of these: names the nearest.
+        For a text that is no condition, and for an unknown name, with the nearest known one.
     """
 
     def __init__(self, text, names):
@@ -150,7 +149,7 @@ class Expression:
             raise InputError(f"{quote(text)}: compares nothing: a condition is such as max_stress > 2e8")
 
     def _check(self, node: Any, depth):
-        """Refuse what a condition must not hold."""
+        """Refuse parts of Python that a condition must not contain."""
         good = ast.Compare | ast.BoolOp | ast.UnaryOp | ast.BinOp | ast.Name | ast.Constant | ast.Call | ast.Subscript
         fine = isinstance(node, good)
         if isinstance(node, ast.BinOp):
@@ -176,12 +175,12 @@ class Expression:
                 self._check(child, depth + 1)
 
     def __call__(self, values):
-        """Evaluate with values by name: true, false, or None where intervals leave that undecided.
+        """Evaluate with values by name: true, false, or None if intervals leave it undecided.
 
         Raises
         ------
         InputError
-            For a sum of texts, an index that is out of range, and what else cannot be computed.
+            For a sum of texts, an index out of range, and other operations that cannot be computed.
         """
         try:
             return self._truth(self._tree, values)
@@ -227,14 +226,14 @@ class Expression:
 
 
 def _with_short(names):
-    """Names, and last parts of paths that only one of them has, by what they stand for."""
+    """Names and abbreviations, the last parts of paths that only one of them has, by full name."""
     ends = [name.rpartition(".")[2] for name in names]
     short = {end: name for end, name in zip(ends, names, strict=True) if ends.count(end) == 1 and end.isidentifier()}
     return short | {name: name for name in names}
 
 
 def _read(value):
-    """A number as its interval; texts, truths, lists and intervals as they are."""
+    """Convert a number to its interval; leave texts, booleans, lists and intervals unchanged."""
     if isinstance(value, tuple) and not isinstance(value, Interval):
         return list(value)
     return exact(float(value)) if isinstance(value, int | float) and not isinstance(value, bool) else value
@@ -247,7 +246,7 @@ def _number(value):
 
 
 def _compared(op, a, b):
-    """Result of a comparison: true for all values, false for none, None for some."""
+    """Result of a comparison: True if it holds for all values, False for none, None for some."""
     if isinstance(op, ast.Eq | ast.NotEq):
         if isinstance(a, Interval) and isinstance(b, Interval):
             same = None if max(a.low, b.low) <= min(a.high, b.high) else False

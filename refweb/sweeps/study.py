@@ -1,4 +1,4 @@
-"""Studies: a scene, the values in it that vary, how they are chosen, and the results that are asked for."""
+"""Studies: the table of a study file, with a scene, its varying values, their sampling and conditions on results."""
 
 from __future__ import annotations
 
@@ -7,17 +7,20 @@ import os
 import pathlib
 import tomllib
 from dataclasses import field as plain_field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError, in_file, refused_at
 from ..messages import nearest, quote, short
 from ..tables import Several, Table, boolean, checked, choice, field, integer, numbers_list, real, table, text
 
+if TYPE_CHECKING:
+    from os import PathLike
+
 SHIPPED_STUDIES = pathlib.Path(__file__).parent / "shipped"
 """Folder of the studies shipped with refweb."""
 DESIGNS = ("grid", "zip")
-"""Ways to put lists and ranges together."""
+"""Ways to combine lists and ranges."""
 SAMPLES = ("random", "sobol", "halton", "latin-hypercube")
 """Ways to take samples of ranges and distributions."""
 MOST_CASES = 1_000_000
@@ -25,15 +28,15 @@ MOST_CASES = 1_000_000
 
 
 class Range(NamedTuple):
-    """Numbers from ``low`` to ``high``, ``count`` of them (None: as many as there are samples), or their logarithms."""
+    """``count`` numbers from ``low`` to ``high`` (None: one for each sample), equally far apart or in equal ratios."""
 
     low: float
     high: float
     count: int | None
     log: bool
 
-    def at(self, share):
-        """The number at a share of the way, 0 to 1."""
+    def at(self, share: float) -> float:
+        """The number at a fraction of the range, 0 to 1."""
         if share in (0.0, 1.0):
             return self.high if share else self.low
         if self.log:
@@ -45,24 +48,24 @@ class Distribution(NamedTuple):
     """A distribution of scipy, by name, and its parameters."""
 
     name: str
-    keys: tuple
+    keys: tuple[Any, ...]
 
     @property
-    def frozen(self):
+    def frozen(self) -> Any:
         """Frozen distribution of `scipy.stats`, with its parameters."""
         from scipy import stats
 
         return getattr(stats, self.name)(**dict(self.keys))
 
     @property
-    def discrete(self):
+    def discrete(self) -> bool:
         """True if its values are whole numbers."""
         from scipy import stats
 
         return isinstance(getattr(stats, self.name), stats.rv_discrete)
 
 
-def read_parameters(name, given):
+def read_parameters(name: str, given: Any) -> dict[str, Any]:
     """Parameters of a study by path: a list of cases, a `Range` or a `Distribution`."""
     if not isinstance(given, dict) or not given:
         raise InputError(f'{name} = {quote(given)} must be a table of values by path, "solve.duration" = [0.1, 0.2]')
@@ -73,7 +76,7 @@ _KEYS = {"from", "to", "count", "spacing", "distribution"}
 
 
 def _flat(given, above=""):
-    """(path, value): dotted keys without quotes are tables in tables to TOML."""
+    """Pairs of path and value; TOML reads dotted keys without quotes as nested tables."""
     for key, value in given.items():
         path = f"{above}.{key}" if above else str(key)
         if isinstance(value, dict) and value and all(isinstance(item, dict | list) for item in value.values()):
@@ -145,7 +148,7 @@ def _distribution(value):
     return distribution
 
 
-def parameters():
+def parameters() -> Any:
     """Values that vary, by path."""
     number = {"type": "number"}
     ranged = {"type": "object", "properties": {"from": number, "to": number}, "additionalProperties": True}
@@ -157,7 +160,7 @@ def parameters():
     return field(read)
 
 
-def texts_by_name():
+def texts_by_name() -> Any:
     """Texts by name."""
 
     @accepts(by_name({"type": "string"}))
@@ -185,29 +188,30 @@ class Study(Table):
         }``, with equal ratios for ``spacing = "log"``; or ``{ distribution, ... }`` with the names of scipy.stats for
         distributions and their parameters.
     title : str
-        Title, by default the name of the file. Results go to a folder of that name.
+        Title, by default the name of the file. Results are written to a folder of that name.
     sample : {"grid", "zip", "random", "sobol", "halton", "latin-hypercube"}
-        Every value with every other; the first ones together, then the second ones; or samples, independent ones
-        or evenly spread, of all ranges and distributions at once, each of them with every combination of the lists.
+        "grid" combines every value with every other; "zip" the first values of all parameters, then the second ones.
+        The others take samples of all ranges and distributions together, independent or evenly spread, for every
+        combination of the lists.
     count : int, optional
         Number of samples.
     seed : int
         Seed of the samples.
     skip : str, optional
-        A condition on the parameters: cases of which it holds are not run.
+        A condition on the parameters; a case for which it is true is not run.
     keep : {"none", "json", "all"}
-        Data that are kept of each run: its row alone, also its ``run.json``, or its whole result folder.
+        Data of each run to keep: its row only, also its ``run.json``, or its whole result folder.
     conditions : dict
-        Conditions on results and parameters by name, of which the share of the cases is told, and of samples the
-        probability. Arithmetic in them carries ± along. A case that ± leaves undecided is neither true nor false: such
-        cases are counted apart, and the share has a lower and an upper value.
+        Conditions on results and parameters by name. The result is the share of cases for which a condition is true,
+        for samples its probability. ± is taken through the arithmetic of a condition. A case that ± leaves undecided is
+        neither true nor false: such cases are counted apart, and the share has a lower and an upper value.
     quantiles : sequence of float
-        Of samples: quantiles that are told of each result.
+        Quantiles of each result, for samples.
     confidence : float
         Level of the confidence intervals.
     indices : bool
-        Of samples by "sobol": whether to find Sobol's indices, which say how much of the spread comes from which
-        parameter. That takes count × (number of ranges and distributions + 2) cases instead of count.
+        True to compute Sobol's indices, the parts of the spread due to each parameter, for samples by "sobol". This
+        takes count × (number of ranges and distributions + 2) cases instead of count.
 
     Raises
     ------
@@ -228,34 +232,34 @@ class Study(Table):
     """
 
     scene: str = text()
-    parameters: dict = parameters()
+    parameters: dict[str, Any] = parameters()
     title: str = text(default="study", limit=200)
     sample: str = choice(*DESIGNS, *SAMPLES, default="grid")
     count: int | None = integer(default=None, at_least=1, at_most=MOST_CASES)
     seed: int = integer(default=0, at_least=0, at_most=2**63 - 1)
     skip: str | None = text(default=None)
     keep: str = choice("none", "json", "all", default="none")
-    conditions: dict = texts_by_name()
+    conditions: dict[str, Any] = texts_by_name()
     quantiles: Several = numbers_list(default=(0.05, 0.5, 0.95))
     confidence: float = real(default=0.95, above=0, below=1)
     indices: bool = boolean(default=False)
     folder: pathlib.Path | None = plain_field(default=None, compare=False, metadata={"read": lambda name, value: value})
 
     @property
-    def listed(self):
-        """Parameters that are lists, and in designs ranges, with all their values."""
+    def listed(self) -> dict[str, list[Any]]:
+        """Parameters with a list of values, and in "grid" and "zip" ranges, with all values."""
         return {path: _values(values) for path, values in self.parameters.items() if path not in self.drawn}
 
     @property
-    def drawn(self):
-        """Parameters of which samples are taken."""
+    def drawn(self) -> dict[str, Range | Distribution]:
+        """Parameters that are sampled."""
         sampled = self.sample in SAMPLES
         return {
             p: values for p, values in self.parameters.items() if sampled and isinstance(values, Range | Distribution)
         }
 
-    def check(self):
-        """Refuse what does not fit together."""
+    def check(self) -> None:
+        """Refuse keys that do not fit together."""
         for q in self.quantiles:
             if not 0.0 < q < 1.0:
                 raise InputError(f"quantiles = {q:g} must be between 0 and 1")
@@ -295,7 +299,7 @@ class Study(Table):
             text = ", ".join(f"{path} has {number}" for path, number in lengths.items())
             raise InputError(f'sample = "zip" needs as many values of each parameter: {text}')
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """The study as plain TOML values."""
         given = {key: value for key, value in super().to_dict().items() if key not in ("folder", "parameters")}
         return {key: value for key, value in given.items() if value != {}} | {
@@ -320,13 +324,13 @@ def _plain(parameter):
     return [list(x) if isinstance(x, tuple) else x for x in parameter]
 
 
-def shipped():
+def shipped() -> dict[str, pathlib.Path]:
     """Paths of the studies shipped with refweb, by name."""
     return {path.stem: path for path in sorted(SHIPPED_STUDIES.glob("*.toml"))}
 
 
-def is_study(source):
-    """True for a study file, and for the name of a shipped study that no file and no shipped scene has."""
+def is_study(source: Any) -> bool:
+    """True for a study file, and for the name of a shipped study if no file and no shipped scene has that name."""
     path = pathlib.Path(source)
     if not os.path.isfile(path):  # False of a name that no file can have
         return path.name.removesuffix(".toml") in shipped() and len(path.parts) == 1
@@ -337,7 +341,7 @@ def is_study(source):
     return "web" not in given and {"scene", "parameters"} <= given.keys()
 
 
-def load(source) -> Study:
+def load(source: str | PathLike[str]) -> Study:
     """The study of a TOML file, or of the name of a study shipped with refweb.
 
     Raises

@@ -1,4 +1,4 @@
-"""Results of a study as a value: its rows, their statistics, and its ``run.json``."""
+"""Results of a study in memory: its rows, their statistics, and the content of its ``run.json``."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from .design import groups
 from .study import Study
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas
 
 
@@ -36,34 +38,34 @@ class Sweep:
     title : str
         Title of the scene.
     status : {"running", "solved", "failed", "interrupted"}
-        How it ended: "solved" where every case has a row, also where that says why it failed.
+        Status of the study: "solved" if every case has a row, also a row with the reason of a failure.
     message : str
-        Why it has not ended, else empty.
+        Reason for which it has not ended, else empty.
     warnings : list of str
         Warnings on the results.
     cost : dict of str to float
-        Times of this start of the study [s], ``cpu_s`` without its workers; ``cases_cpu_s`` of all rows, and
-        ``cases_compile_s``, the part of compiling.
+        Times of the last start of the study [s], ``cpu_s`` without its workers; ``cases_cpu_s`` is the CPU time of all
+        rows, and ``cases_compile_s`` its part for compiling.
     path : pathlib.Path, optional
         Its folder.
     """
 
     study: Study
-    cases: list
+    cases: list[Any]
     title: str
-    rows: list = field(default_factory=list)
-    columns: list = field(default_factory=list)
-    chances: list = field(default_factory=list)
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    columns: list[str] = field(default_factory=list)
+    chances: list[dict[str, Any]] = field(default_factory=list)
     status: str = "running"
     message: str = ""
-    warnings: list = field(default_factory=list)
-    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "compile_s": 0.0})
+    warnings: list[str] = field(default_factory=list)
+    cost: dict[str, Any] = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "compile_s": 0.0})
     path: pathlib.Path | None = None
-    versions: dict = field(default_factory=versions)
-    reasons: list = field(default_factory=list)
+    versions: dict[str, str] = field(default_factory=versions)
+    reasons: list[str] = field(default_factory=list)
 
     @property
-    def count(self):
+    def count(self) -> dict[str, int]:
         """Number of rows of each status, a dict."""
         counts = dict.fromkeys(("solved", "failed", "refused", "lost", "skipped", "waiting"), 0)
         for row in self.rows:
@@ -72,7 +74,7 @@ class Sweep:
 
     @functools.cached_property
     def _not_negative(self):
-        """Names of what is not negative in any case, whatever its parameters are."""
+        """Names of results that cannot be negative in any case."""
         tables, names = ("observe", "cable", "damping"), None
         cases = {json.dumps([case.given.get(key) for key in tables]): case for case in self.cases if case.given}
         for case in cases.values():
@@ -80,8 +82,8 @@ class Sweep:
             names = names_of_case if names is None else names & names_of_case
         return names or set()
 
-    def gather(self, known):
-        """Let ``rows`` be those of all cases, of what is known by their keys, and find what they say together."""
+    def gather(self, known: dict[str, dict[str, Any]]) -> None:
+        """Set ``rows`` of all cases from the known rows by key, and compute their statistics."""
         self.rows = [row_of(self.study, case, known) for case in self.cases]
         self.columns = columns_of(self.study, self.rows)
         self.chances = chances(
@@ -92,13 +94,13 @@ class Sweep:
         }
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The rows as a `pandas.DataFrame`, which refweb does not bring."""
+        """The rows as a `pandas.DataFrame`; pandas must be installed."""
         import pandas
 
         return pandas.DataFrame(self.rows, columns=self.columns)
 
-    def values(self, name) -> Any:
-        """A result, or a parameter by its path, of all cases, an array; NaN where there is none."""
+    def values(self, name: str) -> Any:
+        """Values of a result, or of a parameter by its path, in all cases, an array; NaN for a missing value."""
         import numpy as np
 
         from ..errors import InputError
@@ -112,7 +114,7 @@ class Sweep:
         plain = all(cell is None or isinstance(cell, int | float) for cell in cells)
         return np.array([np.nan if cell is None else cell for cell in cells], dtype=float if plain else object)
 
-    def summary(self):
+    def summary(self) -> dict[str, Any]:
         """The content of ``run.json``, a dict of plain values; ``kind`` is "sweep"."""
         return {
             "kind": "sweep",
@@ -132,13 +134,13 @@ class Sweep:
             "warnings": self.warnings,
         }
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         text = ", ".join(f"{number} {status}" for status, number in self.count.items())
         return f'<Sweep of "{self.title}": {len(self.cases)} cases, {text or "none run"}>'
 
 
-def row_of(study, case, known):
-    """The row of a case: its values, and what is known by its key."""
+def row_of(study: Study, case: Any, known: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """The row of a case: its values and the known row of its key."""
     values = {path: case.values[path] for path in study.parameters}
     if case.given is None:
         return {"case": "", "status": "skipped", **values, "message": f"skip: {study.skip}"}
@@ -146,14 +148,14 @@ def row_of(study, case, known):
     return {"case": case.key, **values, **{k: v for k, v in known_row.items() if k != "case" and k not in values}}
 
 
-def columns_of(study, rows):
+def columns_of(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
     """All columns in their order."""
     middle = dict.fromkeys([*study.parameters, *(name for row in rows for name in row)])
     return [*FIRST, *(name for name in middle if name not in (*FIRST, *LAST)), *LAST]
 
 
-def finite(given):
-    """Plain values without infinite numbers, which JSON does not have."""
+def finite(given: Any) -> Any:
+    """Plain values with None for infinite numbers, which JSON does not have."""
     if isinstance(given, dict):
         return {key: finite(value) for key, value in given.items()}
     if isinstance(given, list | tuple):

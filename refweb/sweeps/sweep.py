@@ -1,8 +1,8 @@
-"""A study from start to end: what is there already, what is missing, and the folder that grows by whole rows.
+"""Run of a study: find the missing cases, run them in workers, and append their rows to the folder of the study.
 
-A study can go on from the state of its folder at every moment. The files of a case are put into their place before its
-row is appended, and rows are appended whole. Therefore a study that is killed loses the cases that its workers were
-running, and nothing else. A row is known by the content of its scene: it is found again by whichever study asks for it.
+A study can continue from the state of its folder at any time. The files of a case are written before its row, and a row
+is appended as a whole. Therefore a study that is killed loses only the cases that its workers were running. The key of
+a row is a digest of its scene: another study with the same case finds it.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import time
 import tomllib
 from collections import Counter
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, in_file
 from ..messages import quote, short
@@ -31,16 +32,19 @@ from .study import Study, load
 from .study_result import Sweep, columns_of, row_of
 from .workers import Given, Processes, through
 
+if TYPE_CHECKING:
+    from os import PathLike
+
 
 def sweep(
-    scene,
-    parameters=None,
-    out=None,
-    executor=None,
-    workers=None,
-    progress: bool | Callable | None = True,
-    announce=None,
-    **options,
+    scene: Scene | Study | str | PathLike[str],
+    parameters: dict[str, Any] | None = None,
+    out: str | PathLike[str] | None = None,
+    executor: Any = None,
+    workers: int | None = None,
+    progress: bool | Callable[..., Any] | None = True,
+    announce: Callable[[Sweep], object] | None = None,
+    **options: Any,
 ) -> Sweep:
     """Run a scene with many values.
 
@@ -52,10 +56,10 @@ def sweep(
     parameters : dict, optional
         Values that vary by path, as in a study: ``{"body.0.velocity": [[0, 0, 1], [0, 0, 2]]}``.
     out : path-like, optional
-        Folder of the study; one that holds rows of a study goes on with what is missing. Without it nothing touches the
-        disk.
+        Folder of the study; if it has rows of a study, only the missing cases are run. Without it nothing is written to
+        the disk.
     executor : concurrent.futures.Executor, optional
-        Who runs the cases; by default processes of this machine.
+        Executor that runs the cases; by default processes of this machine.
     workers : int, optional
         Number of processes, by default one for each processor.
     progress : bool or callable
@@ -102,7 +106,7 @@ def sweep(
 
 
 def prepared(scene, parameters=None, options=None):
-    """The `Sweep` of what `sweep` is given before it is run, and the scene that it begins with; refuses wrong input."""
+    """Check the arguments of `sweep`; the `Sweep` before any run, and the base scene."""
     study, base = _asked(scene, parameters, options or {})
     cases = cases_of(study, base)
     study_run = Sweep(study, cases, str(base.given.get("title", study.scene)))
@@ -112,7 +116,7 @@ def prepared(scene, parameters=None, options=None):
 
 
 def _asked(scene, parameters, options):
-    """(Study, base) of what `sweep` is given."""
+    """The study and the base scene from the arguments of `sweep`."""
     if parameters is None:
         if not isinstance(scene, Study):
             if isinstance(scene, Scene):
@@ -149,7 +153,7 @@ def _reasons(study, cases):
 
 
 def _check(study, base, cases):
-    """Refuse what would leave no result: no case, a first case that does not fit together, unknown names."""
+    """Refuse a study without cases, a first case that cannot be built, and unknown names in conditions."""
     first = next((case for case in cases if case.given is not None), None)
     if first is None:
         raise InputError(f"skip = {quote(study.skip)} leaves no case of {len(cases)}")
@@ -162,7 +166,7 @@ def _check(study, base, cases):
 
 
 def _run(study_run, base, kept, workers, tell):
-    """Run what is missing."""
+    """Run the missing cases."""
     missing = {case.key: case for case in study_run.cases if case.given is not None and not kept.has(case)}
     again = Counter(case.key for case in study_run.cases if case.given is not None)
     by_key = {}
@@ -203,7 +207,7 @@ def _done(study_run, kept):
 
 
 class Kept:
-    """Rows that are there, and the folder of the study where there is one.
+    """Rows of a study, and its folder if there is one.
 
     Parameters
     ----------
@@ -238,7 +242,7 @@ class Kept:
             )
 
     def has(self, case):
-        """Tell if a case has its row, and the files that it is to keep besides."""
+        """Tell if a case has its row and the files to keep."""
         row = self.rows.get(case.key)
         if row is None:
             return False
@@ -248,7 +252,7 @@ class Kept:
         return as_json.is_file() if self.study_run.study.keep == "json" else (archive / "run.json").is_file()
 
     def begin(self, scene=None):
-        """Write what stands at the beginning; ``scene`` is one that is in no file."""
+        """Write the study file, the header of the rows and, if it is in no file, the ``scene``."""
         if self.path is None:
             return
         with case_rows.written(self.path):
@@ -267,7 +271,7 @@ class Kept:
         return row_of(self.study_run.study, case, self.rows)
 
     def add(self, outcome, cases):
-        """Keep what came of a case, its files before its row; ``cases`` are all that have this scene."""
+        """Write the files of a case and then its row; ``cases`` are all cases with this scene."""
         if self.path is not None:
             with case_rows.written(self.path):
                 keep_outcome(self.path, outcome)
@@ -276,7 +280,7 @@ class Kept:
             self._table.add(*map(self._row, cases))
 
     def end(self):
-        """Put rows into their order, and say what they say together."""
+        """Sort the rows, and compute their statistics."""
         self.study_run.gather(self.rows)
         if self._table is not None:
             rows_done = [row for row in self.study_run.rows if row["status"] != "waiting"]
@@ -292,7 +296,7 @@ class Kept:
 
 
 def _check_folder(folder):
-    """Tell if a folder holds a study already; refuse one that holds something else or cannot be written."""
+    """Tell if a folder contains a study; refuse a folder with other content or without write permission."""
     path = pathlib.Path(folder)
     if path.is_dir() and (read_summary(path) or {}).get("kind") == "sweep":
         if is_alive(path):
@@ -312,7 +316,7 @@ def _check_folder(folder):
 
 
 def _tidy(folder):
-    """Remove what a kill has left beside its place."""
+    """Remove temporary files of a study that was killed."""
     for path in [*folder.glob(".refweb-*"), *(folder / "cases").glob(".refweb-*")]:
         shutil.rmtree(path) if path.is_dir() else path.unlink()
 

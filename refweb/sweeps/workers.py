@@ -1,8 +1,8 @@
-"""Workers of cases: processes of this machine, or any `concurrent.futures.Executor`, whose workers may die.
+"""Workers that run cases: processes of this machine, or any `concurrent.futures.Executor`; workers may die.
 
-`through` hands jobs out and yields what comes of them, each once. A worker that dies takes with it whatever it was
-doing. Its jobs are then tried again, one at a time, so that a job that kills its worker is told from the jobs that ran
-beside it. A job that has killed `TRIES` workers is given up.
+`through` submits jobs and yields the outcome of each once. If a worker dies, its jobs are tried again one at a time, to
+find the job that kills its worker among those that ran at the same time. A job that has killed `TRIES` workers is given
+up.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from ..messages import one_line
 from .case import Outcome, solve
 
 TRIES = 3
-"""How often a job may kill its worker."""
+"""Number of workers that a job may kill before it is given up."""
 GLANCE = 0.5
-"""Largest time between two looks at what has come [s]."""
+"""Longest time between two checks for finished jobs [s]."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""Variables of the environment that say how many threads a library starts."""
+"""Environment variables for the number of threads of libraries."""
 
 
 def cores():
@@ -36,7 +36,7 @@ def cores():
 
 
 def _watch(parent):
-    """End with the process that holds the other end of a pipe, however that ends; Ctrl-C is for that process alone."""
+    """End this process when the process at the other end of a pipe ends for any reason; ignore Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
@@ -50,14 +50,15 @@ def _watch(parent):
 class Processes:
     """Processes of this machine, one thread each, by loky: they do not import the user's script, which needs no guard.
 
-    loky gives all jobs up when one process dies, and so tells nothing of which has killed it; `through` tries again.
+    loky gives up all jobs when one process dies, and does not say which job killed it; `through` tries them again.
     """
 
     local = True
 
     def __init__(self, count=None):
         self.parallel = count or cores()
-        self._pool = self._alive = None
+        self._pool: Any = None
+        self._alive: Any = None
 
     def submit(self, job):
         """Hand out a job; a `concurrent.futures.Future`."""
@@ -80,11 +81,11 @@ class Processes:
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def renew(self):
-        """Begin anew after a worker has died."""
+        """Start new processes after a worker has died."""
         self.stop()
 
     def stop(self):
-        """End all of them at once."""
+        """End all processes at once."""
         if self._pool is not None:
             self._pool.shutdown(kill_workers=True)
             self._alive.close()
@@ -92,7 +93,7 @@ class Processes:
 
 
 class Given:
-    """An executor that somebody else has made, and ends."""
+    """An executor that the caller has made and ends."""
 
     local = False
 
@@ -116,17 +117,17 @@ class Given:
         return future
 
     def renew(self):
-        """Nothing: whoever made it renews it."""
+        """Do nothing: the caller renews the executor."""
 
     def stop(self):
-        """Take back what has not begun."""
+        """Cancel the jobs that have not started."""
         for future in list(self._futures):
             future.cancel()
 
 
 @contextlib.contextmanager
 def cluster(address):
-    """The workers of a Dask cluster that is there, by the address of its scheduler, tcp://HOST:PORT.
+    """The workers of a running Dask cluster, by the address of its scheduler, tcp://HOST:PORT.
 
     Yields
     ------
@@ -152,14 +153,14 @@ def cluster(address):
 
 
 def through(jobs, workers):
-    """Results of jobs, each once, in the order in which they come.
+    """Outcomes of jobs, each once, in the order in which they arrive.
 
     Parameters
     ----------
     jobs : iterable of Job
         Jobs to run.
     workers : Processes or Given
-        Who runs it; told to stop in the end, also where that comes early.
+        Workers that run the jobs; they are stopped at the end, also at an early one.
 
     Yields
     ------
@@ -201,7 +202,7 @@ def _hand_out(jobs, running, workers, alone=False):
 
 
 def _again(broken, running, workers, suspects, tried):
-    """Put what has died aside for another try; yields what is given up, and what had ended all the same."""
+    """Keep the jobs of a dead worker for another try; yield outcomes of jobs that are given up or had finished."""
     if workers.local:  # with one process all die
         workers.renew()
         broken = list(running)

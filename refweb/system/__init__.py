@@ -1,1 +1,1 @@
-"""M v' = f assembled: force, tangent, mass, links and factorizations; it knows no scene, method or file."""
+"""M v' = f of a net: forces, tangent, mass, links and factorizations; it knows no scene, method or file."""

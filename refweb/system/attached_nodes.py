@@ -1,13 +1,14 @@
-"""Tangents of attached nodes: they are no unknowns, but move with their bodies.
+"""Tangents of nodes that bodies carry: these nodes are no unknowns and move with their bodies.
 
-With δx = δx_b + δθ × a of a node at the arm a, a force f on it is a force and the moment a × f on the body. A block of
-a cell that has such a node becomes L K T, T being what moves the cell's nodes and L what gathers their forces; and as
-the arm turns, −∂(a × f)/∂θ = (f·a) 1 − a⊗f. Where forces depend on velocity, C becomes L C T_v, and K gains what turns
-velocities:
+A node at the arm a of a body moves by δx = δx_b + δθ × a. A force f on the node acts on the body as the force f and the
+moment a × f. The block K of a cell with such a node becomes L K T: T gives the motion of the cell's nodes from that of
+its rows, and L sums the forces on the nodes to forces on the rows. Since the arm turns, −∂(a × f)/∂θ = (f·a) 1 − a⊗f is
+added. For forces that depend on velocity, C becomes L C T_v, and K gains a part because the velocities of nodes turn
+with the body:
 
     δv = δv_b + δω × a + ω × (δθ × a),        δω = W δu + δθ × ω − W (δθ × u),
 
-with W and u of `refweb.net.rotation`. A quaternion makes δθ as `refweb.net.rotation.to_quaternion` has it.
+with W and u of `refweb.net.rotation`. `refweb.net.rotation.to_quaternion` gives δθ by the change of the quaternion.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ class _Cell:
     Attributes
     ----------
     term, at : int
-        Number of the term in the pattern, and of the cell in it.
+        Number of the term in the pattern, and of the cell in the term.
     own_rows : list of int
-        Place among ``rows`` of each of its rows; −1 of one that is carried.
+        Index in ``rows`` of each row of the cell; −1 for a carried node.
     parts : list of (int, int, int)
-        Of those that are: which row it is, which node that is carried, and the place of the body's row among ``rows``,
-        before its rows of rotation.
+        For each carried node: its number in the cell, its number among the carried nodes, and the index in ``rows`` of
+        the row of its body, which the rows of rotation follow.
     """
 
     def __init__(self, term, at, cell, turns):
@@ -46,7 +47,7 @@ class _Cell:
         ]
 
     def unmoved(self):
-        """(T, L) of what is not carried, shapes (3 of the cell, 3 of its rows) and the other way round."""
+        """T and L of the rows that are not carried, shapes (3 cell rows, 3 ``rows``) and (3 ``rows``, 3 cell rows)."""
         T = np.zeros((3 * len(self.own_rows), 3 * len(self.rows)))
         for i, r in enumerate(self.own_rows):
             if r >= 0:
@@ -62,11 +63,12 @@ class Carried:
     net : refweb.net.net.Net
         With the bodies.
     terms : list of refweb.effects.base.ForceTerm
-        Those of the pattern, in its order.
+        Terms of the pattern, in its order.
     """
 
     def __init__(self, net, terms):
-        self.turns, self._terms, self._entries, self._spun = RigidRotations.of(net), terms, [], None
+        self.turns, self._terms = RigidRotations.of(net), terms
+        self._entries, self._spun = [], []  # made once there is a pattern
         turns, nodes = self.turns, self.turns.carried[:, 0]
         self._cells = [
             _Cell(i, int(at), term.cells[at], turns)
@@ -80,12 +82,12 @@ class Carried:
         return [np.array([cell.rows], dtype=np.int32) for cell in self._cells]
 
     def moving(self, rows):
-        """Rows whose motion is that of some rows: of each node that is carried its body, of any other itself."""
+        """Rows that move some rows: the body of a carried node, and each other row itself."""
         bodies = dict(zip(self.turns.carried[:, 0].tolist(), self.turns.carried[:, 1].tolist(), strict=True))
         return [int(self.turns.rows[bodies[row], 0]) if row in bodies else row for row in rows]
 
     def update_attached_nodes(self, x, v):
-        """Write places and velocities of the nodes, shape (rows, 3)."""
+        """Write displacements and velocities of the nodes into x and v, shape (rows, 3)."""
         update_attached_nodes(x, v, self.turns)
 
     def add_forces_to_bodies(self, x, f):
@@ -93,8 +95,8 @@ class Carried:
         add_forces_to_bodies(x, f, self.turns)
 
     def _arrange(self, pattern, free):
-        """Find where entries stand in the pattern of a system, which has `cells`."""
-        if self._spun is not None:
+        """Find the positions of all entries in the pattern of a system, which contains `cells`."""
+        if self._spun:
             return
         number = np.full(3 * max(3 + self.turns.rows.max(), 1 + free.max(initial=0) // 3), -1)
         number[free] = np.arange(len(free))
@@ -103,7 +105,7 @@ class Carried:
         self._entries = [_entries(cell.rows, pattern.size, number, keys) for cell in self._cells]
 
     def _state(self, x, v):
-        """Arm of each node, and ω, W, u and δθ by the quaternion of its body, (3, 4) from that behind on."""
+        """Arm, ω, W, u and ∂θ/∂q of each node; ∂θ/∂q is by the quaternion of its body, shape (3, 6)."""
         states = []
         for c, (_, n) in enumerate(self.turns.carried):
             _, spin, turn = self.turns.rows[n]
@@ -136,10 +138,10 @@ class Carried:
         return matrix_at(x, *self.turns.rows[n, 1:])
 
     def convert(self, x, blocks):
-        """Leave the columns of quaternions as they are, of which unknowns are."""
+        """Keep the columns of quaternions, which are unknowns here."""
 
     def add_stiffness(self, values, system, t, x, v, blocks, definite=False, only=None):
-        """Add to the values of K of a system what these nodes have of it, of the blocks of −∂f/∂x of its terms."""
+        """Add the part of these nodes to the values of K, from the blocks −∂f/∂x of the terms."""
         self._arrange(system.pattern, system.free)
         state, damped = self._state(x, v), {}
         for i, term in enumerate(self._terms):
@@ -161,12 +163,12 @@ class Carried:
             add_to(values, self._spun[n], expanded)
 
     def add_damping(self, values, system, x, v, blocks):
-        """Add to the values of C what these nodes have of it, of the blocks of −∂f/∂v."""
+        """Add the part of these nodes to the values of C, from the blocks −∂f/∂v."""
         self._arrange(system.pattern, system.free)
         self._add_blocks(values, self._state(x, v), lambda cell: blocks[cell.term][cell.at], 1)
 
     def _add_blocks(self, values, state, block_of, which=0):
-        """Add blocks by the matrices T of their cells, or by T of velocities, 1; cells without a block are left out."""
+        """Add the blocks of cells that have one, by their matrices T, number 0, or T of velocities, number 1."""
         for cell, entries in zip(self._cells, self._entries, strict=True):
             if (block := block_of(cell)) is not None:
                 matrices = self._matrices(cell, state)
@@ -179,7 +181,7 @@ def lever_stiffness(arm, force):
 
 
 def _entries(rows, size, number, keys):
-    """(rows, columns, places) of the entries of a block of some rows that are in a pattern, of column × size + row."""
+    """Rows, columns and positions of the entries of a block that are in a pattern of such keys."""
     of = number[3 * np.array(rows)[:, None] + np.arange(3)].ravel()
     inside = np.flatnonzero(of >= 0)
     row, column = (side.ravel() for side in np.meshgrid(inside, inside, indexing="ij"))
@@ -190,7 +192,7 @@ def _entries(rows, size, number, keys):
 
 
 def beside(expanded, block, cell):
-    """A new block of a cell without what of it is in the pattern already."""
+    """A new block of a cell without the entries that are in the pattern already."""
     T, L = cell.unmoved()
     return expanded - L @ block @ T
 

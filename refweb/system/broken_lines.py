@@ -1,12 +1,15 @@
-"""A system some of whose elements are broken."""
+"""Systems with broken elements: how a system loses elements, and the record of the breaks."""
 
 from __future__ import annotations
 
 import copy
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 class Breaks(NamedTuple):
@@ -32,18 +35,18 @@ class Breaks(NamedTuple):
     places: np.ndarray = np.zeros((0, 3))
     widths: np.ndarray = np.zeros(0)
 
-    def and_then(self, *more):
-        """These and more, which are given as the fields are."""
+    def and_then(self, *more: NDArray[Any]) -> Breaks:
+        """These breaks and more, given as the fields are."""
         return Breaks(*(np.concatenate([before, after]) for before, after in zip(self, more, strict=True)))
 
 
 def torn(system, elements, energies):
-    """The system with these elements broken, stored energy these energies [J].
+    """The system with some elements broken, whose stored energies [J] are given.
 
     Parameters
     ----------
     system : refweb.system.system.System
-        It stays as it is.
+        The system; it is not changed.
     elements : ndarray of int
         Elements.
     energies : ndarray
@@ -71,7 +74,7 @@ def torn(system, elements, energies):
 
 
 def _breakable(system):
-    """The system, or where nothing of it may break one with the column, term and `BreakLimits` of broken elements."""
+    """The system, with the column, term and `BreakLimits` of broken elements if it has none."""
     if system.weakness is not None:
         return system
     from ..effects.base import BreakLimits
@@ -86,13 +89,13 @@ def _breakable(system):
 
 
 def with_broken_lines(system):
-    """The system with the lines broken that are so in its web, each at its middle."""
+    """The system with the broken lines of its web, each broken at its middle."""
     elements = system.net.middle_of(system.net.web.broken)
     return torn(system, elements, np.zeros(len(elements)))
 
 
 def _severed(term, broken):
-    """A term that does nothing through broken elements."""
+    """The term without force in cells of broken elements."""
     if term.elements.numbers is None or term.elements.disable is None:
         return term
     left = replace(term, data=_without(term, term.data, broken[term.elements.numbers]))
@@ -104,7 +107,7 @@ def _severed(term, broken):
 
 
 def _without(term, data, ends):
-    """Numbers of cells that do nothing where an element of theirs ``ends``."""
+    """Numbers of cells, without force in the cells one of whose elements ``ends``."""
     ends = ends if ends.ndim == 1 else ends.any(axis=1)
     if not ends.any():
         return data
@@ -115,10 +118,10 @@ def _without(term, data, ends):
 
 
 def tear(system, t, x, v, elements):
-    """(The system with more of its elements broken, what each held [J]), at displacement x, velocity v and time t.
+    """The system with more elements broken, and the energy of each [J], at displacement x, velocity v and time t.
 
-    The energy that ends is that of the system less that of the torn system. Elements that break together share it in
-    proportion to the energy that each stored.
+    The lost energy is the energy of the system minus that of the torn system. Elements that break together share it in
+    proportion to their stored energies.
     """
     energy = sum(system.energy_of(f, t, x)[elements] for f in system.terms if f.over_lines and f.energy is not None)
     stored = [f for f in system.terms if f.balance.column not in ("work", "dissipated_energy")]

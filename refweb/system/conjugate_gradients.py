@@ -1,10 +1,10 @@
-"""Systems of equations by a factorization at hand, that of a matrix near theirs.
+"""Conjugate gradients with the factorization of a similar matrix as preconditioner.
 
-Conjugate gradients on A y = b, with a factorization of M in place of M⁻¹, converge as √κ allows, κ the condition of
-M⁻¹A: between two load steps of a web, whose tensions differ by a factor of two or three, a solution to 1 % takes two or
-three of them. Each costs a ninth (rslab) to a thirtieth (SuperLU) of a factorization at 118 803 unknowns. Where a few
-iterations are not enough, a factorization of A itself costs less. Where A or M shows a direction without stiffness,
-only a factorization tells more. Both cases end the iteration.
+They solve A y = b with a factorization of M. The number of iterations grows as √κ, κ the condition number of M⁻¹A.
+Between two load steps of a web, whose tensions differ by a factor of two or three, a solution to 1 % takes two or three
+iterations. An iteration costs a ninth (rslab) to a thirtieth (SuperLU) of a factorization at 118 803 unknowns. If a few
+iterations are not enough, a factorization of A itself costs less. If A or M shows a direction without stiffness, only a
+factorization can tell more. Both cases end the iteration.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 class Found(NamedTuple):
     """Solutions of A y = b, shape (n,) or (n, k).
 
-    ``left`` is √(rᵀM⁻¹r) of the residual r over that of b, the largest of all k; ``enough`` says whether it is within
-    the tolerance.
+    ``left`` is √(rᵀM⁻¹r) of the residual r over the same norm of b, the largest of all k. ``enough`` is True if it is
+    within the tolerance.
     """
 
     y: np.ndarray
@@ -28,7 +28,7 @@ class Found(NamedTuple):
 
 
 def solve(times, precondition, b, tolerance, limit):
-    """Solutions of A y = b, several side by side, as far as they come.
+    """Solve A y = b for one or several right-hand sides, to a tolerance if the iteration reaches it.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def solve(times, precondition, b, tolerance, limit):
     tolerance : float
         Largest ``left`` that is enough.
     limit : int
-        Largest number of iterations. It ends before where those so far show that they will not do.
+        Largest number of iterations. The iteration ends earlier if its rate of convergence shows that they are too few.
 
     Returns
     -------
@@ -74,5 +74,5 @@ def _dot(a, b):
 
 
 def _over(a, b):
-    """Ratio, 0 of what is 0 already."""
+    """Ratio of two numbers; 0 if the first is 0."""
     return np.where(b > 0.0, a / np.where(b > 0.0, b, 1.0), 0.0)

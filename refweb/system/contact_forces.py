@@ -1,9 +1,9 @@
-"""Contact of bodies: its force on each, the depth of lines in each, and the depth of pairs in each other.
+"""Contact of bodies: the force on each body, the depth of lines in it, and the depth of pairs of bodies.
 
-Each contact shows, in its cell, how deep it is and the force on the body that it touches, where two bodies touch that
-on the second of them, see `refweb.effects.base.ContactForce.felt`. The contact force on a body is the sum over its
-cells alone: it is zero where nothing touches the body, whatever else acts. One kernel computes this sum for all bodies:
-over the near cells in a step of the compiled loop, over all cells in a state.
+Each contact writes its depth and its force on the touched body to its cell, see
+`refweb.effects.base.ContactForce.felt`; of two bodies that is the force on the second. The contact force on a body is
+the sum over its cells alone. It is zero if nothing touches the body, whatever else acts. One kernel computes this sum
+for all bodies: over the near cells in a step of the compiled loop, over all cells in a state.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from ..effects.base import FELT, FELT_COLUMNS, TOUCH, pairs_of
 from ..kernels import kernel
 
 CONTACT_TERM = np.dtype([(name, np.int64) for name in ("number", "body", "partner", "elements", "pairs", "chosen")])
-"""A term of contact: its number; columns of its cells with the row of the body that it touches, and of the other one or
-−1; the number of elements where it is the push of lines, else 0; the row of the depth of its first pair where it is the
-push of bodies, else −1; and where the numbers of chosen cells stand, −1 for none."""
+"""A term of contact: its number; the columns of its cells with the row of the touched body and of the other body, −1
+for none; the number of elements for contact of lines, else 0; the row of the depth of its first pair for contact of
+bodies, else −1; and the position of the numbers of chosen cells, −1 for none."""
 ContactTermArray = Annotated[np.ndarray, types.Array(from_dtype(CONTACT_TERM), 1, "C")]
 
 
 class ContactForces:
-    """Contact of the bodies of a system: a row for each row behind the nodes, then one for each pair of bodies.
+    """Contact of the bodies of a system: one result row for each system row after the nodes, then one for each pair of
+    bodies.
 
     Parameters
     ----------
@@ -35,7 +36,7 @@ class ContactForces:
     Attributes
     ----------
     first : int
-        Number of the row of the system that the first row is of.
+        Number of the row of the system to which the first row belongs.
     terms : ndarray of `CONTACT_TERM`
         Terms of contact.
     rows : int
@@ -62,11 +63,11 @@ class ContactForces:
         return body.row - self.first
 
     def force_on(self, body, felt):
-        """Force of contact on a body [N], shape (3,), of what bodies feel."""
+        """Force of contact on a body [N], shape (3,), from the result of `of`."""
         return records_of(FELT, felt)["force"][self.row(body)]
 
     def lines_on(self, body):
-        """(number of the term, slice of its cells) of the push of lines on a body; cells are in order of elements."""
+        """Number of the term of contact of lines with a body, and the slice of its cells in order of elements."""
         for term in self.terms:
             indices = np.flatnonzero(self._cells[term["number"]][:, term["body"]] == body.row)
             if term["elements"] and len(indices):
@@ -74,12 +75,12 @@ class ContactForces:
         raise ValueError(f'nothing touches body "{body.name}"')
 
     def pair_rows(self, body, others):
-        """Numbers of the rows of the pairs that a body makes with some others, a list."""
+        """Numbers of the rows of the pairs of a body with some other bodies, a list."""
         rows = [self._pairs.get(frozenset((body.row, partner.row))) for partner in others]
         return [row for row in rows if row is not None]
 
     def of(self, per_cell):
-        """Contact of bodies where terms write ``per_cell``, shape (rows, `FELT_COLUMNS`)."""
+        """Contact of bodies from the values of terms per cell, shape (rows, `FELT_COLUMNS`)."""
         felt = np.empty((self.rows, FELT_COLUMNS))
         forget(felt)
         none = np.empty((0, 1), dtype=np.int32)
@@ -91,7 +92,7 @@ class ContactForces:
 
 @kernel(leaf=True, forceinline=True)
 def forget(felt):
-    """Begin with no contact."""
+    """Set all contact to zero."""
     for r in range(felt.shape[0]):
         row = record_at(FELT, felt, r, 0)
         row.depth = row.force[0] = row.force[1] = row.force[2] = 0.0
@@ -100,7 +101,7 @@ def forget(felt):
 
 @kernel(leaf=True)
 def add_felt(first, term, cells, chosen, out, felt):
-    """Add what bodies feel of the cells of a term; of those that are ``chosen`` where any are, shape (cells, 1)."""
+    """Add forces and depths of the cells of a term; with ``chosen``, shape (cells, 1), of those cells only."""
     for c in range(cells.shape[0]):
         touch = record_at(TOUCH, out, c, 0)
         depth, force = touch.value, touch.force

@@ -1,4 +1,4 @@
-"""Factorizations of tangents: LDLᵀ, whose D has the signs of the pivots, and LU of matrices that are not symmetric.
+"""Factorizations of tangents: LDLᵀ, whose D shows the signs of the pivots, and LU of unsymmetric matrices.
 
 Three libraries compute LDLᵀ. qdldl works column by column, and is fast while the factor fits into the cache. SuperLU of
 scipy computes LU; if all its pivots are on the diagonal, U is D Lᵀ. It is used from `LARGEST` unknowns on. On a CPU
@@ -21,9 +21,9 @@ import numpy as np
 from ..errors import InputError
 
 LARGE, LARGEST = 5000, 20_000
-"""Numbers of unknowns from which rslab is taken, where it is installed, and SuperLU where it is not."""
+"""Numbers of unknowns from which on rslab is used, if it is installed, and SuperLU if it is not."""
 FINE, ROUGH = 1e-8, 1e-2
-"""Residual over the right-hand side to which a solution is refined, and above which there is none."""
+"""Relative residual to which a solution is refined, and relative residual above which a solution is refused."""
 
 
 NEMIN = 8
@@ -41,16 +41,16 @@ class Library:
     Attributes
     ----------
     name : {"qdldl", "superlu", "rslab"}
-        The one that is taken.
+        Name of the library in use.
     why : str or None
-        Its name, and the reason; None where nothing has been factorized.
+        Its name and the reason for the choice; None before the first factorization.
     remarks : list of str
-        Why another took its place.
+        Reasons for which another library replaced it.
 
     Raises
     ------
     InputError
-        Where the one that is asked for is not installed.
+        If the library that the scene asks for is not installed.
     """
 
     def __init__(self, asked="auto"):
@@ -59,7 +59,7 @@ class Library:
             raise InputError("[solve] factorization = \"rslab\" is not installed: pip install 'refweb[fast]'")
 
     def choose(self, size):
-        """Take one for so many unknowns."""
+        """Choose a library for a number of unknowns."""
         if self.remarks:
             return
         self.name = self._asked
@@ -69,7 +69,7 @@ class Library:
         self.why = f"{self.name}, {f'for {size} unknowns' if self._asked == 'auto' else 'as asked for'}"
 
     def fall_back(self, what):
-        """Take qdldl from here on, and say why."""
+        """Use qdldl from here on, and note the reason."""
         self.name = "qdldl"
         self.why = f"{self.why}, then qdldl: {what}"
         self.remarks.append(f"rslab {what}: qdldl factorizes instead, and the results are its")
@@ -78,9 +78,10 @@ class Library:
 class _Qdldl:
     """LDLᵀ by qdldl, column by column, without exchanges of pivots; the ordering is found once.
 
-    It is that of minimum degree, where of equal degrees the number decides. From `LARGE` unknowns on the second
-    factorization counts them from the last one on, and the way that fills less is kept: of hexagon webs the factor is
-    an eighth smaller then and takes a fifth less time, of triangles it is larger, of squares the same.
+    It is the ordering of minimum degree; among equal degrees the number decides. From `LARGE` unknowns on, the second
+    factorization counts the unknowns from the last one on, and the direction with less fill-in is kept. For hexagon
+    webs the factor is then an eighth smaller and takes a fifth less time; for triangles it is larger, for squares the
+    same.
     """
 
     solutions = 10
@@ -90,7 +91,7 @@ class _Qdldl:
         self._solver: Any = None
 
     def factorize(self, values):
-        """Factorize; a zero pivot shows in the solutions alone."""
+        """Factorize; only the solutions show a zero pivot."""
         if self._solver is None:
             self._begin(values)
             return
@@ -136,7 +137,7 @@ class _Qdldl:
 
 
 class _Superlu:
-    """LU by SuperLU with pivots on the diagonal, which has the signs of LDLᵀ."""
+    """LU by SuperLU with pivots on the diagonal; their signs are those of LDLᵀ."""
 
     solutions = 8
 
@@ -145,7 +146,7 @@ class _Superlu:
         self._lu: Any = None
 
     def factorize(self, values):
-        """Factorize; a RuntimeError where the matrix is singular, or a pivot is not on the diagonal."""
+        """Factorize; raise a RuntimeError if the matrix is singular or a pivot is not on the diagonal."""
         self._matrix = self.pattern.matrix(values)
         self._lu = None  # of which there is one at a time in memory
         self._lu = symmetric_lu(self._matrix)
@@ -177,7 +178,7 @@ class _Rslab:
         self._symbolic: Any = None
 
     def factorize(self, values):
-        """Factorize; a RuntimeError where the matrix is singular."""
+        """Factorize; raise a RuntimeError if the matrix is singular."""
         import rslab
 
         self._matrix = self.pattern.matrix(values)
@@ -191,7 +192,7 @@ class _Rslab:
         return self._factor.solve(b)
 
     def solve_all(self, b):
-        """Solutions of A y = b, shape (n, k), in half the time that one by one takes."""
+        """Solutions of A y = b, shape (n, k), in half the time of separate solutions."""
         return self._factor.solve_many(b)
 
     def times(self, y):
@@ -199,7 +200,7 @@ class _Rslab:
         return self._matrix @ y
 
     def negative_pivots(self):
-        """Number of pivots that are not positive, None where those that it counts are not all."""
+        """Number of pivots that are not positive; None if rslab does not report all signs."""
         positive, negative, zero = self._factor.inertia
         complete = positive + negative + zero == self.pattern.size and not self._factor.n_perturbed
         return negative + zero if complete else None
@@ -209,14 +210,14 @@ LIBRARIES = {"qdldl": _Qdldl, "superlu": _Superlu, "rslab": _Rslab}
 
 
 class Factor:
-    """LDLᵀ of matrices of one `refweb.system.sparsity.Pattern`, by the `Library` of that; the ordering is kept.
+    """LDLᵀ of matrices of one `refweb.system.sparsity.Pattern`, by its `Library`; the ordering is kept.
 
     Attributes
     ----------
     shift : float or None
-        Prestress τ by which the tangent that it holds is shifted [N]; None where it holds no tangent.
+        Prestress τ by which the factorized tangent is shifted [N]; None if the matrix is no tangent.
     solutions : int
-        Number of solutions below which these cost clearly less than another factorization.
+        Number of solutions that cost clearly less than another factorization.
     """
 
     def __init__(self, pattern):
@@ -248,9 +249,10 @@ class Factor:
         self._by.factorize(self._values)
 
     def solve(self, b):
-        """Solution of A y = b, shape (n,); None where the factorization broke down on a zero pivot.
+        """Solution of A y = b, shape (n,); None if the factorization broke down on a zero pivot.
 
-        qdldl reports no breakdown, so the residual of the solution is looked at and, where it is large, refined away.
+        qdldl reports no breakdown: therefore the residual of the solution is computed and, if it is large, reduced by
+        refinement.
         """
         if not self.pattern.size:
             return np.zeros(0)
@@ -267,7 +269,7 @@ class Factor:
         return y if error <= ROUGH else None
 
     def precondition(self, b):
-        """Solutions of A y = b as they come, shape (n,) or (n, k), for what looks at the residual itself."""
+        """Solutions of A y = b without refinement, shape (n,) or (n, k), for a caller that checks the residual."""
         return self._by.solve(b) if b.ndim == 1 else self._by.solve_all(b)
 
     def _refined(self, b):
@@ -295,7 +297,7 @@ class Factor:
 
 
 def symmetric_lu(matrix):
-    """LU of a symmetric matrix by SuperLU, ordered for symmetric ones, whose pivots are on the diagonal."""
+    """LU of a symmetric matrix by SuperLU, with an ordering for symmetric matrices and pivots on the diagonal."""
     from scipy.sparse.linalg import splu
 
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -321,7 +323,7 @@ def _not_positive(solver):
 
 
 class Lu:
-    """LU of matrices of one `refweb.system.sparsity.Pattern`, with what a `Factor` has."""
+    """LU of matrices of one `refweb.system.sparsity.Pattern`, with the interface of a `Factor`."""
 
     shift, solutions = None, 0
 
@@ -339,7 +341,7 @@ class Lu:
             self._solver = None
 
     def solve(self, b, transposed=False):
-        """Solution of A y = b, shape (n,), or of Aᵀ y = b; None where there is none."""
+        """Solution of A y = b, shape (n,), or of Aᵀ y = b; None if A is singular."""
         if self.singular:
             return None
         y = self._solver.solve(b, "T" if transposed else "N")
@@ -356,16 +358,16 @@ class Lu:
         return int(np.prod(np.sign(self._solver.U.diagonal()))) * (-1 if odd else 1)
 
     def negative_pivots(self) -> int:
-        """No signs of pivots tell of what is not symmetric."""
+        """Refuse: the signs of pivots say nothing about an unsymmetric matrix."""
         raise NotImplementedError
 
     def precondition(self, b) -> np.ndarray:
-        """Conjugate gradients are for what is symmetric."""
+        """Refuse: conjugate gradients need a symmetric matrix."""
         raise NotImplementedError
 
 
 def _is_odd(turned):
-    """Tell if an odd number of exchanges makes a permutation."""
+    """Tell if a permutation is odd."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
-class PerCell(list):
+    from numpy.typing import NDArray
+
+
+class PerCell(list[Any]):
     """Values of each term per cell, an array beside each of `System.terms`.
 
     Attributes
@@ -16,12 +21,13 @@ class PerCell(list):
         That of the lines, with the columns of `refweb.effects.base`.
     """
 
-    def __init__(self, arrays, lines, tension_column):
+    def __init__(self, arrays: Sequence[NDArray[np.float64]], lines: NDArray[np.float64], tension_column: int) -> None:
         super().__init__(arrays)
-        self.lines, self._tension_column = lines, tension_column
+        self.lines: NDArray[np.float64] = lines
+        self._tension_column = tension_column
 
     @property
-    def tension(self):
+    def tension(self) -> NDArray[np.float64]:
         """Tension of each element [N], with damping where there is some, a view of ``lines``."""
         return self.lines[:, self._tension_column]
 

@@ -1,7 +1,7 @@
-"""Rigid links of a system: their equations, and the forces that keep their lengths.
+"""Rigid links of a system: their equations and the forces that keep the lengths.
 
-With M a + Gᵀλ = f and G = ∂g/∂x, accelerations keep the lengths where G a = −|v₂ − v₁|²/L; so do the nearest
-velocities where G v = 0, and the nearest positions where G δx = −g, as mass weighs distance.
+The accelerations satisfy M a + Gᵀλ = f with G = ∂g/∂x, and keep the lengths if G a = −|v₂ − v₁|²/L. A state is moved to
+the nearest velocities with G v = 0 and to the nearest positions with G δx = −g; mass weighs the distance.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from ..errors import InputError, SolverError
 from .factorization import weak_pivot
 
 WEAK = 1e-12
-"""Share of its largest entry that each pivot of G M⁻¹ Gᵀ has to exceed."""
+"""Smallest pivot of G M⁻¹ Gᵀ over its largest entry, for which the forces of links count as determined."""
 STRETCH = 1e-6
 """Largest relative error of a length in a state to start from."""
 FINE = 1e-13
-"""Relative error of lengths that is left."""
+"""Relative error of lengths at which an iteration stops."""
 
 
 class Links:
-    """All links of a system, in what has mass and is free.
+    """All links of a system, for the components that have mass and are free.
 
     Attributes
     ----------
@@ -31,7 +31,8 @@ class Links:
     Raises
     ------
     InputError
-        For a link that holds nothing, more than there is to hold, or a node that has no mass or is moved.
+        For a link between supported nodes, a distance that is kept already, and a node without mass or with prescribed
+        motion.
     """
 
     def __init__(self, system):
@@ -86,7 +87,7 @@ class Links:
             )
 
     def refuse_stretched(self, x):
-        """Refuse a start that is not made of these links."""
+        """Refuse a start in which a link does not have its length."""
         off = self.pairs.excess(x) / self.pairs.length
         worst = int(np.abs(off).argmax())
         if not abs(off[worst]) < STRETCH:
@@ -107,14 +108,15 @@ class Links:
         return self._sign * self.pairs.direction(x)[self._link, self._axis]
 
     def places(self, position, velocity, first):
-        """Rows and columns of what links add to the Jacobian of `refweb.dynamics.integrators.ida`.
+        """Rows and columns of the entries that links add to the Jacobian of `refweb.dynamics.integrators.ida`.
 
         Parameters
         ----------
         position, velocity : ndarray of int
-            Number of x' − v, and of M v' − f, of all that has mass and is free; x and v have the same.
+            Numbers of the equations x' − v and M v' − f of all components with mass that are free; x and v have the
+            same numbers.
         first : int
-            Number of g and λ of the first link; those of G v and μ follow.
+            Number of g and of λ of the first link; the numbers of G v and μ follow.
         """
         x, v, force = position[self._unknown], velocity[self._unknown], first + self._link
         rate, both = force + len(self), self._both
@@ -122,14 +124,14 @@ class Links:
         return [(v, force), values, across, (x, rate), (force, x), (rate, v), (rate, x)]
 
     def values(self, x, v, multipliers):
-        """Values at those places."""
+        """Values of the entries at `places`."""
         G, length = self._entries(x), self.pairs.length[self._link]
         turn = multipliers[self._link] / length
         rate = self._sign * self.pairs.between(v)[self._link, self._axis] / length
         return [G, turn, -turn[self._both], G, G, G, rate]
 
     def solve(self, x, f, b):
-        """a and λ of M a + Gᵀλ = f, G a = b, by the last factorization where refinement makes up for its age."""
+        """Solve M a + Gᵀλ = f, G a = b for a and λ, by the last factorization if refinement reaches the residual."""
         from scipy.sparse import csc_array
 
         G, size = self._entries(x), len(self._pattern[1]) - 1
@@ -148,11 +150,11 @@ class Links:
         return solution[: len(f)], solution[len(f) :]
 
     def start(self, x, v, force):
-        """Accelerations of what has mass [m/s²], and λ [N], for the forces of all else [N]."""
+        """Accelerations of the components with mass [m/s²], and λ [N], for all other forces [N]."""
         return self.solve(x, force.ravel()[self._at], -self.pairs.turning(v))
 
     def force(self, x, v, force):
-        """Force of the links on every row [N], shape (rows, 3), for the forces of all else [N]."""
+        """Force of the links on every row [N], shape (rows, 3), for all other forces [N]."""
         return -self.pairs.pull(x, self.start(x, v, force)[1])
 
     def drift(self, x, v):

@@ -1,7 +1,7 @@
-"""Mass of a system: a number for each row, or, where it is consistent, a matrix that couples the rows of an element.
+"""Mass of a system: lumped, a number for each row, or consistent, a matrix that couples the rows of an element.
 
-M is the lumped mass on its diagonal, plus what makes it consistent: blocks of each element whose rows sum to 0, so that
-both move a rigid net alike.
+M is the lumped mass on the diagonal plus, for consistent mass, a block of each element whose rows sum to 0. Both masses
+therefore move a rigid net in the same way.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Mass:
     free : ndarray of int
         Components of the unknowns, 3 row + axis.
     pattern : refweb.system.sparsity.Pattern
-        Where the entries of the unknowns stand.
+        Pattern of the unknowns.
     lines : int, optional
         Number of the lines among the terms of the pattern; needed where mass is consistent.
     """
@@ -33,7 +33,7 @@ class Mass:
 
     @cached_property
     def values(self):
-        """M of the unknowns [kg] in the fixed pattern."""
+        """Values of M of the unknowns [kg] in the fixed pattern."""
         net, values = self._net, np.zeros(len(self._pattern.indices))
         if net.consistent_minus_lumped is not None:
             values += self._pattern.assemble_one(self._lines, np.kron(net.consistent_minus_lumped, np.eye(3)))
@@ -51,7 +51,7 @@ class Mass:
 
     @property
     def matrix(self):
-        """M of those components, a `scipy.sparse.csc_array`."""
+        """M of the components `heavy`, a `scipy.sparse.csc_array`."""
         return self._pattern.matrix(self.values)[self._heavy][:, self._heavy].tocsc()
 
     @cached_property
@@ -62,7 +62,7 @@ class Mass:
         return splu(self.matrix)
 
     def moved_by(self, push):
-        """M⁻¹ of a push on every row, for what is free: accelerations [m/s²] by forces; shape (rows, 3)."""
+        """M⁻¹ f for a force on every row: accelerations [m/s²] of the free components, shape (rows, 3)."""
         moved = np.zeros((len(self._net.mass), 3))
         moved.ravel()[self.heavy] = self.factor.solve(push.ravel()[self.heavy])
         return moved
@@ -80,11 +80,11 @@ class Mass:
         return coo_array((net.consistent_minus_lumped.ravel(), pairs), shape=(rows, rows)).tocsr()
 
     def passed_on(self, acceleration):
-        """Force of consistent less lumped M times an acceleration [N], (rows, 3)."""
+        """Difference of consistent and lumped M times an acceleration [N], shape (rows, 3)."""
         return self._consistent_minus_lumped @ acceleration
 
     def kick(self, jump):
-        """Jump of all velocities where prescribed ones jump by ``jump`` [m/s]: consistent mass passes it on."""
+        """Jump of all velocities [m/s] caused by a ``jump`` of prescribed velocities: consistent mass couples them."""
         return jump if self._consistent_minus_lumped is None else jump - self.moved_by(self.passed_on(jump))
 
     def momentum(self, v):

@@ -1,10 +1,11 @@
-"""Bodies that turn, at rest: their unknowns are a place and a rotation vector each, and the tangent by these.
+"""Free bodies in statics: each has a position and a rotation vector as unknowns; tangents by these.
 
 An orientation has no coordinates in which a step is a sum: a step p turns a body by the rotation vector p from where it
-is, q becomes exp(p/2) q. The force that belongs to p is the moment m about the centre, along the axes of space. Where
-all has a potential Π, the second derivative of Π along such steps is the symmetric part of −∂m/∂p; the rest, half the
-matrix of m ×, vanishes with the moment in an equilibrium. So Newton's method with the symmetric part goes down Π, is
-exact to second order, and its pivots say whether an equilibrium is stable. Without a potential K is −∂m/∂p as it is.
+is, q becomes exp(p/2) q. The force that belongs to p is the moment m about the centre, along the axes of space. If all
+forces have a potential Π, the second derivative of Π along such steps is the symmetric part of −∂m/∂p. The other part,
+half the matrix of m ×, is zero in an equilibrium, as the moment is. Newton's method with the symmetric part therefore
+reduces Π and converges quadratically, and its pivots show if an equilibrium is stable. Without a potential K is −∂m/∂p
+itself.
 
 A body on an axle turns about that alone: its moment counts along the direction n of the axle, and of K what is n nᵀ K n
 nᵀ, beside a stiffness across that moves nothing.
@@ -23,7 +24,7 @@ from .attached_nodes import Carried, add_to, cross_matrix, lever_stiffness
 ACROSS = 1e-6
 """Moment of inertia across an axle over that about it: what it makes are modes a thousand times as fast, of no body."""
 NO_TURN = np.hstack([np.eye(3), np.zeros((3, 3))])
-"""δθ of the two rows of rotation of a body: the first has it as its displacement."""
+"""∂θ of the two rows of rotation of a body: the first row has the rotation vector as its displacement."""
 
 
 class RestingBodies(Carried):
@@ -66,7 +67,7 @@ class RestingBodies(Carried):
                 values[at[block]] += size * (np.eye(3) - along)[row[block], column[block]]
 
     def convert(self, x, blocks):
-        """Make columns of rotation vectors of those of quaternions, in blocks of −∂f/∂x of all terms."""
+        """Replace the columns of quaternions by columns of rotation vectors, in blocks −∂f/∂x of all terms."""
         for i, cells, at, n in self._columns:
             _, spin, turn = self.turns.rows[n]
             u, block = x[spin], blocks[i]
@@ -76,7 +77,7 @@ class RestingBodies(Carried):
             block[cells, :, at + 3 : at + 6] = 0.0
 
     def _state(self, x, v):
-        """Arm of each node, and ω, W, u and δθ by the rows of rotation of its body, at rest."""
+        """Arm of each node, and ω, W, u and ∂θ by the rows of rotation of its body, at rest."""
         zero, states = np.zeros(3), []
         for (_, n), arm in zip(self.turns.carried, self.turns.arms, strict=True):
             R = np.array(self.matrix(n, x))
@@ -84,7 +85,7 @@ class RestingBodies(Carried):
         return states
 
     def add_stiffness(self, values, system, t, x, v, blocks, definite=False, only=None):
-        """Add to the values of K of a system what these nodes have of it, of the blocks of −∂f/∂x of its terms.
+        """Add the part of these nodes to the values of K, from the blocks −∂f/∂x of the terms.
 
         ``definite`` and ``only`` are those of `refweb.system.system.System.stiffness`.
         """
@@ -108,14 +109,14 @@ class RestingBodies(Carried):
         self._leave_along_axles(system.pattern, values)
 
     def _make_symmetric(self, values):
-        """Leave the symmetric part of what a rotation of each body has of its own moment."""
+        """Replace the derivative of the moment of each body by its own rotation with the symmetric part."""
         for row, column, at in self._spun:
             matrix = np.zeros((6, 6))
             matrix[row, column] = values[at]
             values[at] = 0.5 * (matrix + matrix.T)[row, column]
 
     def add_across(self, values, system, lines, blocks):
-        """Add what these nodes have of blocks (3 nodes, 3 nodes) of the lines, the term of that number, as built."""
+        """Add the part of these nodes in blocks (3 nodes, 3 nodes) of the term ``lines``, in the position as built."""
         self._arrange(system.pattern, system.free)
         still = np.zeros((system.rows, 3))
         state = self._state(still, still)
@@ -123,16 +124,16 @@ class RestingBodies(Carried):
         self._leave_along_axles(system.pattern, values, across=False)
 
     def add_moves(self, x, moves):
-        """Write the moves of nodes to moves of all rows about x, to first order, shape (k, rows, 3)."""
+        """Write displacements of carried nodes into moves of all rows about x, to first order, shape (k, rows, 3)."""
         for (node, n), (arm, *_) in zip(self.turns.carried, self._state(x, x), strict=True):
             row, spin, _ = self.turns.rows[n]
             moves[:, node] = moves[:, row] + np.cross(moves[:, spin], arm)
 
     def tensors(self, values, system, x):
-        """Values with those of rotations times J/I, of the tensor of inertia J of each body as it stands at x.
+        """Values, with those of rotations times J/I, J the tensor of inertia of each body in its orientation at x.
 
-        So those of M have the tensor in place of the one moment I, and those of the identity make rates of L/I those of
-        the angular velocity.
+        Values of M then contain the tensor in place of the one moment I, and values of the identity convert rates of
+        L/I to rates of the angular velocity.
         """
         self._arrange(system.pattern, system.free)
         values = values.copy()
@@ -161,13 +162,13 @@ class RestingBodies(Carried):
         return turned
 
     def momenta(self, system, x):
-        """Matrix of the unknowns that makes forces by L/I of bodies those by their angular velocity, sparse."""
+        """Sparse matrix of the unknowns that converts derivatives by L/I to derivatives by angular velocities."""
         values = np.zeros(len(system.pattern.indices))
         values[system.pattern.diagonal] = 1.0
         return system.pattern.matrix(self.tensors(values, system, x))
 
     def coriolis(self, system, x, speed):
-        """−∂f/∂ω of the moments 2 ω × S Ω in axes that turn by Ω, see `refweb.effects.turning_bodies`, values."""
+        """Values of −∂f/∂ω of the moments 2 ω × S Ω in axes that turn with Ω, see `refweb.effects.turning_bodies`."""
         self._arrange(system.pattern, system.free)
         values = np.zeros(len(system.pattern.indices))
         for n, (row, column, at) in enumerate(self._spun):

@@ -1,4 +1,4 @@
-"""Fixed sparsity pattern of the tangent of a net."""
+"""Fixed sparsity pattern of the tangent of a net, and the assembly of blocks of cells into its values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _scatter(blocks, slots, values):
 
 
 def _different(keys):
-    """Different values of keys, increasing; sorting them takes a fifth of what `numpy.unique` takes, which hashes."""
+    """Different values of keys, increasing; sorting takes a fifth of the time of `numpy.unique`, which hashes."""
     keys = np.sort(keys)
     return keys[np.append(True, keys[1:] != keys[:-1])] if len(keys) else keys
 
@@ -32,7 +32,8 @@ def _different(keys):
 class Pattern:
     """CSC pattern of the free components of all cells that couple them.
 
-    It has every diagonal entry, and off the diagonal only what some term couples; slack or zero entries stay in it.
+    It has every diagonal entry and, off the diagonal, the entries that a term couples. Entries that are zero stay in
+    it.
 
     Parameters
     ----------
@@ -45,16 +46,16 @@ class Pattern:
     library : refweb.system.factorization.Library
         Library that factorizes symmetric matrices.
     also : list of ndarray of int32, shape (cells, arity)
-        Other cells that are coupled, by what is no term.
+        Further cells whose rows are coupled, but not by a term.
 
     Attributes
     ----------
     indptr, indices : ndarray of int32
         The pattern.
     slots : list of ndarray of int32, shape (cells, (3 arity)²)
-        Place of each entry of a cell's block, row by row, in the values; −1 where a component is supported.
+        Position in the values of each entry of a cell's block, row by row; −1 if a component is supported.
     diagonal : ndarray of int
-        Places of the diagonal.
+        Positions of the diagonal in the values.
     """
 
     def __init__(self, rows, free, cells, library, also=()):
@@ -80,7 +81,7 @@ class Pattern:
         self.diagonal = places[of_cells[0]][:, range(3), range(3)].ravel()[free]
 
     def _places(self, number, column, row, coupled):
-        """Place of each entry of each block, by column and row of it; −1 of what is no entry. Sets the pattern."""
+        """Find the pattern, and the position of each entry of each block by its column and row; −1 for no entry."""
         inside = (number[column] >= 0)[:, :, None] & (number[row] >= 0)[:, None, :]
         inside &= coupled[:, None, None] | np.eye(3, dtype=bool)
         count = inside.sum(axis=2, dtype=np.int32)
@@ -105,17 +106,17 @@ class Pattern:
 
     @cached_property
     def lower(self):
-        """Places of the lower triangle, diagonal included, shape (entries,)."""
+        """Positions of the lower triangle, diagonal included, shape (entries,)."""
         return np.flatnonzero(self.indices >= self._columns)
 
     @cached_property
     def upper(self):
-        """Places of the upper triangle, diagonal included, shape (entries,)."""
+        """Positions of the upper triangle, diagonal included, shape (entries,)."""
         return np.flatnonzero(self.indices <= self._columns)
 
     @cached_property
     def _upper_pattern(self):
-        """Row of each entry of the upper triangle, and where its columns start."""
+        """Row of each entry of the upper triangle, and the starts of its columns."""
         starts = np.searchsorted(self._columns[self.upper], np.arange(self.size + 1))
         return self.indices[self.upper], starts.astype(np.int32)
 

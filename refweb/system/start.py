@@ -1,4 +1,4 @@
-"""Start of a system, as its effects and bodies have it."""
+"""Displacement and velocity at the start, from the effects and bodies of a system."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 
 def laid(system):
-    """Displacement at the start [m], shape (rows, 3); None where the web starts as it is."""
+    """Displacement at the start [m], shape (rows, 3); None if the web starts in its position as built."""
     return next((e.lay(system.net, system.supported) for e in system.effects if hasattr(e, "lay")), None)
 
 
 def initial_velocity(system):
-    """Velocities at the start [m/s], shape (rows, 3): those of the effects, where the web is laid, and of bodies."""
+    """Velocities at the start [m/s], shape (rows, 3), from effects, in the start position of the web, and bodies."""
     v, net = np.zeros((system.rows, 3)), system.net
     net = net if system.laid is None else replace(net, points=net.points + system.laid)
     for effect in system.effects:

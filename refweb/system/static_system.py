@@ -1,4 +1,4 @@
-"""The system of statics: free bodies are fixed, and forces that need velocity are left out."""
+"""The system of statics: bodies that wait are fixed, and forces that need velocity are left out."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ NEAR = 1e-6
 
 
 def at_rest(system):
-    """A copy in which what needs velocity is left out and `waiting` bodies are held and feel nothing; or the system.
+    """A copy without forces that need velocity, with `waiting` bodies fixed and untouched; or the system itself.
 
-    Bodies that tables move are where these have them.
+    Bodies that tables move are in their positions by the tables.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def at_rest(system):
 
 
 def waiting(system):
-    """Free bodies that take no part in an equilibrium that dynamics starts from, a list.
+    """Free bodies that take no part in the equilibrium from which dynamics starts, a list.
 
     Those that move at the start, and those at rest that carry no nodes and touch nothing; in statics none.
     """
@@ -63,7 +63,7 @@ def waiting(system):
 
 
 def _touches(system, body):
-    """Tell if a body touches a line where it starts."""
+    """Tell if a body touches a line in its start position."""
     start = np.zeros((system.rows, 3))
     system.drive(0.0, start)
     for term in system.terms:

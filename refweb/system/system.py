@@ -4,8 +4,8 @@ A `System` concatenates the terms of its effects once and has the interface of o
 ``x`` is the displacement of each row from its reference position, shape (rows, 3); a solver sees only the system.
 
 Where effects prescribe natural lengths, the numbers of the lines are a function of time, `System.line_data`: every
-force and energy asks for those of its own t, and `System.at` is the system as it stands at one time. The net is as
-built throughout. A loop of kernels, which cannot ask, keeps an array of its own and sets lengths in that.
+force and energy uses the numbers of its time t, and `System.at` returns the system with the numbers of one time. The
+net itself keeps its lengths as built. A loop of kernels cannot call Python, and keeps its own array of lengths.
 
 Values are written to arrays of the caller, by default new ones, so that threads may share a system.
 """
@@ -15,6 +15,7 @@ from __future__ import annotations
 import copy
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,11 +26,27 @@ from ..net.rotation import turn_by
 from .forces import Forces, PerCell
 from .start import initial_velocity, laid
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ..effects.natural_lengths import NaturalLengths
+    from ..net.laws.line_data import LineData
+    from ..net.net import Net
+    from ..net.rigid_body import RigidBody
+    from .contact_forces import ContactForces
+    from .factorization import Library
+    from .links import Links
+    from .mass import Mass
+    from .sparsity import Pattern
+    from .unsupported_parts import Part
+
 MOST_TURN = 0.5
 """Largest angle by which a step of statics turns a body [rad]."""
 
 
-def parts_of(effects, net):
+def parts_of(effects: Sequence[Any], net: Net) -> list[Any]:
     """Terms, motions, constraints and limits of effects on a net, in their order, a list."""
     parts = [effect.on(net) for effect in effects if hasattr(effect, "on")]
     return [item for part in parts for item in (part if isinstance(part, list) else [part])]
@@ -58,19 +75,21 @@ class System:
     constraints : list of refweb.effects.base.Constraint
         One per effect that keeps distances; no force of the system holds them.
     weakness : refweb.effects.base.Weakness or None
-        Limits of elements that may break; None if no element breaks.
+        Limits of elements that may break; None if none may.
     carried : ndarray of bool, shape (rows,)
-        Nodes that free bodies carry: those move with these.
+        True for nodes that free bodies carry and that move with them.
     internal : refweb.effects.base.InternalVariables or None
         Internal variables of lines.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     angles : bool
-        True if unknowns of bodies that turn are rotation vectors, see `refweb.system.resting_bodies`, and not
-        quaternions: so it is in statics.
+        True if the unknowns of rotation of bodies are rotation vectors, as in statics, see
+        `refweb.system.resting_bodies`; False for quaternions.
     """
 
-    def __init__(self, net, effects, supported, factorization="auto"):
+    def __init__(
+        self, net: Net, effects: Sequence[Any], supported: NDArray[np.bool_], factorization: str = "auto"
+    ) -> None:
         for effect in sorted(effects, key=lambda effect: hasattr(effect, "on")):  # bodies before what makes them turn
             if hasattr(effect, "extend"):
                 net = effect.extend(net)
@@ -78,22 +97,25 @@ class System:
         for effect in effects:
             if hasattr(effect, "add_internal"):
                 net = effect.add_internal(net)
-        self.net, self.effects = net, effects
-        self.rows = len(net.points)
+        self.net: Net = net
+        self.effects: Sequence[Any] = effects
+        self.rows: int = len(net.points)
         acting = parts_of(effects, net)
         if any(body.axle and body.axle.torque for body in net.bodies):
             from ..effects.axle import torques
 
             acting += torques(net)
-        self.terms = [a for a in acting if isinstance(a, ForceTerm)]
-        self.drives = [a for a in acting if isinstance(a, PrescribedMotion)]
-        self.constraints = [a for a in acting if isinstance(a, Constraint)]
-        self.weakness = next((a for a in acting if isinstance(a, BreakLimits)), None)
+        self.terms: list[ForceTerm] = [a for a in acting if isinstance(a, ForceTerm)]
+        self.drives: list[PrescribedMotion] = [a for a in acting if isinstance(a, PrescribedMotion)]
+        self.constraints: list[Constraint] = [a for a in acting if isinstance(a, Constraint)]
+        self.weakness: BreakLimits | None = next((a for a in acting if isinstance(a, BreakLimits)), None)
         powers = [term.balance.power for term in self.terms if term.over_lines and term.balance.power is not None]
         if len(set(powers)) < len(powers):
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
         self.internal = next((term.internal for term in self.terms if term.internal), None)
-        self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
+        self.supported: NDArray[np.bool_] = np.vstack(
+            [supported, np.zeros((self.rows - len(supported), 3), dtype=bool)]
+        )
         if self.internal is not None:
             self.supported[self.rows - net.internal :] = True
             self.supported.ravel()[self.internal.components] = False
@@ -101,10 +123,10 @@ class System:
             self.supported[body.row] = self.supported[body.base] = body.fixed or bool(body.axle)
         for drive in self.drives:
             self.supported[drive.cells[:, 0]] = True
-        self.angles = net.quasi_static and self.turning
+        self.angles: bool = net.quasi_static and self.turning
         if self.angles:
             self.supported[[body.turn for body in net.bodies if body.turn is not None]] = True
-        self.carried = np.zeros(self.rows, dtype=bool)
+        self.carried: NDArray[np.bool_] = np.zeros(self.rows, dtype=bool)
         self.carried[net.carried] = True
         self.supported[self.carried] = True
         self._factorization = factorization
@@ -112,32 +134,32 @@ class System:
             _ = self.library  # which refuses it where it is not installed
         self.arrange()
 
-    def arrange(self):
-        """Find what follows from what is supported and acts."""
-        self.free = np.flatnonzero(~self.supported)
+    def arrange(self) -> None:
+        """Set the attributes that follow from supports and terms."""
+        self.free: NDArray[np.int64] = np.flatnonzero(~self.supported)
         self._zero = np.zeros((self.rows, 3))
         self._at_time = None  # the last time that lengths were asked for, and `line_data` then, which stays as it is
 
     @cached_property
-    def library(self):
+    def library(self) -> Library:
         """Library that factorizes its symmetric matrices, a `refweb.system.factorization.Library`."""
         from .factorization import Library
 
         return Library(self._factorization)
 
     @property
-    def fixed(self):
-        """Components of places that supports hold, axles, or prescribed motion, shape (rows, 3)."""
+    def fixed(self) -> NDArray[np.bool_]:
+        """True for components of position that supports, axles or prescribed motion fix, shape (rows, 3)."""
         fixed = self.supported & ~self.carried[:, None]
         fixed[self.rows - self.net.spins :] = False
         return fixed
 
     @property
-    def factorized_by(self):
-        """The library that has factorized and the reason, in words; None where none has."""
+    def factorized_by(self) -> str | None:
+        """Name of the library that has factorized and the reason, a text; None before a factorization."""
         return self.library.why if "library" in self.__dict__ else None
 
-    def remarks(self):
+    def remarks(self) -> list[Finding]:
         """Findings on the factorizations."""
         remarks = self.library.remarks if "library" in self.__dict__ else []
         return [Finding("slow-library", text, "solve") for text in remarks]
@@ -157,26 +179,26 @@ class System:
         return follower.taken_on(self.at(t).net, x) if follower else x
 
     @cached_property
-    def laid(self):
-        """Displacement at the start [m], shape (rows, 3); None where the web starts as it is."""
+    def laid(self) -> NDArray[np.float64] | None:
+        """Displacement at the start [m], shape (rows, 3); None if the web starts in its position as built."""
         return laid(self)
 
-    def initial_velocity(self):
+    def initial_velocity(self) -> NDArray[np.float64]:
         """Velocities at the start [m/s], shape (rows, 3): those of the effects and bodies."""
         return initial_velocity(self)
 
     @property
-    def lines(self):
-        """The `ForceTerm` of the lines by their law; None where they have no tension."""
+    def lines(self) -> ForceTerm | None:
+        """The `ForceTerm` of the tension of lines; None if they have no tension."""
         return next((term for term in self.terms if term.over_lines), None)
 
     @property
     def _in_tangent(self):
-        """Terms with a stiffness or a damping: those of the pattern, in its order."""
+        """Terms with a stiffness or a damping, in the order of the pattern."""
         return [f for f in self.terms if f.tangent.stiffness is not None or f.velocity.damping is not None]
 
     @cached_property
-    def pattern(self):
+    def pattern(self) -> Pattern:
         """The fixed `refweb.system.sparsity.Pattern` of the tangent."""
         from .sparsity import Pattern
 
@@ -185,10 +207,10 @@ class System:
         return Pattern(self.rows, self.free, [f.cells for f in self._in_tangent], self.library, also)
 
     @cached_property
-    def carriers(self):
-        """The `refweb.system.attached_nodes.Carried` of bodies that carry nodes; None where none does.
+    def carriers(self) -> Any:
+        """The `refweb.system.attached_nodes.Carried` of bodies that carry nodes; None if none does.
 
-        At rest the `refweb.system.resting_bodies.RestingBodies` of those that turn.
+        In statics the `refweb.system.resting_bodies.RestingBodies` of bodies that turn.
         """
         if self.angles:
             from .resting_bodies import RestingBodies
@@ -201,10 +223,10 @@ class System:
         return Carried(self.net, self._in_tangent)
 
     @cached_property
-    def levers(self):
-        """Length of each row [m], shape (rows,), by which moments and rotations compare with forces and places.
+    def levers(self) -> NDArray[np.float64]:
+        """Lever of each row [m], shape (rows,), which compares moments and rotations with forces and displacements.
 
-        1 of what is no rotation.
+        It is 1 for rows that are no rotation.
         """
         levers = np.ones(self.rows)
         for body in self.net.bodies:
@@ -212,38 +234,39 @@ class System:
                 levers[body.spin] = max([body.extent, *np.linalg.norm(body.points, axis=1)])
         return levers
 
-    def sizes(self, force):
-        """Size of the force on each row [N], of a moment that over its lever, shape (rows,)."""
+    def sizes(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Magnitude of the force on each row [N], for a moment over its lever, shape (rows,)."""
         sizes = np.linalg.norm(force, axis=1)
         return sizes / self.levers if self.net.spins else sizes
 
     @property
-    def resting(self):
+    def resting(self) -> list[RigidBody]:
         """Free bodies whose places are unknowns, and at rest those that turn about axles, a list."""
         on_axles = [
             body for body in self.net.bodies if self.angles and body.axle and not self.supported[body.spin].all()
         ]
         return [body for body in self.net.bodies if body in on_axles or not self.supported[body.row].all()]
 
-    def moved(self, x, step):
-        """Displacement [m] behind a step of all rows, both of shape (rows, 3); bodies turn by rotation vectors."""
+    def moved(self, x: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Displacement [m] after a step of all rows, both of shape (rows, 3); bodies turn by rotation vectors."""
         y = x + step
         if self.angles:
             turn_by(x, y, np.zeros_like(y), self.carriers.turns)
         return y
 
-    def rows_of(self, p):
+    def rows_of(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
         """A step of the unknowns as one of all rows, shape (rows, 3)."""
         step = np.zeros((self.rows, 3))
         step.ravel()[self.free] = p
         return step
 
-    def largest_share(self, p):
+    def largest_share(self, p: NDArray[np.float64]) -> float:
         """Largest share, up to 1, of a step of the unknowns that keeps a tangent meaningful.
 
-        It turns no body by more than `MOST_TURN`, and takes none that touches the web farther than half its thickness.
+        It turns no body by more than `MOST_TURN`, and moves no body that may touch the web by more than half its
+        thickness.
         """
-        share, step = 1.0, self.rows_of(p) if self.resting else None
+        share, step = 1.0, self.rows_of(p)
         for body in self.resting:
             turn = 0.0 if body.turn is None else float(np.linalg.norm(step[body.spin])) / MOST_TURN
             shift = float(np.linalg.norm(step[body.row])) / (0.5 * body.thickness) if self.contact else 0.0
@@ -251,46 +274,46 @@ class System:
         return share
 
     @cached_property
-    def mass(self):
+    def mass(self) -> Mass:
         """The `refweb.system.mass.Mass`."""
         from .mass import Mass
 
         return Mass(self.net, self.free, self.pattern, self._lines_in_tangent)
 
-    def mass_at(self, x):
-        """Values of M of the unknowns [kg] at displacement x; of rotations of bodies their inertia there [kg m²]."""
+    def mass_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of M of the unknowns [kg] at displacement x; for rotations of bodies their inertia at x [kg m²]."""
         return self.carriers.tensors(self.mass.values, self, x) if self.angles else self.mass.values
 
     @property
     def _lines_in_tangent(self):
-        """Number of the lines among the terms of the pattern; None where they have no tension."""
+        """Number of the term of lines in the pattern; None if lines have no tension."""
         return next((i for i, term in enumerate(self._in_tangent) if term.over_lines), None)
 
     @cached_property
-    def unsupported_parts(self):
-        """Parts of the net that can be carried off, a list of `refweb.system.unsupported_parts.Part`."""
+    def unsupported_parts(self) -> list[Part]:
+        """Parts of the net without support along an axis, a list of `refweb.system.unsupported_parts.Part`."""
         from .unsupported_parts import find_parts
 
         return find_parts(self)
 
-    def per_cell(self):
-        """`PerCell` of new arrays; those of terms over the lines are one."""
+    def per_cell(self) -> PerCell:
+        """A `PerCell` of new arrays; terms over the lines share one array."""
         lines = np.zeros((len(self.net.cells), max([2, *(f.columns for f in self.terms if f.over_lines)])))
         arrays = [lines if f.over_lines else np.zeros((len(f.cells), f.columns)) for f in self.terms]
         return PerCell(arrays, lines, self.tension_column)
 
     @property
-    def tension_column(self):
-        """Column of what the lines observe that has their whole tension."""
+    def tension_column(self) -> int:
+        """Column of the output of lines with their whole tension."""
         return DAMPED_TENSION if any(f.adds_tension for f in self.terms) else TENSION
 
-    def blocks(self):
+    def blocks(self) -> list[NDArray[np.float64]]:
         """New arrays for `stiffness` and `damping` to fill, shape (cells, 3 arity, 3 arity) each."""
         sizes = [(len(f.cells), 3 * f.cells.shape[1]) for f in self._in_tangent]
         return [np.empty((count, size, size)) for count, size in sizes]
 
     @property
-    def working(self):
+    def working(self) -> NDArray[np.int64]:
         """Sign of each term: 1 if its power counts as work, −1 if its power is energy lost, else 0."""
         signs = {"work": 1, "dissipated_energy": -1}
         return np.array(
@@ -298,7 +321,7 @@ class System:
         )
 
     @property
-    def corners(self):
+    def corners(self) -> NDArray[np.float64]:
         """Times at which a table of time has a corner [s], increasing."""
         times = [t for term in self.terms for t in term.timing.times]
         times += [t for drive in self.drives for t in drive.times]
@@ -306,20 +329,20 @@ class System:
         return np.unique(np.array(times, dtype=float))
 
     @cached_property
-    def lengths(self):
+    def lengths(self) -> NaturalLengths:
         """The `refweb.effects.natural_lengths.NaturalLengths` that change with time."""
         from ..effects.natural_lengths import NaturalLengths
 
         return NaturalLengths.of(self.net)
 
     @cached_property
-    def material_flow(self):
+    def material_flow(self) -> Any:
         """The `refweb.system.material_flow.MaterialFlow` of masses that follow reels."""
         from .material_flow import MaterialFlow
 
         return MaterialFlow(self)
 
-    def line_data(self, t):
+    def line_data(self, t: float) -> LineData:
         """`Net.line_data` with the natural lengths of time t."""
         if not self.net.factors:
             return self.net.line_data
@@ -332,11 +355,11 @@ class System:
             self._at_time = known = t, numbers
         return known[1]
 
-    def natural_length(self, t):
+    def natural_length(self, t: float) -> NDArray[np.float64]:
         """Natural length of each element at time t [m], shape (elements,)."""
         return self.line_data(t).natural_length
 
-    def at(self, t):
+    def at(self, t: float) -> System:
         """The system as it stands at time t: its natural lengths and masses are those of that time, and stay."""
         if not self.net.factors:
             return self
@@ -347,7 +370,7 @@ class System:
             view.__dict__.pop("mass", None)
         return view
 
-    def with_line_data(self, numbers):
+    def with_line_data(self, numbers: LineData) -> System:
         """The same system with other numbers of its lines, a `refweb.net.laws.line_data.LineData`."""
         changed = copy.copy(self)
         changed.net = replace(self.net, line_data=numbers)
@@ -355,40 +378,42 @@ class System:
         changed.__dict__.pop("lengths", None)
         return changed
 
-    def with_effects(self, effects):
-        """The same system with other numbers of some effects, by the name of their terms: these have the same cells."""
+    def with_effects(self, effects: dict[str, Any]) -> System:
+        """The same system with other effects on the same cells, a dict by the names of their terms."""
         changed, terms = copy.copy(self), {}
         for name, effect in effects.items():
             terms[name] = iter(parts_of([effect], self.net))
         changed.terms = [next(terms[term.name]) if term.name in terms else term for term in self.terms]
         return changed
 
-    def data_of(self, term, t):
+    def data_of(self, term: ForceTerm, t: float) -> NDArray[np.float64]:
         """Numbers of the cells of a term at time t, shape (cells, columns)."""
-        return self.line_data(t).matrix if term.over_lines else term.data
+        return self.line_data(t).matrix if term.data is None else term.data
 
-    def length_force(self, t, x):
-        """∂E/∂L of each element [N], shape (elements,): with the change of L the work of reels."""
+    def length_force(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """∂E/∂L of each element [N], shape (elements,); times the change of L it is the work of reels."""
         from ..effects.natural_lengths import work_of_lengths
 
         force = np.empty(len(self.net.cells))
         work_of_lengths(self.net)(t, x, self.net.cells, self.line_data(t).matrix, force)
         return force
 
-    def drive(self, t, x, v=None):
-        """Write displacements [m] and velocities [m/s] that are prescribed, at time t, or a body's into x and v."""
+    def drive(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None) -> None:
+        """Write prescribed displacements [m] and velocities [m/s] of time t, and carried nodes, into x and v."""
         v = np.zeros_like(x) if v is None else v
         for d in self.drives:
             d.kernel(t, x, v, self._zero, d.cells, d.data, self._zero)
         if self.carriers:
             self.carriers.update_attached_nodes(x, v)
 
-    def force(self, t, x, v=None):
+    def force(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Force on every row [N], supports included, shape (rows, 3)."""
         return self.forces(t, x, v)[0]
 
-    def forces(self, t, x, v=None, per_cell=None):
-        """The `Forces` at displacement x and velocity v, by default at rest; written to a `per_cell`, where given."""
+    def forces(
+        self, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None, per_cell: PerCell | None = None
+    ) -> Forces:
+        """The `Forces` at displacement x and velocity v, by default at rest; written to a `per_cell` if given."""
         v, per_cell = self._zero if v is None else v, self.per_cell() if per_cell is None else per_cell
         f = np.zeros((self.rows, 3))
         for term, out in zip(self.terms, per_cell, strict=True):
@@ -397,27 +422,31 @@ class System:
             self.carriers.add_forces_to_bodies(x, f)
         return Forces(f, per_cell)
 
-    def force_of(self, term, t, x, v=None):
+    def force_of(
+        self, term: ForceTerm, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
         """Force on every row of one term [N]."""
         f, out = np.zeros((self.rows, 3)), np.zeros((len(term.cells), max(term.columns, 2)))
         term.force(t, x, self._zero if v is None else v, f, term.cells, self.data_of(term, t), out)
         return f
 
-    def outer_force(self, t, x=None, v=None):
-        """Force on every row [N] of all but what the net does to itself, by default on the web as it is, at rest."""
+    def outer_force(
+        self, t: float, x: NDArray[np.float64] | None = None, v: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        """Force on every row [N] of all terms that are not internal, by default on the web as built, at rest."""
         x = self._zero if x is None else x
         outer = [self.force_of(term, t, x, v) for term in self.terms if not term.balance.internal]
         return sum(outer, np.zeros((self.rows, 3)))
 
     @cached_property
-    def links(self):
-        """The `refweb.system.links.Links` of what keeps distances."""
+    def links(self) -> Links:
+        """The `refweb.system.links.Links` of the constraints."""
         from .links import Links
 
         return Links(self)
 
-    def balance(self, t, x, v):
-        """`Forces` with those of links; on supports less those that consistent mass takes to move.
+    def balance(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64]) -> Forces:
+        """The `Forces` with those of links, on supports minus the inertia forces of consistent mass.
 
         The reaction of supports is its negative.
         """
@@ -428,13 +457,13 @@ class System:
             force -= np.where(self.supported, self.mass.passed_on(self.mass.moved_by(force)), 0.0)
         return Forces(force, per_cell)
 
-    def row_name(self, row):
+    def row_name(self, row: int) -> str:
         """Name of a row in messages: a node by its number, a body by its name."""
         if row >= self.rows - self.net.internal:
             return f"arms of line {self.net.line[(row - self.rows) // (self.net.internal // len(self.net.cells))]}"
         return f"node {row}" if row < self.net.nodes else f'body "{row_names(self.net.bodies)[row - self.net.nodes]}"'
 
-    def energy_of(self, term, t, x):
+    def energy_of(self, term: ForceTerm, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Energy of each cell of one term [J]."""
         out = np.zeros(len(term.cells))
         if term.energy is None:
@@ -442,15 +471,23 @@ class System:
         term.energy(t, x, term.cells, self.data_of(term, t), out)
         return out
 
-    def energy(self, t, x):
-        """Total potential Π [J]: that of the lines and of all loads."""
+    def energy(self, t: float, x: NDArray[np.float64]) -> float:
+        """Total potential energy Π of lines and loads [J]."""
         return sum(self.energy_of(f, t, x).sum() for f in self.terms)
 
-    def stiffness(self, t, x, v=None, definite=False, only=None, blocks=None):
+    def stiffness(
+        self,
+        t: float,
+        x: NDArray[np.float64],
+        v: NDArray[np.float64] | None = None,
+        definite: bool = False,
+        only: Sequence[ForceTerm] | None = None,
+        blocks: list[NDArray[np.float64]] | None = None,
+    ) -> NDArray[np.float64]:
         """Values of K = −∂f/∂x [N/m] in the fixed pattern.
 
-        ``definite`` leaves out what is negative; ``only`` are the terms to take, by default all; ``blocks`` are
-        `blocks` to write to, which a loop keeps.
+        ``definite`` asks for the positive semidefinite part; ``only`` are the terms to include, by default all;
+        ``blocks`` are `blocks` to write to, which a loop may use again.
         """
         v, blocks = self._zero if v is None else v, self.blocks() if blocks is None else blocks
         for term, block in zip(self._in_tangent, blocks, strict=True):
@@ -466,30 +503,30 @@ class System:
         return values
 
     @property
-    def symmetric(self):
+    def symmetric(self) -> bool:
         """True if K and C are symmetric."""
         felt = any(body.pivot is not None or body.carried for body in self.net.bodies if not body.prescribed)
         return all(map(self.is_symmetric, self.terms)) and (self.angles or not felt)
 
-    def is_symmetric(self, term):
-        """Tell if what a term has of K is symmetric: by rotation vectors all that a potential has is."""
+    def is_symmetric(self, term: ForceTerm) -> bool:
+        """Tell if the part of a term in K is symmetric; with rotation vectors it is for each term with a potential."""
         return term.tangent.symmetric or (self.angles and term.energy is not None)
 
     @cached_property
-    def turning(self):
+    def turning(self) -> bool:
         """True if there are bodies whose orientation counts."""
         return any(body.turn is not None for body in self.net.bodies)
 
     @property
-    def conservative(self):
+    def conservative(self) -> bool:
         """True if every force has a potential."""
         return self.symmetric and all(f.energy is not None for f in self.terms)
 
     @property
-    def dead(self):
+    def dead(self) -> bool:
         """True if the only internal forces are the tensions of the lines, and all others are dead loads.
 
-        Where bodies are free it is not so: what they carry turns with them.
+        With free bodies it is False, since forces on carried nodes turn with them.
         """
         if self.resting:
             return False
@@ -498,36 +535,38 @@ class System:
         return all(f.tangent.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
 
     @property
-    def convex(self):
+    def convex(self) -> bool:
         """True if the potential is convex and the loads are dead: `refweb.statics.duality_bound` then bounds errors."""
         net = self.net
         negative = net.forming & (net.line_data.ea <= 0.0)
         return bool((net.law_is("convex") & ~negative).all()) and self.dead
 
     @property
-    def contact(self):
+    def contact(self) -> bool:
         """True if the web may touch bodies."""
         return any(term.contact.with_lines for term in self.terms)
 
     @cached_property
-    def contact_forces(self):
+    def contact_forces(self) -> ContactForces:
         """The `refweb.system.contact_forces.ContactForces` on its bodies."""
         from .contact_forces import ContactForces
 
         return ContactForces(self)
 
     @property
-    def rotating(self):
-        """Terms of the forces of inertia in a frame that turns, none where none does."""
+    def rotating(self) -> list[ForceTerm]:
+        """Terms of inertia forces in a rotating frame, a list."""
         return [term for term in self.terms if term.frame.angular_velocity is not None]
 
     @property
-    def orbit_radius(self):
-        """Radius of the orbit that the web is in [m], None where it is in none."""
+    def orbit_radius(self) -> float | None:
+        """Radius of the orbit of the web [m]; None without an orbit."""
         return next((f.frame.orbit_radius for f in self.terms if f.frame.orbit_radius is not None), None)
 
-    def damping(self, t, x, v, blocks=None):
-        """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity.
+    def damping(
+        self, t: float, x: NDArray[np.float64], v: NDArray[np.float64], blocks: list[NDArray[np.float64]] | None = None
+    ) -> NDArray[np.float64] | None:
+        """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None if no force depends on velocity.
 
         ``blocks`` are `blocks` to write to, which a loop keeps.
         """
@@ -543,10 +582,10 @@ class System:
             self.carriers.add_damping(values, self, x, v, blocks)
         return values
 
-    def across_lines(self, tension):
-        """Values of the stiffness of lines as built across themselves, by a tension in each [N], shape (elements,).
+    def across_lines(self, tension: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of the stiffness of lines from a tension in each element alone [N], shape (elements,), as built.
 
-        Free bodies have that of the mean line beside what lines hold of them, so that it is definite.
+        Free bodies get the stiffness of the mean line as well, so that the matrix is definite.
         """
         force = tension / self.net.natural_length
         blocks = self.net.unit_tension * force[:, None, None]
@@ -560,6 +599,6 @@ class System:
             self.carriers.add_across(values, self, self._lines_in_tangent, blocks)
         return values
 
-    def assemble_lines(self, blocks):
-        """Values in the fixed pattern of one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""
+    def assemble_lines(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values in the fixed pattern from one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""
         return self.pattern.assemble_one(self._lines_in_tangent, blocks)

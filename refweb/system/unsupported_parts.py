@@ -1,4 +1,4 @@
-"""Parts of a net that nothing holds along an axis, and that forces along it would carry off."""
+"""Parts of a net without support along an axis, which no force along that axis may act on in statics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 class Part(NamedTuple):
     """A connected part and an axis, 0 … 2, along which no row of it is supported; its unknowns along that axis.
 
-    Rotations of bodies are none of its rows, and nodes that bodies carry none of its unknowns.
+    Its rows contain no rotations of bodies, and its unknowns no carried nodes.
     """
 
     rows: np.ndarray
@@ -19,7 +19,7 @@ class Part(NamedTuple):
 
 
 def find_parts(system, touching=True):
-    """Every `Part` of a system; unless ``touching``, as if nothing touched anything."""
+    """Every `Part` of a system; contact holds parts together only if ``touching``."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

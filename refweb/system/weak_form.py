@@ -1,8 +1,8 @@
-"""The tangent of the lines as a weak form, on the page.
+"""The tangent of lines as a weak form of scikit-fem: readable documentation of the compiled kernels.
 
 Position x(s) ∈ R³ over natural arc length s, λ = |x'|, t = x'/λ, tension T(λ − 1). The form is the derivative of the
-internal virtual work ∫ T t·δx' ds. No run evaluates it: `refweb.effects.elasticity` has the same in compiled kernels,
-which take 2 % of its time, and a test holds both equal.
+internal virtual work ∫ T t·δx' ds. No run evaluates it: the compiled kernels of `refweb.effects.elasticity` compute the
+same in 2 % of the time, and a test compares both.
 """
 
 from __future__ import annotations

@@ -144,8 +144,8 @@ def test_one_renderer_is_kept_for_a_film(film, monkeypatch, tmp_path):
     children, start = [], drawing.Renderer._start
 
     def kept(self, *kind):
-        start(self, *kind)
-        children.append(self._child)
+        children.append(start(self, *kind))
+        return children[-1]
 
     monkeypatch.setattr(drawing.Renderer, "_start", kept)
     first = drawing.windows()[:1]

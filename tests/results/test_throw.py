@@ -6,7 +6,7 @@ import pytest
 import refweb
 from refweb.net.web import Web
 from refweb.results.summary_text import on_run
-from refweb.results.throw import Throw, covered, depth_in_hull, in_hull, side_of_mouth, solid_angle
+from refweb.results.throw import Throw, covered, depth_in_hull, side_of_mouth, solid_angle
 from refweb.sweeps.case import cells_of
 
 METHODS = ["central-difference", "cvode", "ida"]
@@ -128,16 +128,17 @@ def test_share_of_directions():
     cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     mouth = np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]], dtype=float)
     centre = np.zeros(3)
-    assert in_hull(cube, centre) and covered(mouth, cube, centre, True) == pytest.approx(5.0 / 6.0, rel=1e-12)
+    assert depth_in_hull(cube, centre) > 0.0
+    assert covered(mouth, cube, centre, True) == pytest.approx(5.0 / 6.0, rel=1e-12)
     above = np.array([0.0, 0.0, 3.0])
-    assert not in_hull(cube, above)
+    assert not depth_in_hull(cube, above) > 0.0
     assert covered(mouth, cube, above, False) == solid_angle(mouth, above) / (4.0 * np.pi)
     rings = [ring(np.sin(a), -np.cos(a)) for a in np.linspace(0.01, 0.5 * np.pi, 20)]
     bowl, rim = np.vstack(rings), rings[-1]
     inside = np.array([0.0, 0.0, -1e-6])
-    assert in_hull(bowl, inside) and covered(rim, bowl, inside, True) == pytest.approx(0.5, abs=1e-5)
+    assert depth_in_hull(bowl, inside) > 0.0 and covered(rim, bowl, inside, True) == pytest.approx(0.5, abs=1e-5)
     disc = ring(1.0, 0.0)
-    assert not in_hull(disc, np.array([0.0, 0.0, 1.0]))
+    assert not depth_in_hull(disc, np.array([0.0, 0.0, 1.0])) > 0.0
     seen = 0.5 * (1.0 - np.cos(0.25 * np.pi))
     assert covered(disc, disc, np.array([0.0, 0.0, 1.0]), False) == pytest.approx(seen, rel=1e-4)
 

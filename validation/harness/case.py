@@ -62,6 +62,7 @@ CASES = {
         "conic_programming",
         "hanging_platform",
         "clamps_and_forms",
+        "changed_lines",
     ),
     "dynamics": (
         "transverse_impact",
@@ -76,6 +77,7 @@ CASES = {
         "free_net",
         "tumbling",
         "winches",
+        "drag_and_link",
     ),
     "missions": (
         "published_throw",

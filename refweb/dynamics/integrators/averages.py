@@ -17,7 +17,7 @@ many steps in a cell.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -25,6 +25,11 @@ from ...kernels import Integers, Matrix, Record, Vector, kernel
 from .extremes import look_at
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ...results.probes import Probe
     from .extremes import Extremes
     from .monitors import Observed
 
@@ -58,7 +63,7 @@ class Windows(Record):
     signs: Vector
 
     @classmethod
-    def of(cls, probes):
+    def of(cls, probes: Sequence[Probe]) -> Self:
         """Those of probes that have a window."""
         slots = np.array([i for i, probe in enumerate(probes) if probe.average], dtype=np.int64)
         widths = np.array([float(probes[i].average) for i in slots])
@@ -100,7 +105,7 @@ class Averages(Record):
     looked: Vector
 
     @classmethod
-    def at_start(cls, values=()):
+    def at_start(cls, values: Sequence[float] | NDArray[np.float64] = ()) -> Self:
         """Those of the values at t = 0; by default none."""
         count, values = len(values), np.asarray(values, dtype=float)
         kept, within = np.zeros((count, CELLS + 1)), np.zeros((count, PARTS + 1))

@@ -16,7 +16,7 @@ exceeds a kink by an eighth of a second difference, so that it gives negative te
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from ...kernels import Integers, Matrix, Record, Vector, inner, kernel
 from ...results.probes import NODES, PLACE, farthest, largest_in
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from .monitors import Observed
 
 EDGE = 2.0**-16
@@ -57,7 +59,7 @@ class Extremes(Record):
     looked: Vector
 
     @classmethod
-    def at_start(cls, values, places=None):
+    def at_start(cls, values: NDArray[np.float64], places: NDArray[np.int64] | None = None) -> Self:
         """Those of the values at t = 0."""
         places = np.full(len(values), -1) if places is None else places
         recent = np.full((len(values), 3), np.nan)

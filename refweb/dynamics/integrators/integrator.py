@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -27,6 +27,11 @@ from .extremes import Extremes
 from .momentum_balance import MomentumBalance
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from ...effects.base import ForceTerm
     from ...system.broken_lines import Breaks
 
 SAME = 1e-12
@@ -48,7 +53,7 @@ class Sum(NamedTuple):
         1 for the largest value of all steps, −1 for the smallest, 0 for neither.
     """
 
-    weights: np.ndarray
+    weights: NDArray[np.float64]
     sign: float = 0.0
 
 
@@ -95,12 +100,12 @@ class IntegratorState:
     """
 
     time: float
-    x: np.ndarray
-    v: np.ndarray
+    x: NDArray[np.float64]
+    v: NDArray[np.float64]
     extremes: Extremes
-    events: np.ndarray
-    work: np.ndarray
-    impulse: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    events: NDArray[Any]
+    work: NDArray[np.float64]
+    impulse: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     ledger: MomentumBalance = field(default_factory=MomentumBalance.empty)
     averages: Averages = field(default_factory=Averages.at_start)
     nsteps: int = 0
@@ -109,27 +114,27 @@ class IntegratorState:
     largest: float = 0.0
     worst: float = 0.0
     share: float = np.inf
-    crossings: np.ndarray = field(default_factory=none_met)
+    crossings: NDArray[np.float64] = field(default_factory=none_met)
     breaks: Breaks | None = field(default=None, metadata={"saved": False})
 
     @property
-    def stopped(self):
+    def stopped(self) -> bool:
         """True if an event has ended the run."""
         return bool(ended_by(self.events))
 
     @property
-    def drift(self):
+    def drift(self) -> float:
         """Largest |ΔE − work| over the largest energy [1]."""
         return float(self.worst / self.largest) if self.largest > 0.0 else 0.0
 
     @property
-    def drifts(self):
+    def drifts(self) -> dict[str, float | None]:
         """Errors of the balances, for ``run.json``; None for angular momentum that is not kept."""
         linear, angular = self.ledger.drifts.tolist()
         angular = angular if self.ledger.largest[1] > 0.0 else None
         return dict(energy_drift=self.drift, momentum_drift=linear, angular_momentum_drift=angular)
 
-    def arrays(self):
+    def arrays(self) -> dict[str, NDArray[Any]]:
         """All of it as arrays by name, for a checkpoint; a field whose metadata says ``saved=False`` is left out."""
         kept = {f.name: getattr(self, f.name) for f in fields(self) if f.metadata.get("saved", True)}
         for group in GROUPS:
@@ -137,9 +142,9 @@ class IntegratorState:
         return {name: np.asarray(value) for name, value in kept.items()}
 
     @classmethod
-    def of_arrays(cls, arrays):
+    def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
         """The course of a checkpoint."""
-        given = {name: array if array.ndim else array.item() for name, array in arrays.items()}
+        given: dict[str, Any] = {name: array if array.ndim else array.item() for name, array in arrays.items()}
         for group, kind in GROUPS.items():
             given[group] = kind(*(given.pop(f"{group}_{name}") for name in kind.field_names()))
         return cls(**given)
@@ -160,66 +165,66 @@ class History:
     """
 
     names: tuple[str, ...]
-    values: np.ndarray
+    values: NDArray[np.float64]
     probed: int
 
     @classmethod
-    def empty(cls, rows, probed, terms):
+    def empty(cls, rows: int, probed: int, terms: Sequence[ForceTerm]) -> Self:
         """Rows of zeros for a number of probes and the terms of a system."""
         names = ["time", *(f"probe {i}" for i in range(probed)), *(term.name for term in terms)]
         names += ["kinetic_energy", "work", "step_size"]
         names += components(VECTORS)
         return cls(tuple(names), np.zeros((rows, len(names))), probed)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.values)
 
-    def __getitem__(self, rows):
+    def __getitem__(self, rows: slice | NDArray[np.bool_]) -> History:
         """Some of the rows, by a slice or a mask."""
         return History(self.names, self.values[rows], self.probed)
 
     @property
-    def time(self):
+    def time(self) -> NDArray[np.float64]:
         """Time of each row [s]."""
         return self.values[:, 0]
 
     @property
-    def probes(self):
+    def probes(self) -> NDArray[np.float64]:
         """Value of each probe, shape (rows, probes)."""
         return self.values[:, 1 : 1 + self.probed]
 
     @property
-    def sums(self):
+    def sums(self) -> NDArray[np.float64]:
         """Weights of a `Sum`: energy of each term, kinetic energy [J], work [J], step size [s]."""
         return self.values[:, 1 + self.probed : -3 * len(VECTORS)]
 
     @property
-    def energies(self):
+    def energies(self) -> NDArray[np.float64]:
         """Energy of each term and, last, kinetic energy [J], shape (rows, terms + 1)."""
         return self.sums[:, :-2]
 
     @property
-    def work(self):
+    def work(self) -> NDArray[np.float64]:
         """Work of all that acts from outside [J]."""
         return self.sums[:, -2]
 
     @property
-    def step_size(self):
+    def step_size(self) -> NDArray[np.float64]:
         """Size of the last step before each row [s]."""
         return self.sums[:, -1]
 
     @property
-    def momentum(self):
+    def momentum(self) -> NDArray[np.float64]:
         """Momentum of all that is free [N s], shape (rows, 3)."""
         return self.values[:, -9:-6]
 
     @property
-    def impulse(self):
+    def impulse(self) -> NDArray[np.float64]:
         """Impulse of the supports on the net [N s], shape (rows, 3)."""
         return self.values[:, -6:-3]
 
     @property
-    def outer_impulse(self):
+    def outer_impulse(self) -> NDArray[np.float64]:
         """Impulse of all else that acts from outside [N s], shape (rows, 3)."""
         return self.values[:, -3:]
 
@@ -239,8 +244,8 @@ class Variant(NamedTuple):
         variant that is the only one of its kind.
     """
 
-    keys: dict = {}
-    settings: tuple = ()
+    keys: dict[str, Any] = {}
+    settings: tuple[float, ...] = ()
     kind: str = ""
 
 
@@ -285,7 +290,7 @@ class Integrator(Protocol):
     beside: bool
     on_progress: Callable[[float], None]
 
-    def start(self, x: np.ndarray | None = None, v: np.ndarray | None = None) -> IntegratorState:
+    def start(self, x: NDArray[np.float64] | None = None, v: NDArray[np.float64] | None = None) -> IntegratorState:
         """The course at t = 0.
 
         Parameters
@@ -331,7 +336,7 @@ class Integrator(Protocol):
         """Raise `EnergyDriftError` for a complete run whose energy balance is open by more than results may have."""
         ...
 
-    def spent(self, course: IntegratorState) -> dict:
+    def spent(self, course: IntegratorState) -> dict[str, Any]:
         """Statistics of a course, for ``run.json``.
 
         Returns
@@ -342,11 +347,11 @@ class Integrator(Protocol):
         """
         ...
 
-    def save(self, course: IntegratorState) -> dict[str, np.ndarray]:
+    def save(self, course: IntegratorState) -> dict[str, NDArray[Any]]:
         """A course as arrays by name, for a checkpoint."""
         ...
 
-    def load(self, arrays: dict[str, np.ndarray]) -> IntegratorState:
+    def load(self, arrays: dict[str, NDArray[Any]]) -> IntegratorState:
         """The course of a checkpoint, for an integrator made of the same arguments."""
         ...
 

@@ -26,7 +26,7 @@ and temperature change, pressure inside of a closed line. Nor does it see [[moti
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -48,6 +48,9 @@ from ...kernels import (
 )
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...system.system import System
     from .records import ForceTerms
 
 CLOSURE = 1e-6
@@ -88,12 +91,12 @@ class MomentumBalance(Record):
     largest: Vector
 
     @classmethod
-    def empty(cls):
+    def empty(cls) -> Self:
         """Make the balance of a run that has not begun."""
         return cls(np.zeros((2, 3)), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
 
     @property
-    def drifts(self):
+    def drifts(self) -> NDArray[np.float64]:
         """Residual over the largest value, of momentum and of angular momentum [1]; 0 where there is none."""
         return np.divide(self.left, self.largest, out=np.zeros(2), where=self.largest > 0.0)
 
@@ -133,7 +136,7 @@ class Outside(Record):
     rounding: float
 
     @classmethod
-    def of(cls, system):
+    def of(cls, system: System) -> Self:
         """Make the record of a system."""
         net, linear = system.net, system.rows - system.net.spins
         outer = [(i, term) for i, term in enumerate(system.terms) if not term.balance.internal]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -101,7 +101,7 @@ class Piece(NamedTuple):
     before: np.ndarray
     step: float
     jump: np.ndarray | None
-    at: Callable
+    at: Callable[..., Any]
 
     def booked(self, t):
         """Integrals until a time within, of the kind of ``before``."""

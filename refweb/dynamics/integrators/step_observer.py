@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
@@ -23,6 +24,15 @@ from .momentum_balance import allowed, refuse_open_momentum
 from .simpson_balance import Sample, SimpsonBalance, refuse_endless
 from .step_limits import StepLimits
 from .tolerances import scales
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from ...results.probes import Probe
+    from ...system.system import System
+    from .integrator import Sum
 
 PATIENCE = 1000
 """Number of steps in turn of which a row would take more than `MAX_STEPS_PER_ROW`; at a start they are short."""
@@ -57,7 +67,7 @@ class ObservedState(IntegratorState):
 
     reached: float = 0.0
     short: int = 0
-    sample: Sample | None = field(default=None, metadata={"saved": False})
+    sample: Any = field(default=None, metadata={"saved": False})
     least_energy: float = field(default=0.0, metadata={"saved": False})
 
 
@@ -93,28 +103,42 @@ class StepObserver(Integrator):
         Where nothing is free to move; for nodes without mass and links that the method does not take.
     """
 
-    method, order = "", 2
-    keys = ("rtol", "atol_position", "atol_velocity")
-    knob, retry, beside, follows_lines = "rtol", 0.1, False, True
-    on_progress = staticmethod(lambda t: None)
-    course_type = ObservedState
-    _made_of: tuple
+    method: str = ""
+    order: int = 2
+    keys: tuple[str, ...] = ("rtol", "atol_position", "atol_velocity")
+    knob: Literal["safety", "rtol"] = "rtol"
+    retry: float = 0.1
+    beside: bool = False
+    follows_lines: bool = True
+    on_progress: Callable[[float], None] = staticmethod(lambda t: None)
+    course_type: type[ObservedState] = ObservedState
+    _made_of: tuple[Any, ...]
     takes_massless = takes_links = takes_rotations = takes_flows = takes_internal = False
     """True if the method's equations can include nodes without mass, rigid links, rotating bodies, masses that change,
     and internal variables."""
-    rotations = None  # the `refweb.dynamics.integrators.rotations.Rotations` of such bodies
+    rotations: Any = None  # the `refweb.dynamics.integrators.rotations.Rotations` of such bodies
     restarts = False
     """True if the method restarts at corners of tables. The polynomial of IDA through the steps before a pulse of 1e-8
     s gives 3 % too much of its impulse; with a restart the error is 4e-5."""
 
-    def __new__(cls, *observed, **keys):
+    def __new__(cls, *observed: Any, **keys: Any) -> Self:
         """Note what it is made of, so that `refined` makes it of the same."""
         made = super().__new__(cls)
         made._made_of = observed, keys
         return made
 
-    def __init__(self, system, probes=(), sums=(), events=(), rtol=1e-6, atol_position=None, atol_velocity=None):
-        self.system, self.rtol = system, rtol
+    def __init__(
+        self,
+        system: System,
+        probes: Sequence[Probe] = (),
+        sums: Sequence[Sum] = (),
+        events: Sequence[Any] = (),
+        rtol: float = 1e-6,
+        atol_position: float | None = None,
+        atol_velocity: float | None = None,
+    ) -> None:
+        self.system: System = system
+        self.rtol: float = rtol
         self._per_cell, self._blocks = system.per_cell(), system.blocks()
         if not self.takes_massless:
             refuse_massless(system, self.method)
@@ -130,17 +154,17 @@ class StepObserver(Integrator):
             from .rotations import followed
 
             self.rotations = followed(system, self.method, self.takes_rotations)
-        self.unknowns = len(system.free)
+        self.unknowns: int = len(system.free)
         if not self.unknowns:
             raise InputError(
                 f'[solve] method = "{self.method}" needs something that is free to move: all nodes are supported; use '
                 '"central-difference"'
             )
         near, fast = scales(system)
-        self.atol_position = rtol * near if atol_position is None else atol_position
-        self.atol_velocity = rtol * fast if atol_velocity is None else atol_velocity
-        self.tolerances = {"m": self.atol_position, "m/s": self.atol_velocity}
-        self.stats = dict(nfev=0, njev=0, nlu=0)
+        self.atol_position: float = rtol * near if atol_position is None else atol_position
+        self.atol_velocity: float = rtol * fast if atol_velocity is None else atol_velocity
+        self.tolerances: dict[str, float] = {"m": self.atol_position, "m/s": self.atol_velocity}
+        self.stats: dict[str, int] = dict(nfev=0, njev=0, nlu=0)
         self._events = event_rows(events)
         self._book = SimpsonBalance(system, self.hold, max(fast, self.atol_velocity / rtol))
         self._measurements = Measurements(probes, sums, self._book)
@@ -155,7 +179,7 @@ class StepObserver(Integrator):
 
     # What a method brings
 
-    def begin(self, t, x, v):
+    def begin(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64]) -> None:
         """Begin to move, or begin anew behind a jump of velocities.
 
         Parameters
@@ -167,7 +191,7 @@ class StepObserver(Integrator):
         """
         raise NotImplementedError
 
-    def step(self, stop, end):
+    def step(self, stop: float, end: float) -> float:
         """Take one step.
 
         Parameters
@@ -190,18 +214,20 @@ class StepObserver(Integrator):
         """
         raise NotImplementedError
 
-    def interpolated(self, t):
+    def interpolated(self, t: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Displacement [m] and velocity [m/s] of the unknowns, shape (unknowns,), at a time within the last step."""
         raise NotImplementedError
 
-    def hold(self, x, v):
+    def hold(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> None:
         """Move a state of all rows, shape (rows, 3), to the nearest one that the equations allow."""
         if self.rotations:
             self.rotations.set_lengths(x)
 
     # What it may call
 
-    def state(self, t, x, v):
+    def state(
+        self, t: float, x: NDArray[np.float64], v: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Displacement [m] and velocity [m/s] of all rows, shape (rows, 3), for those of the unknowns."""
         system = self.system
         all_x, all_v = self._reference.copy(), np.zeros((system.rows, 3))
@@ -209,11 +235,11 @@ class StepObserver(Integrator):
         system.drive(t, all_x, all_v)
         return all_x, all_v
 
-    def force(self, t, x, v):
+    def force(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Force on each unknown [N] for displacement and velocity of the unknowns."""
         return self.force_at(t, *self.state(t, x, v))
 
-    def force_at(self, t, x, v):
+    def force_at(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Force on each unknown [N] at a state of all rows."""
         self.stats["nfev"] += 1
         rows = self.system.forces(t, x, v, self._per_cell).force
@@ -224,31 +250,36 @@ class StepObserver(Integrator):
             self._wrong = t, rows
         return force
 
-    def acceleration(self, t, x, v):
+    def acceleration(self, t: float, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Acceleration of each unknown [m/s²], M⁻¹ f, for displacement and velocity of the unknowns."""
         return self.system.mass.factor.solve(self.force(t, x, v))
 
-    def over_tolerance(self, off_x, off_v, x, v):
+    def over_tolerance(
+        self, off_x: NDArray[np.float64], off_v: NDArray[np.float64], x: NDArray[np.float64], v: NDArray[np.float64]
+    ) -> float:
         """Root mean square of errors of the unknowns, each over its tolerance at a state: 1 is what may be [1]."""
         position = off_x / (self.atol_position + self.rtol * np.abs(x))
         velocity = off_v / (self.atol_velocity + self.rtol * np.abs(v))
         return np.sqrt(0.5 * (np.mean(position**2) + np.mean(velocity**2)))
 
-    def tangents(self, t, x, v):
+    def tangents(
+        self, t: float, x: NDArray[np.float64], v: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
         """Values of K, and of C or None, at a state of all rows."""
         K, C = self.system.stiffness(t, x, v, blocks=self._blocks), self.system.damping(t, x, v, self._blocks)
         if not self.rotations:
             return K, C
         pattern = self.system.pattern
-        return tuple(None if values is None else self.rotations.rows_along_axles(pattern, values) for values in (K, C))
+        along = self.rotations.rows_along_axles
+        return along(pattern, K), None if C is None else along(pattern, C)
 
     # What is made of them
 
-    def spent(self, course):
+    def spent(self, course: IntegratorState) -> dict[str, Any]:
         """Statistics of a run, for ``run.json``."""
         return dict(self.stats)
 
-    def start(self, x=None, v=None):
+    def start(self, x: NDArray[np.float64] | None = None, v: NDArray[np.float64] | None = None) -> ObservedState:
         """The `IntegratorState` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
         system = self.system
         x = np.zeros((system.rows, 3)) if x is None else x.copy()
@@ -263,11 +294,11 @@ class StepObserver(Integrator):
         self._enter(course)
         return course
 
-    def save(self, course):
+    def save(self, course: IntegratorState) -> dict[str, NDArray[Any]]:
         """The `IntegratorState` as arrays by name, for a checkpoint; a method's past steps are not among them."""
         return {**course.arrays(), "spent": np.array(list(self.stats.values()))}
 
-    def load(self, arrays):
+    def load(self, arrays: dict[str, NDArray[Any]]) -> ObservedState:
         """The `IntegratorState` of a checkpoint, from which the method begins as at t = 0."""
         arrays = dict(arrays)
         self.stats.update(zip(self.stats, arrays.pop("spent").tolist(), strict=True))
@@ -276,25 +307,25 @@ class StepObserver(Integrator):
         self._enter(course)
         return course
 
-    def refined(self, by=None):
+    def refined(self, by: float | None = None) -> Self:
         """The method with tolerances that are ``by`` times as small, by default `TWIN_TOLERANCES`."""
         (observed, keys), share = self._made_of, 1.0 / (TWIN_TOLERANCES if by is None else by)
         finer = {key: share * keys[key] for key in ("atol_position", "atol_velocity") if keys.get(key)}
         return type(self)(*observed, **{**keys, **finer, "rtol": share * self.rtol})
 
-    def error_share(self, course, finer):
+    def error_share(self, course: IntegratorState, finer: IntegratorState) -> float:
         """Error of a finer run over that of this one: it goes with the tolerance to the power 2/3 at order 2."""
         return TWIN_TOLERANCES ** (-2.0 / 3.0)
 
-    def next_knob(self, share):
+    def next_knob(self, share: float) -> float:
         """Factor on rtol for errors that are ``share`` times what they may be."""
         return min(max(0.5 * share**-1.5, 0.01), 0.1)
 
-    def advance(self, course: ObservedState, times):
+    def advance(self, course: ObservedState, times: Sequence[float]) -> History:
         """Take a course to each of some times, see `refweb.dynamics.integrators.integrator.Integrator.advance`."""
-        times = np.atleast_1d(np.asarray(times, dtype=float))
-        history = History.empty(len(times), len(self._measurements.observed.probes), self.system.terms)
-        for n, end in enumerate(times):
+        ends = np.atleast_1d(np.asarray(times, dtype=float))
+        history = History.empty(len(ends), len(self._measurements.observed.probes), self.system.terms)
+        for n, end in enumerate(ends):
             before = course.time
             while course.time < end and not course.stopped:
                 if course.reached <= course.time:
@@ -307,7 +338,7 @@ class StepObserver(Integrator):
                 return history[: n + 1]
         return history
 
-    def refuse_drift(self, course):
+    def refuse_drift(self, course: IntegratorState) -> None:
         """Raise `EnergyDriftError` for a run with an energy drift above `DRIFT` or a momentum drift above `allowed`."""
         refuse_open(course, DRIFT, self._remedy)
         refuse_open_momentum(course, allowed(self.rtol), self._remedy)

@@ -14,6 +14,7 @@ import os
 import re
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Sundials(StepObserver):
     linear_solver = choice = ""
     max_order: int
     _symmetric: Symmetric
-    jacobian: Callable
+    jacobian: Callable[..., Any]
 
     def __init__(self, system, *observed, **tolerances):
         super().__init__(system, *observed, **tolerances)

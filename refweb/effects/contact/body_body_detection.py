@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -81,9 +81,9 @@ class Frame(NamedTuple):
         W of `refweb.net.rotation` along them, 00, 01, 02, 11, 12, 22.
     """
 
-    axes: tuple
+    axes: tuple[Any, ...]
     planar: bool
-    mobility: tuple
+    mobility: tuple[Any, ...]
 
 
 class Law(NamedTuple):

@@ -14,7 +14,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ...kernels import kernel
 from ...net.rotation import times
@@ -39,12 +39,12 @@ class ContactPoint(NamedTuple):
         g = ∂δ/∂y and H = ∂²δ/∂y² [1/m], of the axes 00, 01, 02, 11, 12, 22.
     """
 
-    y: tuple
-    d: tuple
-    e: tuple
+    y: tuple[Any, ...]
+    d: tuple[Any, ...]
+    e: tuple[Any, ...]
     depth: float
-    gradient: tuple
-    hessian: tuple
+    gradient: tuple[Any, ...]
+    hessian: tuple[Any, ...]
 
 
 class PointContact(NamedTuple):
@@ -138,10 +138,10 @@ def set_place(contact, c, xi, inner):
 class Places(NamedTuple):
     """Kernels that find where lines touch bodies of one depth, see `places`, and how many contacts an element has."""
 
-    within: Callable
-    deepest: Callable
-    contacts: Callable
-    touch_of: Callable
+    within: Callable[..., Any]
+    deepest: Callable[..., Any]
+    contacts: Callable[..., Any]
+    touch_of: Callable[..., Any]
     limit: int
 
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,9 +51,9 @@ class Slip(NamedTuple):
         Angular velocity of the body [rad/s].
     """
 
-    velocity: tuple
-    slope: tuple
-    turning: tuple
+    velocity: tuple[Any, ...]
+    slope: tuple[Any, ...]
+    turning: tuple[Any, ...]
 
 
 class Loss(NamedTuple):
@@ -61,7 +61,7 @@ class Loss(NamedTuple):
 
     damped: float
     normal: float
-    direction: tuple
+    direction: tuple[Any, ...]
     size: float
 
 

@@ -143,7 +143,7 @@ class Deepest:
     time: float
     stiffness: float
     exponent: float
-    chosen: tuple
+    chosen: tuple[Any, ...]
     smallest: float
     initial: float
     allowed: float

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -64,10 +64,10 @@ class Pair(NamedTuple):
     friction: float
     slip_velocity: float
     shape: Grown
-    axes: tuple
+    axes: tuple[Any, ...]
     once: bool
     planar: bool
-    mobility: tuple
+    mobility: tuple[Any, ...]
 
 
 def pair_data(body, cells, points, law, tumbles=False):

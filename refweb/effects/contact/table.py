@@ -8,6 +8,7 @@ use the solver in `refweb.effects.contact_solver`. Bodies with the same kernels 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +20,12 @@ from ..base import OWN, Balance, CellElements, ContactForce, ForceTerm, Tangent,
 from .line_body_ccd import passing
 from .nearest_point import in_sphere, near
 from .pair import AWAY, pair_data
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...net.net import Net
+    from ...net.rigid_body import RigidBody
 
 KEYS = "stiffness", "exponent", "damping", "friction", "slip_velocity"
 """Keys of the law of a contact."""
@@ -127,30 +134,30 @@ class Contact(Table):
     friction: float = real(default=0.0, at_least=0)
     slip_velocity: float = real(default=1e-2, above=0, unit="m/s")
     between_bodies: bool = boolean(default=False)
-    bodies: dict = field(_bodies, default_factory=dict)
+    bodies: dict[str, Any] = field(_bodies, default_factory=dict)
 
     def _of(self, body, key):
         given = getattr(self.bodies.get(body.name), key, None)
         return getattr(self, key) if given is None else given
 
-    def law_of(self, body):
+    def law_of(self, body: RigidBody) -> tuple[float | None, float]:
         """(Stiffness, exponent) of a body; the stiffness is None if it is left out."""
         return self._of(body, "stiffness"), self._of(body, "exponent")
 
-    def friction_of(self, body):
+    def friction_of(self, body: RigidBody) -> float:
         """Coefficient of friction of a body."""
         return self._of(body, "friction")
 
-    def left_out(self, bodies):
+    def left_out(self, bodies: Sequence[Any]) -> tuple[str, ...]:
         """Names of bodies whose stiffness is left out."""
         return tuple(body.name for body in bodies if self._of(body, "stiffness") is None)
 
-    def with_stiffness(self, stiffness):
+    def with_stiffness(self, stiffness: dict[str, float]) -> Contact:
         """The table with a stiffness for some bodies, by name."""
         by_body = {name: replace(self.bodies.get(name, BodyContact()), stiffness=k) for name, k in stiffness.items()}
         return replace(self, bodies={**self.bodies, **by_body})
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with rows of rotation for free bodies that friction rotates."""
 
         def turns(body):
@@ -158,7 +165,7 @@ class Contact(Table):
 
         return replace(net, bodies=tuple(replace(body, turns=turns(body)) for body in net.bodies))
 
-    def on(self, net):
+    def on(self, net: Net) -> list[ForceTerm]:
         """The terms of lines on bodies; ``out`` has depth [m] or lost power [W], and the force on the body [N]."""
         names = [body.name for body in net.bodies]
         if not names:
@@ -185,7 +192,7 @@ class Contact(Table):
             return terms + lost + between(net, self.law_between)
         return terms + lost
 
-    def law_between(self, first, second):
+    def law_between(self, first: RigidBody, second: RigidBody) -> tuple[float, ...]:
         """(stiffness, exponent, damping, friction, slip velocity) of two bodies."""
         laws = [[self._of(body, key) for key in KEYS] for body in (first, second)]
         if laws[0][1] != laws[1][1]:

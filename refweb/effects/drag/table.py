@@ -6,6 +6,7 @@ The force is in `refweb.effects.drag.force`, and its solver for explicit steps i
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from ...tables import Several, Table, field, real, table, vector
 from ..base import Balance, CellElements, ForceTerm, Tangent, Timing, VelocityForce, without
 from .force import end_of, kernels
 from .implicit_drag import implicit_drag
+
+if TYPE_CHECKING:
+    from ...net.net import Net
 
 SPHERE = 0.47
 """Coefficient of a sphere, at Reynolds numbers from 10³ to 3·10⁵."""
@@ -105,9 +109,9 @@ class Drag(Table):
     tangential: float = real(default=0.01, at_least=0)
     diameter: float | None = real(default=None, above=0, unit="m")
     wind: Several = vector(default=(0.0, 0.0, 0.0), unit="m/s")
-    bodies: dict = field(_bodies, default_factory=dict)
+    bodies: dict[str, Any] = field(_bodies, default_factory=dict)
 
-    def on(self, net):
+    def on(self, net: Net) -> list[ForceTerm]:
         """The terms of the nodes of elements and of free bodies; ``out`` is the power [W]."""
         free = [body for body in net.bodies if not body.prescribed]
         names = [body.name for body in free]

@@ -7,7 +7,7 @@ Cells of a term are pairs, of the nodes of one element and of another, or elemen
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,9 +34,9 @@ ROUNDING = 1e-15
 class Place(NamedTuple):
     """Geometry of a pair: vectors u and w of both elements, p from the second's first node to that of the first."""
 
-    p: tuple
-    u: tuple
-    w: tuple
+    p: tuple[Any, ...]
+    u: tuple[Any, ...]
+    w: tuple[Any, ...]
 
 
 class Numbers(NamedTuple):

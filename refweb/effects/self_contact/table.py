@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from ..base import (
 from ..natural_lengths import shortest_of
 from .pair import APART, ELEMENT
 from .search import distances, near, near_pairs, paired
+
+if TYPE_CHECKING:
+    from ...net.net import Net
 
 LISTED = 20_000
 """Largest number of pairs that are one list, which implicit methods need; above, pairs are found as they come near."""
@@ -101,7 +105,7 @@ class SelfContact(Table):
     slip_velocity: float = real(default=1e-3, above=0, unit="m/s")
     rolling: bool = boolean(default=True)
 
-    def on(self, net):
+    def on(self, net: Net) -> ForceTerm | list[ForceTerm]:
         """The term of the push, and those of damping and friction.
 
         ``out`` is the overlap of a pair or an element [m], or the lost power [W].
@@ -154,13 +158,13 @@ class SelfContact(Table):
             terms.append(_lossy(line_line_friction, velocity, search, twists=not self.rolling, **common))
         return terms if len(terms) > 1 else push
 
-    def stiffness_on(self, net):
+    def stiffness_on(self, net: Net) -> float:
         """Its stiffness [N/m], chosen if it is left out."""
         if self.stiffness is not None:
             return self.stiffness
         return float((net.axial / net.line_data.natural_length).max())
 
-    def elements_of(self, net, beside):
+    def elements_of(self, net: Net, beside: Any) -> Any:
         """Nodes and numbers of all elements with those beside them, see `refweb.effects.self_contact.pair`."""
         touch = 2.0 * self.radius
         data = np.zeros((len(net.cells), APART + beside.shape[1]))
@@ -210,7 +214,7 @@ class SelfContact(Table):
             "or the lines further apart"
         )
 
-    def with_stiffness(self, stiffness):
+    def with_stiffness(self, stiffness: float) -> SelfContact:
         """The table with a stiffness."""
         return replace(self, stiffness=stiffness)
 

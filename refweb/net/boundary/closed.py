@@ -1,9 +1,9 @@
-"""Surfaces that bound a solid: checked, and mended where a flip does it; volume, centre and moments of the solid.
+"""Closed surfaces: check, orientation of triangles, and volume, centre and moments of the solid inside.
 
-The moments are those of tetrahedra from one point to each triangle [1]_: with the corners a, b, c from that point and
-s = a + b + c, a tetrahedron has the volume V = a·(b × c)/6, the first moment V s/4, and the second one
-V (s⊗s + a⊗a + b⊗b + c⊗c)/20. They are taken from the middle of the box around the surface: those of trimesh 5.2, from
-the origin, have an error of 1e-5 of the inertia of a box that lies 1 km away, where these have 3e-13.
+The moments are those of tetrahedra from one point to each triangle [1]_: with the corners a, b, c from that point and s
+= a + b + c, a tetrahedron has the volume V = a·(b × c)/6, the first moment V s/4, and the second one V (s⊗s + a⊗a + b⊗b
++ c⊗c)/20. The point is the middle of the box around the surface. The library trimesh 5.2 takes the origin, and the
+inertia of a box at a distance of 1 km then has an error of 1e-5; here it is 3e-13.
 
 References
 ----------
@@ -24,16 +24,16 @@ from ...errors import InputError
 from ...tables import LARGEST
 
 SAME = 1e-7
-"""Distance at which corners are one, over the largest coordinate or size: STL holds seven digits."""
+"""Distance up to which corners coincide, over the largest coordinate or size: STL has seven digits."""
 THIN = 1e-9
-"""Volume below which a surface is flat, over the cube of its largest size."""
+"""Volume up to which a surface counts as flat, over the cube of its largest size."""
 
 DENT = 1e-6
-"""Share of its volume that a convex solid may lack: rounding of its corners."""
+"""Largest relative difference of the volumes of a convex solid and its hull, by rounding of corners."""
 
 
 class NotClosedError(InputError):
-    """A surface that bounds no solid as it is; `refweb.net.boundary.repair` may find the solid that is meant."""
+    """A surface that is not closed; `refweb.net.boundary.repair` may find the intended solid."""
 
 
 class Closed(NamedTuple):
@@ -44,13 +44,13 @@ class Closed(NamedTuple):
     points : ndarray, shape (n, 3)
         Corners.
     triangles : ndarray of int, shape (t, 3)
-        Those of each triangle, outward.
+        Corners of each triangle, outward.
     turned : int
-        Number of triangles that faced inward.
+        Number of triangles that faced inward and were turned.
     dropped : int
-        Number of triangles that had no area, two of whose corners are one.
+        Number of triangles with two equal corners, which were dropped.
     pieces : int
-        Number of pieces that have no edge in common.
+        Number of pieces without common edges.
     """
 
     points: np.ndarray
@@ -70,7 +70,7 @@ class Moments(NamedTuple):
     centre : ndarray, shape (3,)
         Centre of mass [m].
     inertia : ndarray, shape (3, 3)
-        About it, for a density of 1 [m⁵].
+        Tensor of inertia about the centre, for a density of 1 [m⁵].
     """
 
     volume: float
@@ -84,9 +84,9 @@ def closed(points, triangles):
     Raises
     ------
     InputError
-        For what is not finite or flat.
+        For coordinates that are not finite, and a flat surface.
     NotClosedError
-        For what is open, not orientable or crosses itself, and for edges of more than two triangles.
+        For a surface that is open, not orientable or crosses itself, and for edges of more than two triangles.
     """
     if not (np.abs(points) <= LARGEST).all():
         raise InputError(f"coordinates of corners must be numbers ≤ {LARGEST:g} [m] in size")
@@ -127,12 +127,12 @@ def moments(points, triangles):
 
 
 def convex_hull(points, triangles):
-    """(corners, triangles) of the convex hull of a surface, outward.
+    """Corners and triangles of the convex hull of a surface, outward.
 
     Raises
     ------
     InputError
-        For what lies in a plane.
+        For a surface in a plane.
     """
     if not (np.abs(points) <= LARGEST).all():
         raise InputError(f"coordinates of corners must be numbers ≤ {LARGEST:g} [m] in size")
@@ -147,12 +147,12 @@ def convex_hull(points, triangles):
 
 
 def is_convex(points, volume):
-    """Tell if a solid with some corners and volume [m³] fills their hull."""
+    """Tell if a solid is convex, by its corners and volume [m³]."""
     return bool(ConvexHull(points).volume <= (1.0 + DENT) * volume)
 
 
 def joined(points, triangles):
-    """Points of which each place has one, and the triangles between them that have three corners."""
+    """Different points, and the triangles between them with three different corners."""
     if not len(triangles):
         return points, triangles
     near = SAME * max(np.abs(points[triangles]).max(), np.finfo(float).tiny)
@@ -171,7 +171,7 @@ def _edge(points, start, end):
 
 
 def _neighbours(points, triangles):
-    """(triangles on both sides of each edge (e, 2), whether both run along it in one direction (e,))."""
+    """Triangles on both sides of each edge, shape (e, 2), and a mask of edges that both use in one direction, (e,)."""
     ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     sides = np.sort(ends, axis=1)
     edges, of, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
@@ -193,7 +193,7 @@ def _neighbours(points, triangles):
 
 
 def oriented(size, pairs, along):
-    """(piece of each triangle, whether it is to be turned so that all of a piece face one side).
+    """Piece of each triangle, and a mask of triangles to turn so that all of a piece face the same side.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def oriented(size, pairs, along):
 
 
 def _inward(points, triangles, piece, smallest):
-    """Mask of pieces to turn round: a piece inside another one bounds a hollow."""
+    """Mask of pieces to turn; a piece inside another one bounds a cavity."""
     volume = np.array([
         moments(points, triangles[piece == i]).volume if _is_thick(points, triangles[piece == i]) else 0.0
         for i in range(piece.max() + 1)
@@ -241,7 +241,7 @@ def _is_thick(points, triangles):
 
 
 def _turns(p, points, triangles):
-    """Winding number of a surface around a point: the solid angle that it fills, over 4π."""
+    """Winding number of a surface around a point: the solid angle of the surface over 4π."""
     a, b, c = (points[triangles[:, k]] - p for k in range(3))
     i, j, k = (np.linalg.norm(q, axis=1) for q in (a, b, c))
     above = np.einsum("ij,ij->i", a, np.cross(b, c))

@@ -1,7 +1,7 @@
-"""Triangles that pass through each other, as a compiled kernel.
+"""Search for triangles of a surface that pass through each other, by compiled kernels.
 
-Two triangles cross where an edge of one passes through the other. Edges are held against the triangles in the cells of
-a grid that they pass, of those without a common corner.
+Two triangles cross if an edge of one passes through the other. Each edge is compared with the triangles in the cells of
+a grid that the edge crosses, except triangles with a common corner.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import numpy as np
 from ...kernels import kernel
 
 ROUNDING = 1e-12
-"""Volume of a tetrahedron that counts as none, over the product of three lengths."""
+"""Volume of a tetrahedron that counts as zero, over the product of three lengths."""
 MOST = 128
 """Largest number of cells along an edge of the grid."""
 
 
 @kernel()
 def _volume(points, a, b, c, d):
-    """Six times the volume of a tetrahedron, 0 where rounding decides."""
+    """Six times the volume of a tetrahedron; 0 if rounding decides its sign."""
     u0, u1, u2 = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
     v0, v1, v2 = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1], points[c, 2] - points[a, 2]
     w0, w1, w2 = points[d, 0] - points[a, 0], points[d, 1] - points[a, 1], points[d, 2] - points[a, 2]
@@ -41,7 +41,7 @@ def _passes(points, a, b, triangles, t):
 
 @kernel()
 def _cells_of(points, corners, low, h, n, span):
-    """Write the first and the last cell of the grid that some corners reach."""
+    """Write the first and the last cell of the grid of the box around some corners."""
     for k in range(3):
         lower, upper = points[corners[0], k], points[corners[0], k]
         for c in corners:
@@ -68,7 +68,7 @@ def _find(points, triangles, low, h, n, count, listed, fill):
 
 
 def triangles_by_cell(points, triangles, low, h, n):
-    """Triangles in the cells of a grid that each reaches.
+    """List the triangles in each cell of a grid.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def triangles_by_cell(points, triangles, low, h, n):
     Returns
     -------
     ends : ndarray of int, shape (cells + 1,)
-        Where the triangles of each cell begin in the list, and those of the last end.
+        Start of the triangles of each cell in the list, and end of the last.
     listed : ndarray of int
         The list.
     """
@@ -98,7 +98,7 @@ def triangles_by_cell(points, triangles, low, h, n):
 
 @kernel()
 def _first(points, triangles, low, h, n, ends, listed):
-    """(a triangle, one that an edge of it passes through), (−1, −1) where there is none."""
+    """A triangle, and another one through which one of its edges passes; (−1, −1) if there is none."""
     span, edge = np.empty((2, 3), np.int64), np.empty(2, np.int64)
     for t in range(triangles.shape[0]):
         for e in range(3):
@@ -117,7 +117,7 @@ def _first(points, triangles, low, h, n, ends, listed):
 
 
 def crossing(points, triangles):
-    """Two triangles of a closed surface that pass through each other, (−1, −1) where none do."""
+    """Two triangles of a closed surface that pass through each other; (−1, −1) if there are none."""
     low, size = points.min(axis=0), np.ptp(points, axis=0)
     edges = np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2)
     h = max(float(np.median(edges)), float(size.max()) / MOST)

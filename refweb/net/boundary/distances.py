@@ -1,10 +1,10 @@
-"""Distance from a closed surface of triangles at the points of a grid, as a compiled kernel.
+"""Distance of the points of a grid from a closed surface of triangles, by compiled kernels.
 
-Near the surface each triangle is held against the points around it; further away a point takes the nearest triangle
-of a neighbour, in sweeps along all eight diagonals of the grid, as in fast sweeping [1]_. A point is inside or outside
-by the number of times that a straight line from it, along the third axis, meets the surface. This needs no normals, so
-that triangles without area do no harm. Signs of products decide which of two triangles with a common edge a line meets.
-These products are exact negatives of each other, so that no line slips through between the triangles.
+Near the surface each triangle is compared with the points around it. Farther away a point is compared with the nearest
+triangle of a neighbour, in sweeps along all eight diagonals of the grid, as in fast sweeping [1]_. The number of
+intersections of the surface with a straight line along the third axis decides if a point is inside. This needs no
+normals, so that triangles without area do no harm. Signs of products decide which of two triangles with a common edge a
+line meets. The products of both are exact negatives of each other: no line passes between the triangles.
 
 References
 ----------
@@ -31,7 +31,7 @@ def _square(x, y, z):
 
 @kernel()
 def square_distance(p0, p1, p2, points, triangles, t):
-    """Squared distance of a point from triangle t [m²], by the seven regions that its corners and edges part."""
+    """Squared distance of a point from triangle t [m²], by the seven regions of its corners, edges and face."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     a0, a1, a2 = points[a, 0], points[a, 1], points[a, 2]
     u0, u1, u2 = points[b, 0] - a0, points[b, 1] - a1, points[b, 2] - a2
@@ -56,7 +56,7 @@ def square_distance(p0, p1, p2, points, triangles, t):
 
 @kernel()
 def _near(points, triangles, origin, h, squares, nearest):
-    """Squared distances at the points of the grid that are within a cell of a triangle's box."""
+    """Update squared distances at the points within a cell of the box around a triangle."""
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for t in range(triangles.shape[0]):
         for k in range(3):
@@ -74,7 +74,7 @@ def _near(points, triangles, origin, h, squares, nearest):
 
 @kernel()
 def _ask(points, triangles, origin, h, squares, nearest, i, j, k, a, b, c):
-    """Hold a point of the grid against the nearest triangle of another."""
+    """Compare a point of the grid with the nearest triangle of another point."""
     t = nearest[a, b, c]
     if squares[a, b, c] < squares[i, j, k] and t != nearest[i, j, k]:
         p0, p1, p2 = origin[0] + h * i, origin[1] + h * j, origin[2] + h * k
@@ -85,7 +85,7 @@ def _ask(points, triangles, origin, h, squares, nearest, i, j, k, a, b, c):
 
 @kernel()
 def _sweep(points, triangles, origin, h, squares, nearest, di, dj, dk):
-    """Pass on what is nearest along a diagonal."""
+    """Pass nearest triangles on along a diagonal."""
     n0, n1, n2 = squares.shape
     for i in range(1, n0) if di > 0 else range(n0 - 2, -1, -1):
         for j in range(1, n1) if dj > 0 else range(n1 - 2, -1, -1):
@@ -97,7 +97,7 @@ def _sweep(points, triangles, origin, h, squares, nearest, di, dj, dk):
 
 @kernel(fastmath=False)
 def _side(x0, y0, x1, y1):
-    """(sign of x0 y1 − x1 y0, its value); 0 is decided by the coordinates, and is exactly opposite for (1, 0)."""
+    """Sign and value of x0 y1 − x1 y0; for 0 the coordinates decide, and the sign for (1, 0) is exactly opposite."""
     area = y0 * x1 - x0 * y1
     if area > 0.0:
         return 1, area
@@ -116,9 +116,9 @@ def _side(x0, y0, x1, y1):
 
 @kernel(fastmath=False)
 def meets(points, triangle, x, y):
-    """(side from which the line through (x, y) along the third axis meets a triangle, where).
+    """Side from which the line through (x, y) along the third axis meets a triangle, and the coordinate.
 
-    1 where it comes from behind the triangle, −1 where from before it, 0 where it does not meet it.
+    The side is 1 from behind the triangle, −1 from the front, and 0 if the line does not meet it.
     """
     x0, y0 = points[triangle[0], 0] - x, points[triangle[0], 1] - y
     x1, y1 = points[triangle[1], 0] - x, points[triangle[1], 1] - y
@@ -135,7 +135,7 @@ def meets(points, triangle, x, y):
 
 @kernel()
 def _crossings(points, triangles, origin, h, count):
-    """Count where lines through the grid meet the surface: at the first point behind each place."""
+    """Count the intersections of grid lines with the surface, each at the first grid point behind it."""
     n0, n1, n2 = count.shape
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]

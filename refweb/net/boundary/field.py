@@ -1,13 +1,15 @@
-"""Depth in a solid as a field on a grid, once and again differentiable.
+"""Depth in a solid as a field of cubic B-splines on a grid, with continuous second derivatives.
 
-The distance from the surface is known at the points of a grid, see `refweb.net.boundary.distances`. Between them depth
-is a sum of cubic B-splines, whose gradient and Hessian are continuous: so a force that is the slope of an energy made
-of it conserves that energy. Its coefficients are the distances δ less a sixth of their second differences,
+The distance from the surface is known at the points of a grid, see `refweb.net.boundary.distances`. Between the points
+the depth is a sum of cubic B-splines, whose gradient and Hessian are continuous. A force that is the gradient of an
+energy of this depth therefore conserves the energy. Its coefficients are the distances δ less a sixth of their second
+differences,
 
     c = δ − (δ(+1) − 2 δ + δ(−1))/6 of each axis,
 
-which reproduces cubic polynomials [1]_: the field misses a smooth surface by O(h⁴), and rounds edges by 0.2 h. Unlike
-the splines that interpolate δ it has small waves beside edges: on the surface of a box gradients of 1.09, not 1.19.
+which reproduces cubic polynomials [1]_: the field misses a smooth surface by O(h⁴), and rounds edges by 0.2 h. Its
+waves beside edges are smaller than those of splines that interpolate δ: on the surface of a box gradients reach 1.09,
+not 1.19.
 
 References
 ----------
@@ -30,17 +32,17 @@ from ... import memory
 from ...kernels import kernel
 
 ORIGIN, FINE, COUNTS, MARGIN, HEAD = 0, 3, 4, 7, 8
-"""Where numbers of a field stand: first point of the grid [m], points a metre, numbers of points, distance of the
-body from the end of the field [m]; behind them the coefficients."""
+"""Positions in the numbers of a field: first point of the grid [m], points per metre, numbers of points, distance of
+the body from the end of the field [m], and then the coefficients."""
 AROUND = 4
 """Number of points of the grid on each side of the body."""
 BYTES = 40.0
-"""Memory for a point of a grid while its field is made."""
+"""Memory for each point of a grid while its field is made [byte]."""
 GAP = 0.02
-"""Thickness of gaps between parts of a repaired solid that are none, over the distance of the points."""
+"""Width of gaps in a repaired solid that are ignored, over the spacing of the grid."""
 LOOKS, OPPOSITE, BEYOND, THINNER = 4000, -0.8, 1.5, 0.01
-"""Number of places from which walls are looked for; rate at which depth falls beyond the middle of one, so many cells
-behind it; share of the surface that may be thinner."""
+"""Number of surface points from which thickness is measured; rate of decrease of depth beyond the middle of a wall, and
+cells behind it at which it is measured; share of the surface that may be thinner."""
 
 
 def _number_at(typing, address, index):
@@ -52,12 +54,12 @@ def _number_at(typing, address, index):
 
 
 number_at: Any = intrinsic(_number_at)
-"""In kernels, ``number_at(address, index)``: the number that stands so many numbers behind an address."""
+"""In kernels, ``number_at(address, index)``: the number at an index from an address."""
 
 
 @kernel(forceinline=True)
 def _weights(t):
-    """Values of the four splines at a place of a cell, their slopes and bends."""
+    """Values, first and second derivatives of the four splines at a position in a cell."""
     r = 1.0 - t
     return (
         (r * r * r / 6.0, (3.0 * t - 6.0) * t * t / 6.0 + 2.0 / 3.0, ((3.0 - 3.0 * t) * t + 3.0) * t / 6.0 + 1.0 / 6.0,
@@ -69,7 +71,7 @@ def _weights(t):
 
 @kernel()
 def _outside(u, v, w, fine, most0, most1, most2, margin):
-    """Depth outside of the field, as `depth`: no nearer than the body can be."""
+    """Depth outside the field, as `depth`: at most the one that the body can have there."""
     a, b, c = u - min(max(u, 1.0), most0), v - min(max(v, 1.0), most1), w - min(max(w, 1.0), most2)
     off = math.sqrt(a * a + b * b + c * c)
     return -margin - off / fine, (-a / off, -b / off, -c / off), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -77,7 +79,7 @@ def _outside(u, v, w, fine, most0, most1, most2, margin):
 
 @kernel(forceinline=True)
 def depth_at(p, address):
-    """Depth, as `depth`, by a field whose numbers stand at an address."""
+    """Depth, as `depth`, by a field whose numbers are at an address."""
     at = int(address)
     fine = number_at(at, FINE)
     u = (p[0] - number_at(at, ORIGIN)) * fine
@@ -120,7 +122,7 @@ depth.convex = False
 
 @kernel()
 def depths(places, address, result):
-    """Write the depth of places (n, 3) and its gradient to ``result (n, 4)``."""
+    """Write the depth at points (n, 3) and its gradient to ``result (n, 4)``."""
     for i in range(places.shape[0]):
         deep, g, _ = depth_at((places[i, 0], places[i, 1], places[i, 2]), address)
         result[i, 0], result[i, 1], result[i, 2], result[i, 3] = deep, g[0], g[1], g[2]
@@ -135,48 +137,47 @@ class Field:
     numbers : ndarray
         Numbers for kernels, see `ORIGIN`.
     spacing : float
-        Distance of the points of its grid h [m].
+        Spacing h of its grid [m].
     counts : tuple of 3 int
-        Numbers of points.
+        Numbers of points along the axes.
     error : float
-        Largest depth or distance that it has on the surface, where it should be 0 [m]: at corners, on edges and in the
-        middle of triangles.
+        Largest |depth| on the surface, where it should be 0 [m], at corners, on edges and in the middle of triangles.
     thickness : float
-        Least depth that it has in the middle of a wall [m], see `_thickness`.
+        Least depth in the middle of a wall [m], see `_thickness`.
     offset : float
-        Distance from the surface to where depth is 0, outside of it [m].
+        Distance of the surface of depth 0 from the surface of the solid, outward [m].
     """
 
     numbers: np.ndarray
     spacing: float
-    counts: tuple
+    counts: tuple[Any, ...]
     error: float
     thickness: float
     offset: float
 
     @property
     def margin(self):
-        """Distance from the body that it reaches [m]."""
+        """Distance from the body up to which the field is defined [m]."""
         return float(self.numbers[MARGIN])
 
     @property
     def address(self):
-        """Address of its numbers in memory, which kernels read as long as there is this field."""
+        """Address of its numbers in memory, valid as long as the field exists."""
         return float(self.numbers.ctypes.data)
 
     def at(self, places):
-        """(depth (n,) [m], gradient (n, 3)) at places (n, 3)."""
+        """Depth [m], shape (n,), and gradient, shape (n, 3), at points (n, 3)."""
         result = np.empty((len(places), 4))
         depths(np.ascontiguousarray(places), self.address, result)
         return result[:, 0], result[:, 1:]
 
 
 def field_of(points, triangles, cells, around=AROUND, known=None, winding=None, offset=0.0):
-    """The `Field` of the solid that a surface bounds, with so many cells along its longest side.
+    """The `Field` of the solid inside a surface, with a number of cells along its longest side.
 
-    So many points of the grid stand ``around`` it. Of a wider one error, thickness and offset are those of ``known``, a
-    field. Where the surface is the boundary of a `refweb.net.boundary.repair.Repaired` solid, its ``winding`` tells
-    what is inside. An ``offset`` [m] makes the solid thicker by as much on each side.
+    ``around`` is the number of grid points on each side of the solid. A wider field takes error, thickness and offset
+    from the field ``known``. For the boundary of a `refweb.net.boundary.repair.Repaired` solid ``winding`` decides
+    which points are inside. The solid is thickened by ``offset`` [m] on each side.
 
     Raises
     ------
@@ -235,17 +236,17 @@ def _coefficients(deep):
 
 
 def places_on(points, triangles):
-    """Places of a surface where the field may miss it most."""
+    """Points of a surface at which the field may have its largest errors."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     edges = [(1.0 - t) * p + t * q for p, q in ((a, b), (b, c), (c, a)) for t in (0.25, 0.5)]
     return np.vstack([points, *edges, (a + b + c) / 3.0])
 
 
 def _thickness(field, points, triangles):
-    """Least distance from the middle of a wall to its surface [m], but for `THINNER` of the surface.
+    """Least distance from the middle of a wall to its surface [m], except for a share `THINNER` of the surface.
 
-    From places on the surface depth grows along the inner normal, and then falls at the rate at which the surface ahead
-    comes nearer; where that is opposite, it is a wall. None is thicker than the deepest place is deep.
+    From points on the surface the depth increases along the inner normal, and then decreases towards the surface ahead.
+    If that surface is opposite, both bound a wall. No wall is thicker than the largest depth.
     """
     rng = np.random.default_rng(0)
     a, b, c = (points[triangles[:, k]] for k in range(3))

@@ -1,4 +1,4 @@
-"""Ground from heights: triangles between places, and the block of ground below them."""
+"""Terrain from heights: triangles between given points, and the solid block of ground below them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from .closed import joined
 from .surface_file import read
 
 UPRIGHT = 1e-6
-"""Share of its area that a triangle has seen from above at least."""
+"""Least area of a triangle in the view from above, over its area."""
 
 
 def places_of(path):
-    """(points (n, 3) in the unit of the file, triangles (t, 3) that face up) of a file of heights.
+    """Points, shape (n, 3), in the unit of a file of heights, and triangles, shape (t, 3), that face up.
 
     Raises
     ------
     InputError
-        For a file without a surface, and for one that has two heights at a place.
+        For a file without a surface, and for two heights at one position.
     """
     if path.suffix.lower() == ".csv":
         points = columns_of(path, "xyz")
@@ -40,7 +40,7 @@ def places_of(path):
 
 
 def _between(points):
-    """Triangles between places (n, 3): halves of the cells of a grid, or of Delaunay where they lie on none."""
+    """Triangles between points (n, 3): halves of the cells of a grid, or Delaunay triangles without a grid."""
     if not np.isfinite(points).all():
         raise InputError("its heights must be finite")
     xs, ys = np.unique(points[:, 0]), np.unique(points[:, 1])
@@ -57,7 +57,7 @@ def _between(points):
 
 
 def rim_of(triangles):
-    """Edges (e, 2) of one triangle, in its direction."""
+    """Edges, shape (e, 2), that belong to one triangle only, in its direction."""
     ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     _, of, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     return ends[times[of.ravel()] == 1]
@@ -69,7 +69,7 @@ def on_rim(triangles):
 
 
 def above_ground(points, triangles, bottom):
-    """(corners, triangles) of the block between a surface that faces up and the height of its bottom [m]."""
+    """Corners and triangles of the block between a surface that faces up and the height of its bottom [m]."""
     count = len(points)
     low = np.column_stack([points[:, :2], np.full(count, bottom)])
     a, b = rim_of(triangles).T

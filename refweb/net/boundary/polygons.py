@@ -1,7 +1,7 @@
-"""Polygons in space, parted into triangles by cutting off ears.
+"""Triangulation of polygons in space by cutting off ears.
 
 An ear is a corner that does not point inward and whose triangle holds no other corner. A polygon whose sides do not
-cross has two at least [1]_; of those the one with the largest smallest angle is cut off.
+cross has at least two ears [1]_; the ear with the largest least angle is cut off first.
 
 References
 ----------
@@ -13,11 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 TOUCHES = 1e-12
-"""Area that counts as none, over the square of the size of a polygon."""
+"""Area that counts as zero, over the square of the size of a polygon."""
 
 
 def ears(corners):
-    """Triangles (n − 2, 3) of a polygon of corners (n, 3), by their numbers; None where its sides cross."""
+    """Triangles, shape (n − 2, 3), of a polygon of corners (n, 3), by numbers; None if its sides cross."""
     normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     size = np.ptp(corners, axis=0).max()
     if not np.linalg.norm(normal) > TOUCHES * size**2:
@@ -51,7 +51,7 @@ def _quality(a, b, c):
 
 
 def _holds(flat, left, ear, size):
-    """Tell if the triangle of a corner holds another corner that is left."""
+    """Tell if the triangle at a corner contains another remaining corner."""
     a, b, c = (flat[i] for i in ear)
     p = flat[[i for i in left if i not in ear]]
     outside = np.zeros(len(p), dtype=bool)

@@ -1,23 +1,22 @@
-"""The solid that a faulty surface means: holes are bridged, parts that overlap or touch are one.
+"""Repair of faulty surfaces: holes are closed, and parts that overlap or touch become one solid.
 
-Triangles that are there twice count once. Parts that hang together at edges of two triangles are made to face one side,
-outward: so that the volume between a part and the middle of its rim is positive. A part that the file has inside out
-and that lies in others bounds a hollow. Holes are closed by the triangles of their rim, or where that does not lie in a
-plane by the cone from its middle. Then the surface has no rim, and the solid is where its winding number, see
-`refweb.net.boundary.winding`, is above 1/2: of parts that overlap that is their union.
+The input are triangles, the output is a `Repaired` solid. Of equal triangles one is kept. A part is a set of triangles
+connected by edges of two triangles; its triangles are turned outward, so that the volume between the part and the
+middle of its rim is positive. A part that faces inward in the file and lies in others bounds a cavity. Holes are closed
+by triangles of their rim, or, if the rim is not plane, by the cone from its middle. The surface then has no rim, and
+the solid is the set of points with a winding number above 1/2, see `refweb.net.boundary.winding`; for overlapping parts
+it is their union. The boundary is the part of the surface with the solid on one side only. Triangles that others cross
+are divided until the pieces are small against the cells of the grid of depth. Walls and gaps between parts that are
+thinner than 2 % of a cell are ignored.
 
-Of the surface only counts what has the solid on one side alone. Triangles that others cross are parted until the parts
-are small against the cells of the grid of depth; walls and gaps between parts that are thinner than 2 % of a cell are
-taken for none.
-
-trimesh 5.2 alone gives the volume of 8 of the 14 faulty solids in ``tests/net/test_repair.py``. With the union of
-manifold3d it gives all, and leaves gaps: between two boxes 1e-6 m apart the depth is 1 mm, where that of one solid is
-99 mm.
+The library trimesh 5.2 finds the volume of 8 of the 14 faulty solids in ``tests/net/test_repair.py``. With unions by
+manifold3d it finds all, but keeps gaps: between two boxes at a distance of 1e-6 m it gives a depth of 1 mm, and 99 mm
+is that of one solid.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -30,16 +29,15 @@ from .polygons import ears
 from .winding import Winding
 
 COARSE, SMALL = 2.0, 1.0 / 16.0
-"""Length of the parts of a triangle that are looked at one by one, and of those that are parted no more, over a
-cell."""
+"""Length of pieces of a triangle that are checked one by one, and least length of divided pieces, over a cell."""
 LOOKS = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
-"""Places of a triangle that are looked at, as shares of its corners."""
+"""Barycentric coordinates of the points at which a triangle is checked."""
 FLAT = 1e-7
-"""Volume of a part that is a sheet, over the power 3/2 of its area."""
+"""Volume up to which a part counts as a sheet, over its area to the power 3/2."""
 LOOP = 400
-"""Largest number of edges of a hole that triangles of its rim close."""
+"""Largest number of edges of a hole that is closed by triangles of its rim."""
 SUMMED = 5e-3
-"""Share by which sums over lines may miss the volume that a boundary without seams has exactly."""
+"""Largest relative difference of sums over lines and the exact volume of a boundary without gaps."""
 EMPTY = (
     "it has no inside: its winding number is nowhere above 1/2, and a body needs a surface that encloses something. "
     'Open ground is shape = "terrain" with heights = FILE'
@@ -47,39 +45,39 @@ EMPTY = (
 
 
 class Repaired(NamedTuple):
-    """The solid that a surface means.
+    """Solid from a faulty surface.
 
     Attributes
     ----------
     points : ndarray, shape (n, 3)
         Corners [m].
     triangles : ndarray of int, shape (t, 3)
-        Those of each triangle that is in its boundary, outward; a part of it may lie inside.
+        Corners of each triangle in the boundary, outward; a part of a triangle may lie inside.
     boundary : tuple of ndarray
-        Corners and triangles of the boundary alone.
+        Corners and triangles of only the boundary.
     moments : refweb.net.boundary.closed.Moments
         Of the solid.
     winding : refweb.net.boundary.winding.Winding
-        Tells what is inside.
+        Decides which points are inside.
     remarks : tuple of str
         Faults of the surface.
     """
 
     points: np.ndarray
     triangles: np.ndarray
-    boundary: tuple
+    boundary: tuple[Any, ...]
     moments: Moments
     winding: Winding
-    remarks: tuple
+    remarks: tuple[Any, ...]
 
 
 def repaired(points, triangles, cells):
-    """The `Repaired` solid of some triangles, for a grid of depth with so many cells along the longest side.
+    """The `Repaired` solid of some triangles, for a grid of depth with a number of cells along the longest side.
 
     Raises
     ------
     InputError
-        For what has no inside.
+        For a surface that encloses nothing.
     """
     points, triangles = joined(points, triangles)
     if not len(triangles):
@@ -115,14 +113,14 @@ def repaired(points, triangles, cells):
 
 
 def touches_itself(points, triangles, cells):
-    """Tell if parts of a closed surface touch, or are nearer to each other than `GAP` of a cell."""
+    """Tell if parts of a closed surface touch or are closer than `GAP` of a cell."""
     spacing = float(np.ptp(points, axis=0).max()) / cells
     _, side, _ = _boundary(points[triangles], Winding(points, triangles), spacing)
     return not (side == 1).all()
 
 
 def _single(triangles):
-    """(Triangles of which each is there once, number of others); of a wall that two parts have alike there is none."""
+    """Different triangles, and the number of removed ones; a wall that two parts share is removed."""
     _, first, of, count = np.unique(
         np.sort(triangles, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
     )
@@ -146,19 +144,19 @@ def _single(triangles):
 
 
 def _edges(triangles):
-    """(number of each edge of triangles (t, 3), corners of each edge (e, 2))."""
+    """Numbers of the edges of triangles, shape (t, 3), and corners of each edge, shape (e, 2)."""
     ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     edges, of = np.unique(ends, axis=0, return_inverse=True)
     return of.reshape(-1, 3), edges
 
 
 class _Pieces(NamedTuple):
-    """Triangles that hang together at edges of two triangles.
+    """Pieces: sets of triangles connected by edges of two triangles.
 
     Attributes
     ----------
     triangles : ndarray of int, shape (t, 3)
-        All, those of a piece facing one side.
+        All triangles; those of a piece face the same side.
     piece, area : ndarray, shape (t,)
         Piece of each triangle, and its area [m²].
     as_given : ndarray of bool, shape (pieces,)
@@ -205,7 +203,7 @@ def _pieces(points, triangles):
 
 
 def _without_sheets(points, triangles):
-    """(Triangles without pieces that are flat and have an open edge, area of each triangle of these [m²])."""
+    """Triangles without flat pieces with an open edge, and areas of the removed triangles [m²]."""
     pieces = _pieces(points, triangles)
     sheet = (pieces.flat & pieces.open)[pieces.piece]
     return triangles[~sheet], pieces.area[sheet]
@@ -225,7 +223,7 @@ def _outward(points, triangles, pieces):
 
 
 def _rim(triangles):
-    """Directed edges (e, 2) that a surface has more often in one direction than in the other."""
+    """Directed edges, shape (e, 2), that occur more often in one direction than in the other."""
     ends = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     forth = ends[:, 0] < ends[:, 1]
     edges, of = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
@@ -243,16 +241,16 @@ def _volume(points, triangles):
 
 
 def _lies_in_others(points, triangles, part):
-    """Tell if a part without a rim lies in what other triangles enclose."""
+    """Tell if a part without a rim lies inside other triangles."""
     if len(_rim(triangles[part])):
         return False
     return bool(Winding(points, triangles[~part]).inside(points[triangles[part]].mean(axis=1)).all())
 
 
 def _lids(points, triangles, ends):
-    """(Points with middles of rims behind them, triangles that close all rims, size of each hole [m]).
+    """Points followed by middles of rims, triangles that close all rims, and the size of each hole [m].
 
-    A rim with edges of one triangle, corners ``ends (k, 2)``, is that of a hole.
+    A rim with edges of only one triangle, corners ``ends (k, 2)``, belongs to a hole.
     """
     rim, opening = _rim(triangles), set(map(tuple, np.sort(ends, axis=1).tolist()))
     if not len(rim):
@@ -279,7 +277,7 @@ def _lids(points, triangles, ends):
 
 
 def _loop(edges):
-    """Corners around a hole, against the direction of its edges; None for what is not one loop."""
+    """Corners around a hole, against the direction of its edges; None if they are not one loop."""
     after = dict(edges[:, ::-1].tolist())
     if len(after) < len(edges) or len(set(after.values())) < len(edges):
         return None
@@ -290,7 +288,7 @@ def _loop(edges):
 
 
 def _in_plane(corners):
-    """Triangles of a polygon that lies in a plane within a thousandth of its size; None for another."""
+    """Triangles of a polygon that is plane within a thousandth of its size; None for another."""
     normal = np.linalg.svd(corners - corners.mean(axis=0))[2][2]
     away = np.abs((corners - corners.mean(axis=0)) @ normal).max()
     if len(corners) > 3 and away > 1e-3 * np.ptp(corners, axis=0).max():
@@ -299,7 +297,7 @@ def _in_plane(corners):
 
 
 def _sides(corners, winding, spacing):
-    """1, −1 or 0 of places of triangles (t, 3, 3): solid behind, before, on both sides or none; shape (t, looks)."""
+    """Side of the solid at points of triangles, shape (t, points): 1 behind, −1 before, 0 both or none."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0)
@@ -310,7 +308,7 @@ def _sides(corners, winding, spacing):
 
 
 def _boundary(corners, winding, spacing):
-    """(Corners (k, 3, 3) of the boundary, 1 or −1 of triangles that are whole in it, mask of those that are cut)."""
+    """Corners of the boundary, (k, 3, 3), 1 or −1 for triangles that are whole in it, and a mask of divided ones."""
     parts, of = _parted(corners, np.arange(len(corners)), COARSE * spacing)
     sides = _sides(parts, winding, spacing)
     low, high = np.full(len(corners), 2), np.full(len(corners), -2)
@@ -328,18 +326,18 @@ def _boundary(corners, winding, spacing):
 
 
 def _turned(corners, side):
-    """Triangles, by corners or by their numbers, turned where a side is below 0."""
+    """Triangles, by corners or numbers, turned if their side is below 0."""
     return np.where((side < 0).reshape(-1, *(corners.ndim - 1) * (1,)), corners[:, ::-1], corners)
 
 
 def _longest(corners):
-    """(Length of the longest edge of triangles (t, 3, 3), number of the corner where it begins)."""
+    """Length of the longest edge of triangles (t, 3, 3), and the number of its first corner."""
     length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     return length.max(axis=1, initial=0.0), length.argmax(axis=1)
 
 
 def _halved(corners):
-    """Both halves of triangles that are cut at the middle of their longest edge."""
+    """Both halves of triangles, divided at the middle of their longest edge."""
     if not len(corners):
         return corners
     _, at = _longest(corners)
@@ -350,7 +348,7 @@ def _halved(corners):
 
 
 def _parted(corners, of, length):
-    """Parts of triangles whose edges are no longer than a length, and the triangle of each."""
+    """Pieces of triangles with edges up to a length, and the triangle of each."""
     done, owners = [], []
     while len(corners):
         short = _longest(corners)[0] <= length

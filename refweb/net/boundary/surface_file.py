@@ -1,7 +1,7 @@
-"""Surfaces from files: corners and triangles, from STL, OBJ and VTP.
+"""Reading of surfaces: corners and triangles from STL, OBJ and VTP files.
 
-meshio reads STL, and VTK, in a process of its own, VTP. Of OBJ only the corners and faces count, which
-`refweb.net.obj_file` reads: textured files have lists that meshio does not take, and VTK rounds to 7 digits.
+meshio reads STL. VTK reads VTP, in a separate process. `refweb.net.obj_file` reads corners and faces of OBJ: meshio
+does not accept the lists of textured files, and VTK rounds to 7 digits.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from ..obj_file import read_obj
 from .polygons import ears
 
 HARMLESS = ("vertex", "poly_vertex", "line", "polyline")
-"""Cells that bound nothing."""
+"""Kinds of cells that are ignored, since they bound nothing."""
 
 
 def read(path):
-    """(points (n, 3) in the unit of the file, triangles (t, 3)) of a file.
+    """Points, shape (n, 3), in the unit of a file, and triangles, shape (t, 3).
 
     Raises
     ------
@@ -51,7 +51,7 @@ def _of_stl(path):
 
 
 def _of_obj(path):
-    """Corners, and an array (faces, corners) for each sequence of faces with as many corners."""
+    """Corners, and an array (faces, corners) for each sequence of faces with equal numbers of corners."""
     points, _, faces, _, _ = read_obj(path)
     return points, [np.array(list(group), dtype=np.int64) for _, group in itertools.groupby(faces, len)]
 
@@ -72,7 +72,7 @@ def _sorted(points, blocks):
 
 
 def _triangles(points, cells):
-    """Triangles of cells of some corners each."""
+    """Triangles of cells with a number of corners each."""
     corners = cells.shape[1]
     fan = np.stack([cells[:, [0, k, k + 1]] for k in range(1, corners - 1)])
     if corners > 3:
@@ -87,4 +87,4 @@ def _triangles(points, cells):
 
 
 READERS = {".stl": _of_stl, ".obj": _of_obj, ".vtp": _of_vtk}
-"""Functions that read surfaces, by the end of the name of the file."""
+"""Functions that read surfaces, by the suffix of the file."""

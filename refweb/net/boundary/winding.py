@@ -1,9 +1,9 @@
-"""Winding number of a surface of triangles, and the moments of where it is above 1/2.
+"""Winding number of a surface of triangles, and moments of the points at which it is above 1/2.
 
-The generalised winding number [1]_ of a surface around a point is the solid angle that it fills, over 4π. Of a surface
-without a rim it is a whole number: how often a straight line from there leaves the surface less how often it enters it.
-It adds up over parts: what parts that overlap fill together is where it is above 1/2. Lines run along the third axis,
-and are held against the triangles in their cell of a grid across it.
+The generalised winding number [1]_ of a surface around a point is its solid angle over 4π. For a surface without a rim
+it is an integer: the number of times that a straight line from the point leaves the surface, minus the number of times
+that it enters. Winding numbers of parts add up: the union of overlapping parts is the set with a number above 1/2.
+Lines run along the third axis, and are compared with the triangles in their cell of a grid across that axis.
 
 References
 ----------
@@ -34,7 +34,7 @@ def _cell(value, low, h, count):
 
 @kernel()
 def _numbers(places, points, triangles, low, h, n, ends, listed, result):
-    """Write the winding number around places (m, 3) to ``result (m,)``."""
+    """Write the winding numbers around points (m, 3) to ``result (m,)``."""
     for p in range(places.shape[0]):
         x, y, z = places[p, 0], places[p, 1], places[p, 2]
         cell = _cell(x, low[0], h[0], n) * n + _cell(y, low[1], h[1], n)
@@ -48,7 +48,7 @@ def _numbers(places, points, triangles, low, h, n, ends, listed, result):
 
 @kernel()
 def _add_part(total, x, y, z0, z1):
-    """Add the moments of a part of a line: 1, x, y, z, xx, xy, xz, yy, yz, zz."""
+    """Add the moments of a segment of a line: 1, x, y, z, xx, xy, xz, yy, yz, zz."""
     length, first, second = z1 - z0, 0.5 * (z1 * z1 - z0 * z0), (z1 * z1 * z1 - z0 * z0 * z0) / 3.0
     total[0] += length
     total[1] += x * length
@@ -93,7 +93,7 @@ class Winding:
     points : ndarray, shape (n, 3)
         Corners [m].
     triangles : ndarray of int, shape (t, 3)
-        Those of each triangle.
+        Corners of each triangle.
     """
 
     def __init__(self, points, triangles):
@@ -106,18 +106,18 @@ class Winding:
         self._grid = self._low, h, n, *triangles_by_cell(*self._surface, self._low, h, np.array([n, n, 1]))
 
     def moved(self, by):
-        """The same of the surface moved by a vector [m]."""
+        """The winding numbers of the surface moved by a vector [m]."""
         points, triangles = self._surface
         return Winding(points + by, triangles)
 
     def at(self, places):
-        """Winding numbers around places (m, 3), shape (m,)."""
+        """Winding numbers around points (m, 3), shape (m,)."""
         result = np.empty(len(places), np.int64)
         _numbers(np.ascontiguousarray(places), *self._surface, *self._grid, result)
         return result
 
     def inside(self, places):
-        """Mask of places (m, 3) around which it is above 1/2."""
+        """Mask of points (m, 3) with a winding number above 1/2."""
         return self.at(places) > 0
 
     def sums(self):

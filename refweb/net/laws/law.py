@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ...compiled.rows import narrowed, record_at
 from ...kernels import Matrix, Vector, kernel
 from .line_data import FIELDS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 LINE = np.dtype(FIELDS)
 """Numbers of a line that every law may read."""
@@ -88,18 +91,18 @@ class TensionLaw:
     smoothed: ClassVar[bool] = False
     plastic: ClassVar[bool] = False
 
-    def __init_subclass__(cls):
+    def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         if "stress" in vars(cls) and "above_floor" not in vars(cls):
             cls.above_floor = infinite if cls.bar or cls.forming else cls.stress
 
     @classmethod
-    def numbers(cls, values):
+    def numbers(cls, values: dict[str, Any]) -> dict[str, NDArray[Any]]:
         """Numbers of lines by column, from their properties, see `refweb.net.cable.Cable.properties`."""
         return {name: values[name] for name in cls.columns}
 
     @classmethod
-    def strain_of(cls, tension, lines):
+    def strain_of(cls, tension: NDArray[np.float64], lines: Any) -> NDArray[np.float64]:
         """Strain at a tension.
 
         Parameters
@@ -130,7 +133,7 @@ class TensionLaw:
         return np.where(endless, np.inf, high)
 
     @classmethod
-    def floor(cls, lines):
+    def floor(cls, lines: Any) -> NDArray[np.float64]:
         """Largest push of each of some lines [N], 0 of a law that only pulls, shape (lines,)."""
         return np.full(len(lines), math.inf if cls.pushes else 0.0)
 
@@ -161,7 +164,7 @@ class Mixed:
 def _chosen(kernels, records, number=0):
     """A kernel that calls one of some, that of the number of the line, counted from ``number``."""
     first, record = kernels[0], records[0]
-    rest = _chosen(kernels[1:], records[1:], number + 1) if len(kernels) > 1 else None
+    rest: Any = _chosen(kernels[1:], records[1:], number + 1) if len(kernels) > 1 else None
 
     @kernel()
     def last(strain, line):
@@ -187,9 +190,11 @@ def record_of(columns, numbers):
     """Dtype by which kernels read some columns besides `FIELDS` from rows of a dtype, that of a `LineData`."""
     if not columns:
         return LINE
-    names = [*LINE.names, *columns]
-    formats = [LINE[name] for name in LINE.names] + [np.dtype(float)] * len(columns)
-    offsets = [numbers.fields[name][1] for name in names]
+    fixed: Any = LINE.names
+    names = [*fixed, *columns]
+    formats = [LINE[name] for name in fixed] + [np.dtype(float)] * len(columns)
+    fields: Any = numbers.fields
+    offsets = [fields[name][1] for name in names]
     return np.dtype({"names": names, "formats": formats, "offsets": offsets})
 
 

@@ -8,6 +8,9 @@ compression. With g = (s + r)/2 (for s < 0: 2η²/(r − s)) and g0, r0 its valu
 which has a relative error of a few units of round-off everywhere. Under compression the stress tends to the floor −αE.
 """
 
+# Kernels in classes are no methods:
+# pyright: reportArgumentType=false, reportOperatorIssue=false
+
 from __future__ import annotations
 
 import math

@@ -4,6 +4,9 @@ Tension of the laws of form finding does not depend on natural length: T = q l o
 force. In place of EA they have q L, L the natural length, and the force, so that T = EA (1 + ε) and T = EA.
 """
 
+# Kernels in classes are no methods:
+# pyright: reportArgumentType=false, reportOperatorIssue=false
+
 from __future__ import annotations
 
 from ...kernels import kernel

@@ -1,4 +1,4 @@
 """Shapes of rigid bodies, one file a shape; they know nothing of contact.
 
-How to write one says `refweb.net.rigid_body`.
+`refweb.net.rigid_body` describes how to write one.
 """

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from ...errors import InputError
 from ...tables import Several, real, rows, table, vector
 from ..rigid_body import Grown, Shape, axes_of
 from .rounding import check_rounding, edge_radius, shrunk
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @table
@@ -37,24 +43,24 @@ class Box(Shape):
     axes: Several = rows(3, default=None)
     rounding: float | None = real(default=None, above=0, unit="m")
 
-    def check(self):
-        """Refuse sizes that are not > 0, axes that are not two at right angles and a rounding that is too large."""
+    def check(self) -> None:
+        """Refuse sizes that are not > 0, axes that are not at right angles, and a rounding that is too large."""
         if min(self.size) <= 0.0:
             raise InputError(f"size = {list(self.size)} must be > 0 [m]")
         self.frame()
         check_rounding(self.rounding, self.size)
 
-    def grown(self):
+    def grown(self) -> Grown:
         """A smaller box, grown by the radius of the edges."""
         edge = edge_radius(self.rounding, self.size)
         return Grown(edge, shrunk(self.size, edge))
 
-    def skeleton(self):
+    def skeleton(self) -> NDArray[Any]:
         """The edges of its core."""
         from ..skeleton import of_box
 
         return of_box(self.grown())
 
-    def frame(self):
+    def frame(self) -> NDArray[np.float64]:
         """Unit vectors of its edges."""
         return axes_of(self.axes)

@@ -1,9 +1,15 @@
-"""Capsules: a straight line that has grown."""
+"""Capsules: straight lines grown by a radius."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from ...tables import Several, real, table, vector
 from ..rigid_body import Grown, Shape, axes_about
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @table
@@ -15,7 +21,7 @@ class Capsule(Shape):
     radius : float
         Its radius [m], > 0.
     length : float
-        Distance of the centres of its half spheres [m], > 0; from end to end it is longer by two radii.
+        Distance of the centres of its half spheres [m], > 0; the total length is larger by two radii.
     axis : sequence of 3 float
         Its axis; not with ``orientation``.
 
@@ -37,21 +43,21 @@ class Capsule(Shape):
     length: float = real(above=0, unit="m")
     axis: Several = vector(default=None)
 
-    def check(self):
+    def check(self) -> None:
         """Refuse an axis that is zero."""
         if self.axis is not None:
             self.frame()
 
-    def grown(self):
+    def grown(self) -> Grown:
         """Its axis, grown by the radius."""
         return Grown(self.radius, (0.0, 0.0, 0.5 * self.length))
 
-    def skeleton(self):
+    def skeleton(self) -> NDArray[Any]:
         """Its axis."""
         from ..skeleton import of_box
 
         return of_box(self.grown())
 
-    def frame(self):
-        """Unit vectors of its axes, its own third."""
+    def frame(self) -> NDArray[np.float64]:
+        """Unit vectors of its axes; its own axis is third."""
         return axes_about("axis", self.axis)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ...tables import Several, real, table, vector
 from ..rigid_body import Grown, Shape, axes_about
 from .rounding import check_rounding, edge_radius, shrunk
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 @table
@@ -43,7 +48,7 @@ class Cylinder(Shape):
     axis: Several = vector(default=None)
     rounding: float | None = real(default=None, above=0, unit="m")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse an axis that is zero and a rounding that is too large."""
         if self.axis is not None:
             self.frame()
@@ -52,22 +57,22 @@ class Cylinder(Shape):
     def _sizes(self):
         return 2.0 * self.radius, 2.0 * self.radius, self.length
 
-    def grown(self):
+    def grown(self) -> Grown:
         """A smaller cylinder, grown by the radius of the edges."""
         edge = edge_radius(self.rounding, self._sizes())
         return Grown(edge, shrunk(self._sizes(), edge), round=True)
 
-    def skeleton(self):
+    def skeleton(self) -> NDArray[Any]:
         """The rims of its core, and its axis."""
         from ..skeleton import of_cylinder
 
         return of_cylinder(self.grown())
 
-    def frame(self):
-        """Unit vectors of its axes, its own third."""
+    def frame(self) -> NDArray[np.float64]:
+        """Unit vectors of its axes; its own axis is third."""
         return axes_about("axis", self.axis)
 
-    def farthest(self, normals):
+    def farthest(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points of the core, on the circles at its ends."""
         side = np.sign(normals)
         around = np.linalg.norm(normals[:, :2], axis=1, keepdims=True)

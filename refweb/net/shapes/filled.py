@@ -1,23 +1,28 @@
-"""Bodies whose depth is known on a grid: solids that a surface of triangles bounds."""
+"""Bodies with depth on a grid: solids inside a surface of triangles."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ...tables import Several
 from ..rigid_body import Grown, Shape, axes_of
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
 GRID = 48
-"""Number of cells of the grid along the longest side, where none is given and no wall is too thin for it."""
+"""Number of cells of the grid along the longest side, by default and if no wall is too thin."""
 WIDE = 96
-"""The same of a grid for bodies that are thicker than the first one reaches: far from a surface depth is smooth."""
+"""Number of cells of a wider grid, for contact with thicker bodies; far from a surface the depth is smooth."""
 WALL = 2.0
 """Least number of cells from the middle of a wall to its surface."""
 MOST = 4_000_000
-"""Largest number of points of a grid that is chosen."""
+"""Largest number of points of a chosen grid."""
 
 
 class Solid(NamedTuple):
@@ -28,7 +33,7 @@ class Solid(NamedTuple):
     points : ndarray, shape (n, 3)
         Corners [m].
     triangles : ndarray of int, shape (t, 3)
-        Those of each triangle, outward.
+        Corners of each triangle, outward.
     centre : ndarray, shape (3,)
         Centre of mass, from the origin of the file [m].
     volume : float
@@ -36,15 +41,15 @@ class Solid(NamedTuple):
     inertia : ndarray, shape (3, 3)
         Moments for a density of 1 [m⁵].
     field : refweb.net.boundary.field.Field
-        Depth in it.
+        Depth in the solid.
     convex : bool
         True if the body is convex.
     remarks : tuple of str
         Faults of the surface.
     felt : tuple of ndarray, optional
-        Corners and triangles of the boundary of a solid whose surface had faults, where these are not the ones above.
+        Corners and triangles of the boundary of a repaired solid, if they differ from ``points`` and ``triangles``.
     winding : refweb.net.boundary.winding.Winding, optional
-        Tells what is inside of such a solid.
+        Decides which points are inside a repaired solid.
     error : float, optional
         Error of the field at the part of the surface that matters [m]; by default that of the field.
     """
@@ -56,8 +61,8 @@ class Solid(NamedTuple):
     inertia: np.ndarray
     field: Any
     convex: bool
-    remarks: tuple
-    felt: tuple | None = None
+    remarks: tuple[Any, ...]
+    felt: tuple[Any, ...] | None = None
     winding: Any = None
     error: float | None = None
 
@@ -68,8 +73,8 @@ class Filled(Shape):
     solid: Any
     axes: Several
 
-    def grown(self):
-        """No core: the box that it fills about its centre, within its error, and where its field's numbers stand."""
+    def grown(self) -> Grown:
+        """Half sizes of the box around it, within its error, as core, and the address of its field."""
         field = self.solid.field
         size = tuple((np.abs(self.solid.points).max(axis=0) + field.error).tolist())
         return Grown(
@@ -77,36 +82,36 @@ class Filled(Shape):
         )
 
     @property
-    def extent(self):
+    def extent(self) -> float:
         """Largest distance from its centre to its surface, within its error [m]."""
         return float(np.linalg.norm(self.solid.points, axis=1).max()) + self.solid.field.error
 
-    def frame(self):
+    def frame(self) -> NDArray[np.float64]:
         """Unit vectors of the axes of the file."""
         return axes_of(self.axes)
 
-    def volume(self):
+    def volume(self) -> float:
         """Its volume [m³]."""
         return self.solid.volume
 
-    def inertia(self, mass):
+    def inertia(self, mass: float) -> NDArray[np.float64]:
         """Tensor of inertia of a uniform mass about its centre [kg m²], along its axes, shape (3, 3)."""
         return mass / self.solid.volume * self.solid.inertia
 
-    def depth(self):
-        """Kernel of the depth that its field has."""
+    def depth(self) -> Any:
+        """Kernel of the depth by its field."""
         from ..boundary.field import depth
 
         return depth
 
-    def skeleton(self):
-        """Its edges that stand out."""
+    def skeleton(self) -> NDArray[Any] | None:
+        """Its convex edges."""
         from ..skeleton import of_surface
 
         return of_surface(self.solid.points, self.solid.triangles)
 
-    def touched(self, thickness):
-        """Its field, or for what is thicker than that reaches a wider one, with `WIDE` cells along all it fills."""
+    def touched(self, thickness: float) -> Grown:
+        """Its field, or for thicker parts a wider field with `WIDE` cells along the longest side."""
         field, grown = self.solid.field, self.grown()
         if thickness <= field.margin:
             return grown
@@ -122,11 +127,11 @@ class Filled(Shape):
             wide[thickness] = field_of(points, triangles, cells, around, field, self.solid.winding)
         return grown._replace(field=wide[thickness].address)
 
-    def boundary(self):
+    def boundary(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Its triangles."""
         return self.solid.points, self.solid.triangles
 
-    def remarks(self):
+    def remarks(self) -> tuple[str, ...]:
         """Remarks on repairs of its file, and on walls that are thickened."""
         return *self.solid.remarks, *self._on_thin_walls()
 
@@ -141,10 +146,10 @@ class Filled(Shape):
 
     @property
     def _felt(self):
-        """Corners and triangles of the boundary that its field is made of."""
+        """Corners and triangles of the boundary from which its field is made."""
         return self.solid.felt or (self.solid.points, self.solid.triangles)
 
-    def texts(self):
+    def texts(self) -> Iterator[str]:
         """Texts on its size, its centre of mass in the file, and the error of its field at the surface."""
         solid, field = self.solid, self.solid.field
         centre = ", ".join(f"{x:.4g}" for x in solid.centre)
@@ -153,16 +158,16 @@ class Filled(Shape):
         yield f"surface within {self.error:.1e} m on a grid of {grid} points"
 
     @property
-    def error(self):
-        """Largest distance of the surface that lines feel from that of the file [m]."""
+    def error(self) -> float | None:
+        """Largest distance of the surface of contact from that of the file [m]."""
         return self.solid.field.error if self.solid.error is None else self.solid.error
 
 
 def field_in(points, triangles, grid, winding=None, fewest=GRID):
-    """The field of the solid in a surface, with ``grid`` cells, or as many as its walls ask for, from ``fewest`` on.
+    """The field of the solid inside a surface, with ``grid`` cells, or with enough for its walls, ``fewest`` at least.
 
-    Walls that are too thin for a grid that is given, or for the finest that is chosen, are thickened: the whole solid
-    grows by an offset, so that depth is a distance still and the middle of each wall has `WALL` cells on each side.
+    If walls are too thin for a given grid, or for the finest chosen one, the whole solid is grown by an offset: depth
+    is still a distance, and each wall has `WALL` cells on both sides of its middle.
     """
     from ..boundary.field import field_of
 

@@ -1,10 +1,11 @@
-"""Solids from files: bodies that a surface of triangles bounds."""
+"""Solids from files of a surface of triangles."""
 
 from __future__ import annotations
 
 import functools
 import hashlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,24 +20,24 @@ SIZES = 1e-6, 1e6
 
 @table
 class Mesh(Filled):
-    """A solid whose surface is in a file; its position is that of its centre of mass, were it uniform.
+    """A solid with its surface in a file; its position is that of its centre of mass at uniform density.
 
-    The origin of the file lies at −c from there, c being the centre of mass in the file, turned as the axes say. Parts
-    that overlap or touch are one solid and holes are bridged, with a warning, see `refweb.net.boundary.repair`.
+    With the centre of mass c in the file, the origin of the file is at −c from the position, turned with the axes.
+    Parts that overlap or touch become one solid and holes are closed, with a warning, see `refweb.net.boundary.repair`.
 
     Parameters
     ----------
     file : str
         STL, OBJ or VTP file of a surface that encloses something, relative to the scene's folder.
     scale : float
-        Metres a unit of the file, > 0.
+        Metres per unit of the file, > 0.
     surface : {"file", "hull"}
         "hull" takes the convex hull of the surface in place of what the file has.
     axes : list of 2 vectors, optional
         Directions of the first two axes of the file, at right angles; by default x and y.
     grid : int, optional
-        Number of cells along its longest side of the grid on which depth is known, see `refweb.net.boundary.field`; by
-        default 48, or as many as its thinnest wall asks for.
+        Number of cells of the grid of depth along its longest side, see `refweb.net.boundary.field`; by default 48, or
+        more for thin walls.
 
     Examples
     --------
@@ -57,23 +58,23 @@ class Mesh(Filled):
     axes: Several = rows(3, default=None)
     grid: int | None = integer(default=None, at_least=8, at_most=4096)
 
-    def check(self):
-        """Refuse axes that are not two at right angles."""
+    def check(self) -> None:
+        """Refuse axes that are not at right angles."""
         self.frame()
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """The table as plain TOML values, the file with its folder."""
         return {**super().to_dict(), "file": str(Path(self.file).absolute())}
 
     @functools.cached_property
-    def solid(self):
+    def solid(self) -> Any:
         """The `Solid`.
 
         Raises
         ------
         InputError
-            For a file that cannot be read or whose surface has no inside, a size that no body has, and a grid that
-            does not fit into memory.
+            For a file that cannot be read, a surface that encloses nothing, a size below 1e-6 or above 1e6 m, and a
+            grid that does not fit into memory.
         """
         path = Path(self.file)
         try:
@@ -84,14 +85,14 @@ class Mesh(Filled):
         except OSError as error:
             raise InputError(f"file = {quote(self.file)}: cannot be read: {error.strerror or error}") from None
 
-    def settle(self):
+    def settle(self) -> None:
         """Read the file."""
         _ = self.solid
 
 
 @functools.lru_cache(maxsize=16)
 def _solid(path, content, scale, grid, hull):
-    """The `Solid` of a file of some content, or of its convex hull."""
+    """The `Solid` of the content of a file, or its convex hull."""
     from ..boundary.closed import NotClosedError, closed, convex_hull, is_convex, moments
     from ..boundary.surface_file import read
 
@@ -131,7 +132,7 @@ def _touches_itself(surface, grid):
 
 
 def _refuse_size(points, scale):
-    """Refuse a size that no body has."""
+    """Refuse a size out of `SIZES`."""
     size = float(np.ptp(points.reshape(-1, 3), axis=0).max())
     if not SIZES[0] <= size <= SIZES[1]:
         raise InputError(
@@ -141,7 +142,7 @@ def _refuse_size(points, scale):
 
 
 def _repaired(points, triangles, grid):
-    """The `Solid` that a surface with faults means."""
+    """The `Solid` of a repaired surface."""
     from ..boundary.closed import is_convex
     from ..boundary.repair import repaired
 

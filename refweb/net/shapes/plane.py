@@ -1,8 +1,9 @@
-"""Planes: the ground behind them has no end."""
+"""Planes: half spaces of ground."""
 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from ...errors import InputError
 from ...kernels import kernel
 from ...tables import Several, real, table, vector
 from ..rigid_body import Grown, Shape, axes_about
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 @kernel()
@@ -22,8 +26,8 @@ def depth(p, grown):
 class Plane(Shape):
     """All that lies behind a plane through the position, such as level ground; it is fixed.
 
-    Where the stiffness of contact is left out it is chosen for an overlap of 2 % of the shortest line, since a plane
-    has no size. Nothing passes through it, however deep.
+    If the stiffness of contact is not given, it is chosen for an overlap of 2 % of the shortest line, since a plane has
+    no size. Nothing passes through it at any depth.
 
     Parameters
     ----------
@@ -47,34 +51,34 @@ class Plane(Shape):
     normal: Several = vector(default=None)
     drawn: float = real(default=2.0, above=0, unit="m")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a normal that is zero."""
         if self.normal is not None:
             self.frame()
 
-    def frame(self):
+    def frame(self) -> NDArray[np.float64]:
         """Unit vectors of its axes, the normal third."""
         return axes_about("normal", self.normal)
 
-    def grown(self):
-        """A box without end."""
+    def grown(self) -> Grown:
+        """An infinite box."""
         return Grown(0.0, (math.inf, math.inf, math.inf))
 
-    def depth(self):
+    def depth(self) -> Any:
         """Kernel of the distance behind it."""
         return depth
 
-    def skeleton(self):
-        """No parts: it touches other bodies by theirs."""
+    def skeleton(self) -> NDArray[Any] | None:
+        """No parts: other bodies touch it with their parts."""
         from ..skeleton import PART
 
         return np.zeros(0, PART)
 
-    def volume(self):
+    def volume(self) -> None:
         """None: it has no end."""
         raise InputError('density has no meaning for shape = "plane", which has no end: leave it out')
 
-    def boundary(self):
+    def boundary(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """A square."""
         corners = 0.5 * self.drawn * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
         return corners, np.array([[0, 1, 2], [0, 2, 3]])

@@ -1,8 +1,9 @@
-"""Rings: rigid circles, which webs in their plane touch as the disc inside."""
+"""Rings: rigid circles; a web in the plane of a ring touches it as a disc."""
 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,15 +11,18 @@ from ...errors import InputError
 from ...tables import Several, real, table, vector
 from ..rigid_body import Grown, Shape, axes_about
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
 TUBE = 0.04
-"""Thickness of the tube that a ring is drawn as, over its radius."""
+"""Thickness of the tube that is drawn for a ring, over its radius."""
 
 
 @table
 class Ring(Shape):
-    """A ring; along its normal, its third direction, it has no ends.
-
-    It keeps its plane: it turns about its normal only.
+    """A ring; it is infinite along its normal, its third direction. It keeps its plane: it turns about its normal only.
 
     Parameters
     ----------
@@ -44,40 +48,40 @@ class Ring(Shape):
     radius: float = real(above=0, unit="m")
     normal: Several = vector()
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a normal that is zero."""
         self.frame()
 
-    def grown(self):
+    def grown(self) -> Grown:
         """Its axis, grown by the radius."""
         return Grown(self.radius, (0.0, 0.0, math.inf))
 
-    def skeleton(self):
+    def skeleton(self) -> NDArray[Any] | None:
         """The circle."""
         from ..skeleton import rim
 
         return rim(self.radius, 0.0, 0.0)
 
-    def frame(self):
+    def frame(self) -> NDArray[np.float64]:
         """Unit vectors of its axes, the normal third."""
         return axes_about("normal", self.normal)
 
-    def volume(self):
+    def volume(self) -> None:
         """None: it has no thickness."""
         raise InputError('density has no meaning for shape = "ring", which has no thickness: give mass = ... [kg]')
 
-    def inertia(self, mass):
+    def inertia(self, mass: float) -> NDArray[np.float64]:
         """Moments of inertia of a thin ring: m r² about its normal and half of it across."""
         about = mass * self.radius**2
         return np.diag([0.5 * about, 0.5 * about, about])
 
-    def refuse_turning(self, angular_velocity):
+    def refuse_turning(self, angular_velocity: Sequence[float]) -> None:
         """Refuse to turn about another axis than the normal."""
         across = np.linalg.norm(np.cross(angular_velocity, self.normal))
         if across > 1e-9 * np.linalg.norm(angular_velocity) * np.linalg.norm(self.normal):
             raise InputError(f"angular_velocity = {list(angular_velocity)} must be along the normal of the ring")
 
-    def boundary(self):
+    def boundary(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """A thin tube whose outer edge has the radius."""
         from ..surfaces import tube
 

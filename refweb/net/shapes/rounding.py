@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ...errors import InputError
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 ROUNDING = 0.02
-"""Radius of edges, where none is given, over the smallest size."""
+"""Default radius of edges over the smallest size."""
 
 
 def edge_radius(rounding, sizes):
-    """Radius of edges [m] of a body of some sizes [m]; ``rounding`` is what is given, or None."""
+    """Radius of edges [m] of a body of some sizes [m]; ``rounding`` is the given radius or None."""
     return rounding or ROUNDING * min(sizes)
 
 
-def shrunk(sizes, edge):
-    """Half sizes [m] of the core that edges of a radius leave."""
-    return tuple(max(0.5 * size - edge, 0.0) for size in sizes)
+def shrunk(sizes: Sequence[float], edge: float) -> tuple[float, float, float]:
+    """Half sizes of the core [m] of a body of some sizes with edges of a radius [m]."""
+    x, y, z = (max(0.5 * size - edge, 0.0) for size in sizes)
+    return x, y, z
 
 
 def check_rounding(rounding, sizes):

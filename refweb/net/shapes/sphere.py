@@ -1,11 +1,16 @@
-"""Spheres: a point that has grown."""
+"""Spheres: points grown by a radius."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...tables import real, table
 from ..rigid_body import Grown, Shape
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 @table
@@ -32,16 +37,16 @@ class Sphere(Shape):
 
     radius: float = real(above=0, unit="m")
 
-    def grown(self):
+    def grown(self) -> Grown:
         """A point, grown by the radius."""
         return Grown(self.radius, (0.0, 0.0, 0.0))
 
-    def skeleton(self):
+    def skeleton(self) -> NDArray[Any]:
         """Its centre."""
         from ..skeleton import of_box
 
         return of_box(self.grown())
 
-    def inertia(self, mass):
+    def inertia(self, mass: float) -> NDArray[np.float64]:
         """Moments of inertia of a solid sphere, 2/5 m r²."""
         return 0.4 * mass * self.radius**2 * np.eye(3)

@@ -1,10 +1,11 @@
-"""Terrain: ground whose heights are in a file."""
+"""Terrain: ground with heights from a file."""
 
 from __future__ import annotations
 
 import functools
 import hashlib
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,34 +14,37 @@ from ...messages import quote
 from ...tables import Several, integer, real, rows, table, text
 from .filled import GRID, MOST, Filled, Solid, field_in
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 DEEP = 0.25
-"""Depth of the ground below its lowest place, where none is given, over its longest side."""
+"""Default depth of the ground below its lowest point, over its longest side."""
 FORMATS = (".csv", ".obj", ".stl", ".vtp")
-"""Ends of names of files of heights."""
+"""Suffixes of files of heights."""
 
 
 @table
 class Terrain(Filled):
-    """Ground given by heights: all below them down to a depth is solid, with upright walls at its rim; it is fixed.
+    """Ground given by heights: solid below them down to a depth, with vertical walls at its rim; it is fixed.
 
-    The position is where the origin of the file lies, the third axis is up. A CSV file has the columns x, y and z of
-    places, on a grid or scattered, between which the ground is made of triangles; a surface file (OBJ, STL, VTP) brings
-    the triangles. The surface has one height at each place, so no cliff hangs over. Its error is that of the ground but
-    for triangles at the rim. Where the stiffness of contact is left out it is chosen as for a plane.
+    The position is that of the origin of the file, and the third axis is up. A CSV file has the columns x, y and z of
+    points, on a grid or scattered, which triangles join; a surface file (OBJ, STL, VTP) contains the triangles. The
+    surface has one height at each position, without overhangs. Its error does not include triangles at the rim. If the
+    stiffness of contact is not given, it is chosen as for a plane.
 
     Parameters
     ----------
     heights : str
         CSV file of heights, or OBJ, STL or VTP file of an open surface, relative to the scene's folder.
     scale : float
-        Metres a unit of the file, > 0.
+        Metres per unit of the file, > 0.
     thickness : float, optional
-        Depth of the ground below its lowest place [m], > 0; by default a quarter of its longest side.
+        Depth of the ground below its lowest point [m], > 0; by default a quarter of its longest side.
     axes : list of 2 vectors, optional
         Directions of the first two axes of the file, at right angles; by default x and y.
     grid : int, optional
-        Number of cells along its longest side of the grid on which depth is known; by default 48 or more, so that a
-        cell is no longer than the edges of the triangles, as far as memory allows.
+        Number of cells of the grid of depth along its longest side; by default 48 or more, so that a cell is at most as
+        long as the edges of the triangles, as far as memory allows.
 
     Examples
     --------
@@ -60,23 +64,22 @@ class Terrain(Filled):
     axes: Several = rows(3, default=None)
     grid: int | None = integer(default=None, at_least=8, at_most=4096)
 
-    def check(self):
-        """Refuse axes that are not two at right angles."""
+    def check(self) -> None:
+        """Refuse axes that are not at right angles."""
         self.frame()
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """The table as plain TOML values, the file with its folder."""
         return {**super().to_dict(), "heights": str(Path(self.heights).absolute())}
 
     @functools.cached_property
-    def solid(self):
+    def solid(self) -> Any:
         """The `Solid`, about the origin of the file.
 
         Raises
         ------
         InputError
-            For a file that cannot be read or whose surface has two heights at a place, and a grid that does not
-            fit into memory.
+            For a file that cannot be read, two heights at one position, and a grid that does not fit into memory.
         """
         path = Path(self.heights)
         try:
@@ -91,8 +94,8 @@ class Terrain(Filled):
         except OSError as error:
             raise InputError(f"heights = {quote(self.heights)}: cannot be read: {error.strerror or error}") from None
 
-    def skeleton(self):
-        """Its edges that stand out, or none where there are too many: other bodies touch it by theirs."""
+    def skeleton(self) -> NDArray[Any] | None:
+        """Its convex edges, or none if there are too many: other bodies touch it with their parts."""
         from ..skeleton import PART
 
         try:
@@ -100,14 +103,14 @@ class Terrain(Filled):
         except InputError:
             return np.zeros(0, PART)
 
-    def settle(self):
+    def settle(self) -> None:
         """Read the file."""
         _ = self.solid
 
 
 @functools.lru_cache(maxsize=16)
 def _solid(path, content, scale, thickness, grid):
-    """The `Solid` of a file of some content."""
+    """The `Solid` of the content of a file."""
     from ..boundary.closed import NotClosedError, closed, is_convex, moments
     from ..boundary.field import places_on
     from ..boundary.heights import above_ground, on_rim, places_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,10 @@ from ...messages import quote
 from ..probes import MAGNITUDE, PROBE, Probe
 from .nodal import Nodal
 from .observable import Value
+
+if TYPE_CHECKING:
+    from ...system.system import System
+    from ..state import State
 
 
 class TotalAngularMomentum(Nodal):
@@ -23,7 +28,8 @@ class TotalAngularMomentum(Nodal):
     ``[orbit]`` velocities are relative to the rotating axes, and the total is not constant.
     """
 
-    unit, keys = "N m s", ("node", "body", "component")
+    unit = "N m s"
+    keys: tuple[str, ...] = ("node", "body", "component")
     dynamic = True
 
     def _parts(self, system):
@@ -40,7 +46,7 @@ class TotalAngularMomentum(Nodal):
         moments = [(b.spin, b.moment_about_centre) for b in turning]
         return np.column_stack([masses, net.points[:linear]]), counted, moments
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Value by sums over rows."""
         numbers, counted, spins = self._parts(state.system)
         mass, linear = numbers[:, :1], len(numbers)
@@ -50,11 +56,11 @@ class TotalAngularMomentum(Nodal):
         total += sum((moment * state.v[row] for row, moment in spins), np.zeros(3))
         return Value(float(self.sizes(total[None])[0]), None)
 
-    def position(self, system, at):
+    def position(self, system: System, at: int) -> int | None:
         """None: the value has no position."""
         return None
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x and v."""
         numbers, counted, spins = self._parts(system)
         component = MAGNITUDE if self.observe.component is None else self.observe.component

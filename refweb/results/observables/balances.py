@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...errors import InputError
 from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
-def weights(system, column):
+    from ...statics.equilibrium import Equilibrium
+    from ...system.system import System
+    from ..state import State
+
+
+def weights(system: System, column: str) -> NDArray[np.float64]:
     """Weights of (energy of each term, kinetic energy, work, step size) in a column."""
     total, books = column == "total_energy", [f.balance.column for f in system.terms]
     stored = [book not in ("work", "dissipated_energy") for book in books]
@@ -36,20 +45,20 @@ class Booked(Observable):
     needs = ""
     signed = True
 
-    def bounds(self, system):
+    def bounds(self, system: System | None) -> tuple[float, float]:
         """Bounds of the value: strain, contact, bending, kinetic and lost energies are not negative."""
         return ANY if self.signed else NOT_NEGATIVE
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse a column that no effect writes to."""
         if self.needs and self.observe.quantity not in [f.balance.column for f in system.terms]:
             raise InputError(f'quantity = "{self.observe.quantity}" needs {self.needs} in the scene')
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Value from the energies of the state, without kinetic energy."""
         return Value(state.energies[self.observe.quantity], None)
 
-    def weights(self, system):
+    def weights(self, system: System) -> NDArray[np.float64]:
         """Weights of (energy of each term, kinetic energy, work, step size)."""
         return weights(system, self.observe.quantity)
 
@@ -66,7 +75,7 @@ class StrainEnergy(Booked):
 
     signed = False
 
-    def error(self, state, equilibrium):
+    def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """The proven bound of duality, if there is one."""
         if equilibrium.duality_bound is None:
             return super().error(state, equilibrium)
@@ -153,7 +162,7 @@ class Work(Booked):
 
     needs = "[[load]], [[motion]] or another effect that does work"
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse a scene without such effects, and in statics work that depends on the path."""
         moved = system.drives or system.net.factors
         if not moved:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,17 +13,23 @@ from ...messages import nearest
 from ..probes import MAGNITUDE, PROBE, Probe
 from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...system.system import System
+    from ..state import State
+
 
 class Between(Observable):
     """A length or an area that follows from the positions of some rows."""
 
     unit = "m"
 
-    def rows(self, system):
+    def rows(self, system: System) -> NDArray[np.int64]:
         """The rows, in their order, shape (k,)."""
         raise NotImplementedError
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse nodes and bodies that the system does not have."""
         self.rows(system)
 
@@ -36,11 +43,11 @@ class Between(Observable):
             raise InputError(f'body = "{name}" is not a body, {hint}')
         return system.net.bodies[names.index(name)].row
 
-    def bounds(self, system):
+    def bounds(self, system: System | None) -> tuple[float, float]:
         """Bounds of the value: a length or an area is not negative, but its component may be."""
         return NOT_NEGATIVE if self.observe.component is None else ANY
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Value by the kernel of its probe."""
         value = self.probe(state.system)
         rows, data = np.array(value.rows, dtype=np.int64), np.ascontiguousarray(value.data, dtype=float)
@@ -51,9 +58,9 @@ class Between(Observable):
 class Distance(Between):
     """Distance of two nodes, of a node and the centre of a body, or of two bodies, ``body`` and ``to``."""
 
-    keys = ("node", "body", "to")
+    keys: tuple[str, ...] = ("node", "body", "to")
 
-    def rows(self, system):
+    def rows(self, system: System) -> NDArray[np.int64]:
         """Rows of both ends."""
         observe, numbers = self.observe, []
         if observe.node is not None:
@@ -66,7 +73,7 @@ class Distance(Between):
             )
         return np.array(numbers)
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x and the reference position."""
         rows = self.rows(system)
         return Probe(distance, rows, system.net.points[rows])
@@ -75,11 +82,11 @@ class Distance(Between):
 class Mouth(Between):
     """Polygon of nodes around a mouth, see `Web.find_around`; the last is followed by the first."""
 
-    keys = ("node",)
+    keys: tuple[str, ...] = ("node",)
 
-    def rows(self, system):
+    def rows(self, system: System) -> NDArray[np.int64]:
         """Rows of the nodes around the mouth."""
-        numbers = np.zeros(0) if self.observe.node is None else system.net.web.find_around(self.observe.node)
+        numbers = np.zeros(0, np.int64) if self.observe.node is None else system.net.web.find_around(self.observe.node)
         if len(numbers) < 3:
             raise InputError(
                 f'quantity = "{self.observe.quantity}" is of {len(numbers)} nodes, must be at least 3: name those of '
@@ -91,7 +98,7 @@ class Mouth(Between):
 class MouthPerimeter(Mouth):
     """Sum of the distances from node to node, and from the last to the first."""
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x and the reference position."""
         rows = self.rows(system)
         return Probe(perimeter, rows, system.net.points[rows])
@@ -105,9 +112,10 @@ class MouthArea(Mouth):
     axis, positive if the nodes run counterclockwise.
     """
 
-    unit, keys = "m²", ("node", "component")
+    unit = "m²"
+    keys: tuple[str, ...] = ("node", "component")
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x and the reference position."""
         rows, component = self.rows(system), self.observe.component
         component = MAGNITUDE if component is None else component

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ...effects.base import STRAIN
 from ...errors import InputError
 from ...net.tension_laws import law_of
 from .observable import ANY, NOT_NEGATIVE, SELECTIONS, Observable, Value
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...net.net import Net
+    from ...statics.duality_bound import DualityBound
+    from ...statics.equilibrium import Equilibrium
+    from ...system.system import System
+    from ..probes import Probe
+    from ..state import State
 
 
 class Line(Observable):
@@ -22,18 +34,19 @@ class Line(Observable):
         True if the value has the sign of the tension.
     """
 
-    keys, at = ("line", "part", "select"), "line"
+    keys: tuple[str, ...] = ("line", "part", "select")
+    at = "line"
     pull = True
 
-    def values(self, state):
+    def values(self, state: State) -> NDArray[np.float64]:
         """Value of each element in a state, shape (cells,)."""
         raise NotImplementedError
 
-    def bound(self, proven, net):
+    def bound(self, proven: DualityBound, net: Net) -> NDArray[np.float64]:
         """Error of each element by a `refweb.statics.duality_bound.DualityBound`, shape (cells,)."""
         raise NotImplementedError
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse lines that the net does not have, and parts of lines of one element."""
         self.lines(system.net)
         if self.observe.part is not None and system.net.subdivide == 1:
@@ -42,12 +55,12 @@ class Line(Observable):
                 "it out, or name lines where they end"
             )
 
-    def lines(self, net):
+    def lines(self, net: Net) -> NDArray[np.int64] | None:
         """Numbers of the observed lines, increasing; None for all."""
         line = self.observe.line
         return None if line is None else net.web.find_lines(line, "line")
 
-    def elements(self, net):
+    def elements(self, net: Net) -> NDArray[np.int64]:
         """Numbers of their elements, or of the part of each that is asked for, increasing, shape (k,)."""
         lines, part = self.lines(net), self.observe.part
         if part is not None:
@@ -56,14 +69,14 @@ class Line(Observable):
             return net.middle_of(lines) if part == "middle" else lines * net.subdivide + ends[part]
         return np.arange(len(net.line)) if lines is None else np.flatnonzero(np.isin(net.line, lines))
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """The value that counts of its elements."""
         net = state.system.net
         elements = self.elements(net)
         value, at = self.selected(self.values(state)[elements])
         return Value(value, int(net.line[elements[at]]))
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of the elements of its lines, or of all."""
         from ..probes import Probe, line, line_of, selected_element
 
@@ -76,11 +89,11 @@ class Line(Observable):
             return Probe(line, [self.column(system), first, last + 1], scale)
         return Probe(line_of, [self.column(system), *elements.tolist()], scale)
 
-    def position(self, system, at):
+    def position(self, system: System, at: int) -> int:
         """The line of an element."""
         return int(system.net.line[at])
 
-    def bounds(self, system):
+    def bounds(self, system: Any) -> tuple[float, float]:
         """Lines that can only pull have tensions that are not negative, damping apart.
 
         Where such a line is among others the largest is not negative, and where there is no other the smallest.
@@ -92,7 +105,7 @@ class Line(Observable):
         certain = pulls.all() if self.observe.select == "min" else pulls.any()
         return NOT_NEGATIVE if self.pull and certain and alone else ANY
 
-    def bounds_by_tables(self, tables):
+    def bounds_by_tables(self, tables: dict[str, Any]) -> tuple[float, float]:
         """The same where the law of all lines is known without the net: one law, of the cable and of its groups."""
         if self.observe.select == "abs":
             return NOT_NEGATIVE
@@ -102,15 +115,15 @@ class Line(Observable):
         pushes = damped or not laws or any(law_of(law).pushes for law in laws)
         return NOT_NEGATIVE if self.pull and not pushes else ANY
 
-    def column(self, system):
+    def column(self, system: System) -> int:
         """Column of tension in the output of lines."""
         return system.tension_column
 
-    def scale(self, net):
+    def scale(self, net: Net) -> NDArray[np.float64]:
         """1, shape (cells,)."""
         return np.ones(len(net.cells))
 
-    def error(self, state, equilibrium):
+    def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """The proven bound of duality, if there is one, plus the rounding of lines whose ends are both fixed."""
         if equilibrium.duality_bound is None:
             return super().error(state, equilibrium)
@@ -118,7 +131,7 @@ class Line(Observable):
         bound = self.bound(equilibrium.duality_bound, net)[self.elements(net)]
         return float(bound.max()) + self.of_held_lines(state)
 
-    def proven(self, equilibrium):
+    def proven(self, equilibrium: Equilibrium) -> bool:
         """True if there is a bound from duality."""
         return equilibrium.duality_bound is not None
 
@@ -128,11 +141,11 @@ class Tension(Line):
 
     unit = "N"
 
-    def values(self, state):
+    def values(self, state: State) -> NDArray[np.float64]:
         """Tension [N], shape (cells,)."""
         return state.element_tension
 
-    def bound(self, proven, net):
+    def bound(self, proven: DualityBound, net: Net) -> NDArray[np.float64]:
         """The error bound of tension itself [N], shape (cells,)."""
         return proven.tension
 
@@ -142,15 +155,15 @@ class Stress(Line):
 
     unit = "Pa"
 
-    def values(self, state):
+    def values(self, state: State) -> NDArray[np.float64]:
         """Stress [Pa], shape (cells,)."""
         return state.element_tension / state.system.net.area
 
-    def scale(self, net):
+    def scale(self, net: Net) -> NDArray[np.float64]:
         """Inverse of the area [1/m²], shape (cells,)."""
         return 1.0 / net.area
 
-    def bound(self, proven, net):
+    def bound(self, proven: DualityBound, net: Net) -> NDArray[np.float64]:
         """Error bound of tension over the area [Pa], shape (cells,)."""
         return proven.tension / net.area
 
@@ -164,21 +177,21 @@ class StressShare(Line):
         The limit, an attribute of `refweb.net.net.Net`.
     """
 
-    def __init__(self, over):
+    def __init__(self, over: str) -> None:
         from .observe import Observe
 
         super().__init__(Observe(name=over, quantity="stress"))
         self._over = over
 
-    def values(self, state):
+    def values(self, state: State) -> NDArray[np.float64]:
         """Shares of the limit, shape (cells,)."""
         return state.element_tension * self.scale(state.system.net)
 
-    def scale(self, net):
+    def scale(self, net: Net) -> NDArray[np.float64]:
         """Inverse of the tension at the limit [1/N], 0 without a limit, shape (cells,)."""
         return 1.0 / (net.area * getattr(net, self._over))
 
-    def bound(self, proven, net):
+    def bound(self, proven: DualityBound, net: Net) -> NDArray[np.float64]:
         """Error bound of tension over the tension at the limit [1], shape (cells,)."""
         return proven.tension * self.scale(net)
 
@@ -188,19 +201,19 @@ class Strain(Line):
 
     pull = False
 
-    def column(self, system):
+    def column(self, system: System) -> int:
         """Column of strain."""
         return STRAIN
 
-    def values(self, state):
+    def values(self, state: State) -> NDArray[np.float64]:
         """Strain [1], shape (cells,)."""
         return state.element_strain
 
-    def bound(self, proven, net):
+    def bound(self, proven: DualityBound, net: Net) -> NDArray[np.float64]:
         """Error bound of strain itself [1], shape (cells,)."""
         return proven.strain
 
-    def error(self, state, equilibrium):
+    def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """± of the value; None if the line may be slack within its bound, since its strain is then not unique."""
         error = super().error(state, equilibrium)
         if error is None or equilibrium.duality_bound is None:

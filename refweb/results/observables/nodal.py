@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .observable import SELECTIONS, Observable, Value
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ...statics.equilibrium import Equilibrium
+    from ...system.system import System
+    from ..probes import Probe
+    from ..state import State
+    from .observe import Observe
 
 
 class Nodal(Observable):
@@ -13,46 +26,48 @@ class Nodal(Observable):
     Subclasses have `vectors` and a probe.
     """
 
-    keys = ("node", "body", "component", "select")
+    keys: tuple[str, ...] = ("node", "body", "component", "select")
 
-    def __init__(self, observe):
+    def __init__(self, observe: Observe) -> None:
         super().__init__(observe)
         self.at = "node" if observe.body is None else "body"
 
-    def vectors(self, state):
+    def vectors(self, state: State) -> NDArray[np.float64]:
         """Vector of each row in a state, shape (rows, 3)."""
         raise NotImplementedError
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse nodes and bodies that the net does not have."""
         self.rows(system)
 
-    def rows(self, system):
+    def rows(self, system: System) -> NDArray[np.int64]:
         """Rows it is looked at, shape (k,)."""
         net = system.net
         if self.observe.body is not None:
             return np.array([body.row for body in self.bodies(net)])
         return np.arange(net.nodes) if self.observe.node is None else net.find(self.observe.node)
 
-    def sizes(self, vectors):
+    def sizes(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """The requested component of vectors, or their magnitude, shape (k,)."""
         component = self.observe.component
         return np.linalg.norm(vectors, axis=1) if component is None else vectors[:, component]
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """The value that counts of its rows."""
         rows = self.rows(state.system)
         value, at = self.selected(self.sizes(self.vectors(state)[rows]))
         return Value(value, self.position(state.system, int(rows[at])))
 
-    def position(self, system, at):
+    def position(self, system: System, at: int) -> int | None:
         """The node, or of several bodies the number of the one; nowhere of one body, which is named."""
         if self.observe.body is None:
             return at
         rows = [body.row for body in system.net.bodies]
         return None if isinstance(self.observe.body, str) else rows.index(at)
 
-    def probe_of(self, kernel, source, rows, data):
+    def probe_of(
+        self, kernel: Any, source: int, rows: Sequence[int] | NDArray[np.int64], data: NDArray[np.float64]
+    ) -> Probe:
         """The probe of rows by a kernel of the largest, or by that of another choice, of a ``source`` of vectors."""
         from ..probes import MAGNITUDE, Probe, selected_row
 
@@ -61,7 +76,7 @@ class Nodal(Observable):
         component = MAGNITUDE if self.observe.component is None else self.observe.component
         return Probe(selected_row, [source, SELECTIONS[self.observe.select], component, *rows], data)
 
-    def numbers(self, rows):
+    def numbers(self, rows: Sequence[int] | NDArray[np.int64]) -> list[int]:
         """Component and rows in the form of `refweb.results.probes.largest_of`."""
         from ..probes import MAGNITUDE
 
@@ -73,14 +88,14 @@ class Nodal(Observable):
 class Place(Nodal):
     """A vector of each row that follows from its position; it is open if the row floats."""
 
-    def floats(self, state, equilibrium):
+    def floats(self, state: State, equilibrium: Equilibrium) -> bool:
         """Tell if the row whose value counts may move at no cost, or another one pass it."""
         floating = equilibrium.floating
         if floating is None:
             return bool(np.isin(self.rows(state.system), state.slack_nodes).any())
         rows, component = self.rows(state.system), self.observe.component
         axes = slice(None) if component is None else [component]
-        open_ = floating.free[rows][:, axes].any(axis=1)
+        open_ = np.any(floating.free[rows][:, axes], axis=1)
         if not open_.any():
             return False
         scores = self.scores(self.sizes(self.vectors(state)[rows]))
@@ -95,7 +110,7 @@ class Place(Nodal):
         best = np.maximum(*(self.scores(end) for end in ends))
         return bool((best[open_] > scores.max()).any())
 
-    def interval(self, state, equilibrium):
+    def interval(self, state: State, equilibrium: Equilibrium) -> tuple[float, float] | None:
         """Range of one row along one axis, see `refweb.statics.floating.Parts.limits`."""
         rows, axis, floating = self.rows(state.system), self.observe.component, equilibrium.floating
         if floating is None or floating.parts is None or axis is None or len(rows) > 1 or not floating.free[rows, axis]:
@@ -115,11 +130,11 @@ class Displacement(Place):
 
     unit = "m"
 
-    def vectors(self, state):
+    def vectors(self, state: State) -> NDArray[np.float64]:
         """Displacement [m], shape (rows, 3)."""
         return state.x
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x alone."""
         from ..probes import DISPLACEMENT, displacement
 
@@ -132,11 +147,11 @@ class Position(Place):
 
     unit = "m"
 
-    def vectors(self, state):
+    def vectors(self, state: State) -> NDArray[np.float64]:
         """Positions [m], shape (rows, 3)."""
         return state.position
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x and the reference position."""
         from ..probes import DISPLACEMENT, displacement
 
@@ -150,11 +165,11 @@ class Velocity(Nodal):
     unit = "m/s"
     dynamic = True
 
-    def vectors(self, state):
+    def vectors(self, state: State) -> NDArray[np.float64]:
         """Velocities [m/s], shape (rows, 3)."""
         return state.v
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of v alone."""
         from ..probes import VELOCITY, velocity
 

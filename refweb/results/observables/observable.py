@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ...errors import InputError
 from ...messages import nearest
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...net.net import Net
+    from ...net.rigid_body import RigidBody
+    from ...statics.equilibrium import Equilibrium
+    from ...system.system import System
+    from ..probes import Probe
+    from ..state import State
+    from .observe import Observe
+
 ANY, NOT_NEGATIVE = (-np.inf, np.inf), (0.0, np.inf)
 """Least and largest value that are possible."""
-SELECTIONS = {"max": 0, "min": 1, "abs": 2}
+SELECTIONS: dict[str | None, int] = {"max": 0, "min": 1, "abs": 2}
 """Numbers of choices among several values in compiled probes, by ``select``."""
 ROUNDING, SHARE = 4.0 * np.finfo(float).eps, 1e-7
 """Rounding of a strain by rounding of positions and lengths; relative change of lengths by which its effect is
@@ -50,26 +61,26 @@ class Observable:
     """
 
     unit = "1"
-    keys: tuple = ()
+    keys: tuple[str, ...] = ()
     dynamic = False
     at = "node"
     booked = False
 
-    def __init__(self, observe):
+    def __init__(self, observe: Observe) -> None:
         self.observe = observe
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Raise an `InputError` for keys that do not fit a `refweb.system.system.System`."""
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Its `Value` in a `refweb.results.state.State`."""
         raise NotImplementedError
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """The `refweb.results.probes.Probe` of the same value for every step of a run."""
         raise NotImplementedError
 
-    def body(self, net):
+    def body(self, net: Net) -> RigidBody:
         """The body it is of: the one that is named or the only one. Refused where it is none, or one of several."""
         names = [body.name for body in net.bodies]
         if self.observe.body is None and len(names) == 1:
@@ -80,7 +91,7 @@ class Observable:
             raise InputError(f'body {missing}: quantity = "{quantity}" needs one body, {nearest("", names)}')
         return named[0]
 
-    def bodies(self, net):
+    def bodies(self, net: Net) -> list[RigidBody]:
         """The bodies that are named, a list. Refused where one is none."""
         named, bodies = self.observe.body, {body.name: body for body in net.bodies}
         named = (named,) if isinstance(named, str) else named or ()
@@ -90,36 +101,36 @@ class Observable:
                 raise InputError(f'body = "{name}" is not a body, {hint}')
         return [bodies[name] for name in dict.fromkeys(named)]
 
-    def scores(self, values):
+    def scores(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Numbers of which the largest is that of the value that counts, see ``select`` of `refweb.Observe`."""
         if self.observe.select == "abs":
             return np.abs(values)
         return -values if self.observe.select == "min" else values
 
-    def selected(self, values):
+    def selected(self, values: NDArray[np.float64]) -> tuple[float, int]:
         """The value that counts, and its number."""
         at = int(np.argmax(self.scores(values)))
         return float(abs(values[at]) if self.observe.select == "abs" else values[at]), at
 
     @property
-    def selects(self):
+    def selects(self) -> bool:
         """True where a value counts that is not the largest."""
         return self.observe.select not in (None, "max")
 
-    def bounds(self, system):
+    def bounds(self, system: System | None) -> tuple[float, float]:
         """Least and largest value that are possible, whatever the state: a magnitude is not negative."""
         magnitude = "component" in self.keys and self.observe.component is None
         return NOT_NEGATIVE if magnitude or self.observe.select == "abs" else ANY
 
-    def bounds_by_tables(self, tables):
+    def bounds_by_tables(self, tables: dict[str, Any]) -> tuple[float, float]:
         """Least and largest possible value by the tables of a scene file, a dict; any value if they do not tell."""
         return self.bounds(None)
 
-    def position(self, system, at):
+    def position(self, system: System, at: int) -> int | None:
         """Node or line of the row or element ``at`` of the probe; None for quantities of the whole net."""
         return None
 
-    def error(self, state, equilibrium):
+    def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None if it is not known.
 
         This is an estimate from the deviations of the equilibrium: the change by the residual, three times the change
@@ -132,7 +143,7 @@ class Observable:
         rounding = 2.0 * np.finfo(float).eps * abs(self.of(state).value) + self.of_held_lines(state)
         return float(changes[0] + 3.0 * max(changes[1:]) + rounding)
 
-    def proven(self, equilibrium):
+    def proven(self, equilibrium: Equilibrium) -> bool:
         """Tell if ± in an equilibrium is a proven bound."""
         return False
 
@@ -145,14 +156,14 @@ class Observable:
         moved = type(state)(state.system, state.time, state.system.moved(state.x, share * move))
         return abs(self.of(moved).value - self.of(state).value) / share
 
-    def of_held_lines(self, state):
+    def of_held_lines(self, state: State) -> float:
         """Effect on the value of a rounding, by `ROUNDING`, of the strains of lines whose ends are both fixed.
 
         No displacement of a node balances these strains.
         """
         system = state.system.at(state.time)
         net = system.net
-        fixed = system.supported[: net.nodes].all(axis=1)[net.cells].all(axis=1)
+        fixed = np.all(system.supported[: net.nodes], axis=1)[net.cells].all(axis=1)
         if not fixed.any():
             return 0.0
         changes, value = [], self.of(state).value
@@ -163,13 +174,13 @@ class Observable:
             changes.append(abs(self.of(moved).value - value))
         return max(changes) / SHARE * ROUNDING
 
-    def floats(self, state, equilibrium):
+    def floats(self, state: State, equilibrium: Equilibrium) -> bool:
         """Tell if moves without stiffness change the value, compared with other moves of their size."""
         if equilibrium.floating is None:
             return False
         some = np.random.default_rng(0).uniform(-1.0, 1.0, state.x.shape) * ~state.system.supported
         return max(self._change(state, move) for move in equilibrium.floating.moves) > 1e-4 * self._change(state, some)
 
-    def interval(self, state, equilibrium):
+    def interval(self, state: State, equilibrium: Equilibrium) -> tuple[float, float] | None:
         """Least and largest value in all equilibria if parts of the net float; None if that is not known."""
         return None

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from ...accepted import accepts, any_of, array
 from ...errors import InputError
 from ...messages import nearest, quote
 from ...registry import OBSERVABLES, known, load, possible
 from ...tables import Several, Table, choice, component, field, nodes, real, table, text
+
+if TYPE_CHECKING:
+    from ...statics.equilibrium import Equilibrium
+    from ...system.system import System
+    from ..probes import Probe
+    from ..solution import Result
+    from ..state import State
+    from .observable import Value
 
 SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
 """Sign of the peaks that a probe follows, by ``reduce``."""
@@ -106,7 +116,7 @@ class Observe(Table):
     reduce: str = choice("max", "min", "final", default="final")
     average: float | None = real(default=None, above=0.0, unit="s")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse a node, line, component or choice that the quantity does not have."""
         if "," in self.name or '"' in self.name:
             raise InputError(
@@ -127,16 +137,16 @@ class Observe(Table):
             )
 
     @property
-    def observable(self):
+    def observable(self) -> Any:
         """The `refweb.results.observables.observable.Observable` of the quantity."""
         return load(OBSERVABLES[self.quantity])(self)
 
     @property
-    def unit(self):
+    def unit(self) -> str:
         """Unit of the value."""
         return self.observable.unit
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse nodes, lines, bodies and effects that the system does not have."""
         if system.net.quasi_static and self.observable.dynamic:
             raise InputError(f'quantity = "{self.quantity}" has no meaning in statics')
@@ -144,11 +154,11 @@ class Observe(Table):
             raise InputError(f"average = {self.average:g} has no meaning in statics: leave it out")
         self.observable.on(system)
 
-    def value(self, state):
+    def value(self, state: State) -> Value:
         """The observable at one instant, a `refweb.results.observables.observable.Value`."""
         return self.observable.of(state)
 
-    def error(self, state, equilibrium):
+    def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None if it is not known.
 
         It is a proven bound from duality if there is one for the quantity, else an estimate from the deviations of the
@@ -156,15 +166,15 @@ class Observe(Table):
         """
         return self.observable.error(state, equilibrium)
 
-    def interval(self, state, equilibrium):
+    def interval(self, state: State, equilibrium: Equilibrium) -> tuple[float, float] | None:
         """Least and largest value in all equilibria, if the value is open and they are known."""
         return self.observable.interval(state, equilibrium)
 
-    def bounded(self, result, system):
+    def bounded(self, result: Result, system: System) -> Result:
         """A `refweb.results.solution.Result` whose ± is cut to possible values."""
         return result.bounded(*self.observable.bounds(system))
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """The `refweb.results.probes.Probe` of the observable, with the sign of its peaks and its window."""
         return self.observable.probe(system)._replace(sign=SIGN[self.reduce], average=self.average or 0.0)
 

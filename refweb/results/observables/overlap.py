@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...effects.base import CONTACT, pairs_of
 from ...errors import InputError
 from .observable import NOT_NEGATIVE, Observable, Value
+
+if TYPE_CHECKING:
+    from ...system.system import System
+    from ..probes import Probe
+    from ..state import State
 
 
 class Overlap(Observable):
@@ -17,9 +24,11 @@ class Overlap(Observable):
     With ``reduce = "max"`` it is the deepest overlap at and between all steps.
     """
 
-    unit, keys, at = "m", ("body",), "line"
+    unit = "m"
+    keys: tuple[str, ...] = ("body",)
+    at = "line"
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse a scene without contact, an unknown body, and a missing name if there are several bodies."""
         if not system.contact:
             raise InputError('quantity = "overlap" needs [contact] in the scene')
@@ -29,21 +38,21 @@ class Overlap(Observable):
         """The bodies that are named, or the only one."""
         return self.bodies(net) if isinstance(self.observe.body, tuple) else [self.body(net)]
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """The deepest over all lines."""
         deep = np.max([state.overlap(body) for body in self._touched(state.system.net)], axis=0)
         at = int(np.argmax(deep))
         return Value(float(deep[at]), self.position(state.system, at if deep[at] > 0.0 else -1))
 
-    def bounds(self, system):
+    def bounds(self, system: System | None) -> tuple[float, float]:
         """Bounds of the value: a depth is not negative."""
         return NOT_NEGATIVE
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of the contact of its body."""
         return _deepest_of([system.contact_forces.row(body) for body in self._touched(system.net)])
 
-    def position(self, system, at):
+    def position(self, system: System, at: int) -> int | None:
         """The line of an element, None without contact."""
         return int(system.net.line[at]) if at >= 0 else None
 

@@ -6,11 +6,20 @@ its contacts, see `refweb.system.contact_forces`: it is zero without contact, wh
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...effects.base import CONTACT
 from .nodal import Nodal
 from .observable import SELECTIONS, Value
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...system.system import System
+    from ..probes import Probe
+    from ..state import State
 
 
 class Reaction(Nodal):
@@ -18,23 +27,23 @@ class Reaction(Nodal):
 
     unit = "N"
 
-    def vectors(self, state):
+    def vectors(self, state: State) -> NDArray[np.float64]:
         """Reactions [N], shape (rows, 3)."""
         return state.reaction
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """The sum over its rows, or the value that counts of them."""
         rows = self.rows(state.system)
         if self.observe.select is not None or len(rows) == 1:
             return super().of(state)
         return Value(float(self.sizes(state.reaction[rows].sum(axis=0, keepdims=True))[0]), None)
 
-    def position(self, system, at):
+    def position(self, system: System, at: int) -> int | None:
         """The node or body, where it is one; a sum stands nowhere."""
         stands = self.observe.select is not None or len(self.rows(system)) == 1
         return super().position(system, at) if stands else None
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of the support forces on nodes, or of all contact forces on bodies."""
         from ..probes import REACTION, Probe, contact_force, reaction, selected_contact, selected_row
 

@@ -6,6 +6,7 @@ All components are along the axes x, y and z of the scene.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,11 @@ from ...net.rotation import matrix_at, quaternion_of, times, times_transposed
 from ..probes import MAGNITUDE, PROBE, Probe
 from .observable import Observable, Value
 
+if TYPE_CHECKING:
+    from ...system.system import System
+    from ..state import State
+    from .observe import Observe
+
 W = 3
 """Number of the component "w"."""
 
@@ -22,16 +28,16 @@ W = 3
 class Turning(Observable):
     """Rotation of one body."""
 
-    keys = ("body", "component")
+    keys: tuple[str, ...] = ("body", "component")
     dynamic = True
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse an unknown body, and a missing name if there is no body or there are several."""
         if not system.net.bodies:
             raise InputError(f'quantity = "{self.observe.quantity}" needs a [[body]] in the scene')
         self.body(system.net)
 
-    def rows(self, system):
+    def rows(self, system: System) -> list[int]:
         """Component and rows of rotation of the body, −1 for rows that do not exist."""
         component, body = self.observe.component, self.body(system.net)
         rows = (MAGNITUDE if component is None else component, body.spin, body.turn)
@@ -51,15 +57,15 @@ class Orientation(Turning):
 
     dynamic = False
 
-    def __init__(self, observe):
+    def __init__(self, observe: Observe) -> None:
         super().__init__(observe)
         self.unit = "rad" if observe.component is None else "1"
 
-    def bounds(self, system):
+    def bounds(self, system: System | None) -> tuple[float, float]:
         """Bounds of the value: those of an angle, or of a component of a unit quaternion."""
         return (0.0, math.pi) if self.observe.component is None else (-1.0, 1.0)
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse a sphere, which has no orientation."""
         super().on(system)
         body = self.body(system.net)
@@ -69,13 +75,13 @@ class Orientation(Turning):
                 "the same however it turns"
             )
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Value by the rotation of the body."""
         value = self.probe(state.system)
         rows = np.array(value.rows, dtype=np.int64)
         return Value(float(orientation_of(state.x, rows, np.ascontiguousarray(value.data, dtype=float))), None)
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x alone."""
         body, component = self.body(system.net), self.observe.component
         component = -1 if component is None else component
@@ -91,11 +97,11 @@ class AngularVelocity(Turning):
 
     unit = "rad/s"
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Value by momentum and inertia."""
         return self._sized(self.body(state.system.net).turning(state.x, state.v))
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x and v."""
         body = self.body(system.net)
         whirl = np.eye(3) if body.turn is None else body.axes.T @ body.mobility @ body.axes
@@ -107,12 +113,12 @@ class AngularMomentum(Turning):
 
     unit = "N m s"
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Value by the velocity of its row of rotation."""
         body = self.body(state.system.net)
         return self._sized(np.zeros(3) if body.spin is None else body.moment * state.v[body.spin])
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of v alone."""
         body = self.body(system.net)
         return Probe(angular_momentum, self.rows(system), np.array([[body.moment if body.spin is not None else 0.0]]))

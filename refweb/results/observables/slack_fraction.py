@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from .observable import Observable, Value
+
+if TYPE_CHECKING:
+    from ...statics.equilibrium import Equilibrium
+    from ...system.system import System
+    from ..probes import Probe
+    from ..state import State
 
 
 class SlackFraction(Observable):
     """Slack elements over all elements."""
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Share of the elements that are slack at all quadrature points."""
         return Value(float(state.element_slack.mean()), None)
 
-    def bounds(self, system):
+    def bounds(self, system: System | None) -> tuple[float, float]:
         """Bounds of the value: those of a share."""
         return 0.0, 1.0
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe that counts strains up to the slackness."""
         from ..probes import Probe, slack_fraction
 
         return Probe(slack_fraction, [], system.net.slackness[:, None])
 
-    def error(self, state, equilibrium):
+    def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """None, since the value jumps."""
         return None

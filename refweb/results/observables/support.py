@@ -11,6 +11,8 @@ the moment across it, J α n + ω² n × J n − M with the tensor of inertia J 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...errors import InputError
@@ -20,13 +22,17 @@ from ..probes import PROBE, Probe, component_of
 from .observable import ANY, Value
 from .rotation import Turning
 
+if TYPE_CHECKING:
+    from ...system.system import System
+    from ..state import State
+
 
 class _Held(Turning):
     """Quantity of a body that a motion or an axle holds."""
 
     dynamic = False
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse a body that nothing holds in a way that is known here."""
         super().on(system)
         body = self.body(system.net)
@@ -37,7 +43,7 @@ class _Held(Turning):
                 'fixed = true; the force of contact on it is quantity = "reaction"'
             )
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Value by its probe, which looks at no lines."""
         probe, lines, where = self.probe(state.system), np.zeros((0, 0)), np.full(2, -1)
         rows, data = np.array(probe.rows, dtype=np.int64), np.ascontiguousarray(probe.data, dtype=float)
@@ -50,11 +56,12 @@ class SupportForce(_Held):
 
     unit = "N"
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x, v and f."""
         body, (component, *_) = self.body(system.net), self.rows(system)
         off = body.pivot is not None and not body.moved
-        data = [body.mass if off else 0.0, body.moment, *body.arm, *(body.axle.direction if off else np.zeros(3))]
+        direction = body.axle.direction if off and body.axle else np.zeros(3)
+        data = [body.mass if off else 0.0, body.moment, *body.arm, *direction]
         turning = (body.spin, body.turn) if off else (-1, -1)
         return Probe(support_force, [component, body.base, *turning], np.array([data]))
 
@@ -64,7 +71,7 @@ class SupportMoment(_Held):
 
     unit = "N m"
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse a body that is moved, and not turned."""
         super().on(system)
         body = self.body(system.net)
@@ -74,10 +81,10 @@ class SupportMoment(_Held):
                 "moment it is: give rotation = [[0, 0, 0, 0]] to hold it"
             )
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """Value by its probe; in statics of the moments that an axle bears as well."""
         body, system = self.body(state.system.net), state.system
-        if body.moved or not system.angles:
+        if body.moved or body.axle is None or not system.angles:
             return super().of(state)
         force = sum((system.force_of(term, state.time, state.x) for term in system.terms), np.zeros((system.rows, 3)))
         add_forces_to_bodies(state.x, force, system.carriers.turns)
@@ -85,10 +92,10 @@ class SupportMoment(_Held):
         across = (axle @ moment) * axle - moment
         return Value(float(component_of.py_func(self.rows(system)[0], *across)), None)
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x, v and f."""
         body, (component, spin, turn) = self.body(system.net), self.rows(system)
-        if body.moved:
+        if body.moved or body.axle is None:
             return Probe(support_moment, [component, spin], np.zeros((0, 0)))
         about_base = body.axes.T @ body.inertia @ body.axes
         about_base += body.mass * (body.arm @ body.arm * np.eye(3) - np.outer(body.arm, body.arm))
@@ -98,13 +105,14 @@ class SupportMoment(_Held):
 class AxleAngle(_Held):
     """Angle that a body has turned by about its axle since the start, of any number of turns."""
 
-    unit, keys = "rad", ("body",)
+    unit = "rad"
+    keys: tuple[str, ...] = ("body",)
 
-    def bounds(self, system):
+    def bounds(self, system: System | None) -> tuple[float, float]:
         """Any angle."""
         return ANY
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse a body without an axle."""
         super().on(system)
         body = self.body(system.net)
@@ -114,7 +122,7 @@ class AxleAngle(_Held):
                 "{ direction = [...] } and, where it is moved, rotation = ..."
             )
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of x alone."""
         return Probe(axle_angle, self.rows(system)[2:], np.zeros((0, 0)))
 
