@@ -150,7 +150,7 @@ def reset_checks(ccd: Ccd) -> None:
             due[c].path = 0.0
 
 
-@kernel(leaf=True)
+@kernel(leaf=True, forceinline=True)
 def approach(kick, drift, free, model, running):
     """(Largest component of a velocity [m/s], largest approach of two rows [m]) in a drift behind a kick.
 
