@@ -101,7 +101,7 @@ class NaturalLengths(Record):
             runs=np.ascontiguousarray(np.column_stack([elements[begins], elements[ends] + 1])),
             cells=Arrays(INDICES, [column(part) for part, _ in factors]),
             tables=Arrays(VECTOR, [np.array(flattened(table)) for _, table in factors]),
-            growth=net.line_data.column(GROWTH) if factors and GROWTH in net.line_data.dtype.names else -1,
+            growth=net.line_data.column(GROWTH) if factors and GROWTH in (net.line_data.dtype.names or ()) else -1,
             by_length=Functions(ENERGY, [work_of_lengths(net)] if factors else []),
             corners=np.array([*corners, *([np.inf] if factors else []), -np.inf]),
             masses=FollowedMass.none(),

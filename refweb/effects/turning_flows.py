@@ -7,6 +7,7 @@ force m (φ − 1) G r does work, since its potential changes with time; that of
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -118,7 +119,7 @@ def force_terms(net, frame, pull, name):
         data["largest"] = flow.mass[moves] * max(abs(change) for _, change in added)
         data["point"] = net.points[rows]
         numbers = np.hstack([matrix_of(data), np.tile(flattened(added), (len(rows), 1))])
-        shared = dict(name=name, cells=column(rows), data=numbers, frame=frame)
+        shared: dict[str, Any] = dict(name=name, cells=column(rows), data=numbers, frame=frame)
         times = tuple(t for t, _ in added)
         terms += [
             ForceTerm(

@@ -153,19 +153,19 @@ class Viscous(Table):
     lines: Several = nodes(default="all", what="line")
     statics: str = choice("long", "short", default="long")
 
-    def check(self):
+    def check(self) -> None:
         """Refuse arms that are none."""
         for i, arm in enumerate(self.arms):
             for j, (name, unit) in enumerate((("modulus", "Pa"), ("time", "s"))):
                 if not arm[j] > 0.0:
                     raise InputError(f"arms[{i}][{j}] = {arm[j]:g} must be > 0: it is a {name} [{unit}]")
 
-    def at_once(self, web):
+    def at_once(self, web: Web) -> NDArray[np.float64]:
         """Modulus that the arms add where they act as springs [Pa], shape (lines,); 0 where they have relaxed."""
         total = sum(modulus for modulus, _ in self.arms) if self.statics == "short" else 0.0
-        return total * np.isin(np.arange(len(web.lines)), self.chosen(web))
+        return np.where(np.isin(np.arange(len(web.lines)), self.chosen(web)), total, 0.0)
 
-    def chosen(self, web):
+    def chosen(self, web: Web) -> NDArray[np.int64]:
         """Numbers of the lines that have arms, shape (k,)."""
         return web.find_lines(self.lines)
 

@@ -104,7 +104,7 @@ class State:
         return self.system.net.slackness if self.plastic_strain is None else self.plastic_strain
 
     @cached_property
-    def plastic_strain(self):
+    def plastic_strain(self) -> NDArray[np.float64] | None:
         """Plastic strain of each element, the largest over its quadrature points [1], None where no line yields."""
         if not self.system.net.law_is("plastic").any():
             return None

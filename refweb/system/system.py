@@ -112,7 +112,7 @@ class System:
         powers = [term.balance.power for term in self.terms if term.over_lines and term.balance.power is not None]
         if len(set(powers)) < len(powers):
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
-        self.internal = next((term.internal for term in self.terms if term.internal), None)
+        self.internal: Any = next((term.internal for term in self.terms if term.internal), None)
         self.supported: NDArray[np.bool_] = np.vstack(
             [supported, np.zeros((self.rows - len(supported), 3), dtype=bool)]
         )
@@ -164,16 +164,16 @@ class System:
         remarks = self.library.remarks if "library" in self.__dict__ else []
         return [Finding("slow-library", text, "solve") for text in remarks]
 
-    def resistance(self, t):
+    def resistance(self, t: float) -> NDArray[np.float64]:
         """c of each internal variable at time t, in the order of their components, see `InternalVariables`."""
         return self.internal.resistance * self.natural_length(t)[self.internal.elements]
 
-    def settled(self, x):
+    def settled(self, x: Any) -> Any:
         """A state, x or None as it is given, with internal variables as they are after all time at rest, or new."""
         settling = [effect for effect in self.effects if hasattr(effect, "settled")]
         return settling[0].settled(self.at(0.0).net, x) if settling else x
 
-    def taken_on(self, t, x):
+    def taken_on(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """A state with plastic strains that it asks for at time t, x itself where no line can yield."""
         follower = self.internal and self.internal.follower
         return follower.taken_on(self.at(t).net, x) if follower else x
