@@ -178,8 +178,8 @@ class Simulation:
         from ..system.static_system import waiting
 
         equilibrium_ = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
-        self.begin = Start(self.system.settled(equilibrium_.x))
-        state = State(self.system, 0.0, self.begin.x)
+        x = self.system.settled(equilibrium_.x)
+        self.begin, state = Start(x), State(self.system, 0.0, x)
         for finding in remark_on_open(state, equilibrium_):
             text = f"of the equilibrium it starts from: {finding.text}"
             self.solution.findings.append(finding._replace(text=text))
