@@ -207,3 +207,75 @@ def test_refusals():
         refweb.Scene(web=web, cable=refweb.Cable(**LAW, density=1.0, viscous=viscous)).build()
     with pytest.raises(InputError, match=r'\[damping\] time = 1 \[s\] cannot stand beside law = "elastic-plastic"'):
         refweb.Scene(web=web, cable=refweb.Cable(**LAW, density=1.0), effects=[refweb.Damping(time=1.0)]).build()
+
+
+@pytest.mark.parametrize("method", ["central-difference", "cvode", "ida"])
+def test_a_line_breaks_at_a_plastic_strain(method):
+    """Stretched at a rate, at the time at which E (ε − p) = Y(p); it keeps what it lost, and ends what it stored."""
+    rate, limit = 0.02, 0.013
+    strain = limit + (STRESS + HARDENING * limit) / MODULUS
+    points = [[0, 0, 0], [1, 0, 0], [0, 0, 1]]  # the last one moves freely, and hangs on a line that holds
+    web = refweb.Inline(points=points, lines=[[0, 1], [0, 2]], supports=[0], groups={"brake": [0]})
+    motion = refweb.Motion(node=1, displacement=[(0.0, 0.0, 0.0, 0.0), (2.0, 2.0 * rate, 0.0, 0.0)])
+    observe = [refweb.Observe(name=name, quantity=f"{name}_energy") for name in ("plastic", "rupture")]
+    scene = refweb.Scene(
+        web=web, cable=refweb.Cable(**LAW, density=1.0), observe=observe, accuracy=refweb.Accuracy(error="none"),
+        effects=[motion, refweb.Rupture(strength=1e9, groups={"brake": {"plastic_strain": limit}})],
+        solve=refweb.Dynamic(duration=2.0, method=method), output=refweb.Output(interval=0.5, frames=1),
+    )  # fmt: skip
+    run = refweb.run(scene)
+    (broken,) = run.breaks
+    np.testing.assert_allclose(broken["time"], strain / rate, rtol=1e-6)
+    np.testing.assert_allclose(broken["energy"], 0.5 * AREA * MODULUS * (strain - limit) ** 2, rtol=1e-5)
+    lost = AREA * (STRESS * limit + 0.5 * HARDENING * limit**2)
+    np.testing.assert_allclose(run.history["plastic"][-1], lost, rtol=1e-5)
+    assert run.state.tension[0] == 0.0 and run.solver["energy_drift"] < 1e-4
+    static = scene.replace(
+        observe=[], solve=refweb.Static(load_steps=[0.5, 2.0]), output=refweb.Output(), accuracy=refweb.Accuracy()
+    )
+    with pytest.raises(refweb.SolverError, match=f"load step {strain / rate:.6g}, where its plastic strain reaches"):
+        refweb.run(static)
+
+
+def test_a_mass_breaks_a_brake():
+    """Without a strength: it goes on with what is left; lines beside it without that limit and of another law hold."""
+    mass, speed, limit = 2.0, 1.5, 0.05
+    groups = {"brake": [0], "rest": [2]}
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]] * 3, supports=[0], groups=groups)
+    cable = refweb.Cable(**LAW, density=0.0, groups={"rest": dict(law="tension-only", modulus=1e4)})
+    effects = [refweb.PointMass(node=1, mass=mass), refweb.Velocity(node=1, value=(speed, 0.0, 0.0))]
+    run = refweb.run(
+        refweb.Scene(
+            web=web,
+            cable=cable,
+            effects=[*effects, refweb.Rupture(groups={"brake": {"plastic_strain": limit}})],
+            solve=refweb.Dynamic(duration=0.1, safety=0.01),
+            output=refweb.Output(interval=0.01),
+        )  # fmt: skip
+    )
+    assert [b["line"] for b in run.breaks] == [0]
+
+    def energy(p):
+        return AREA * (STRESS * p + 0.5 * HARDENING * p**2 + 0.5 * (STRESS + HARDENING * p) ** 2 / MODULUS)
+
+    stretch = run.state.x[1, 0]
+    p = (MODULUS * stretch - STRESS) / (MODULUS + HARDENING)
+    kinetic = 0.5 * mass * speed**2 - energy(limit) - energy(p) - 0.5 * AREA * 1e4 * stretch**2
+    np.testing.assert_allclose(0.5 * mass * run.state.v[1, 0] ** 2, kinetic, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "keys, words",
+    [
+        (dict(plastic_strain=0.1), "plastic_strain = 0.1 needs lines that yield"),
+        (
+            dict(groups={"rest": {"plastic_strain": 0.1}}),
+            'groups.rest: plastic_strain = 0.1 has no meaning with law = "t',
+        ),
+    ],
+)
+def test_plastic_strains_of_lines_that_do_not_yield(keys, words):
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0], groups={"rest": [0]})
+    cable = refweb.Cable(law="tension-only", modulus=1.0, area=1.0, density=1.0)
+    with pytest.raises(InputError, match=words):
+        refweb.Scene(web=web, cable=cable, effects=[refweb.Rupture(**keys)]).build()
