@@ -4,6 +4,7 @@ import nets
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import PchipInterpolator
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
@@ -74,6 +75,8 @@ def test_ten_cycles_of_a_line_by_hand(law):
     )
     rest = refweb.run(static)
     np.testing.assert_allclose([step["results"]["lost"].value for step in rest.steps], exact[:, 2], rtol=1e-9)
+    assert [finding.code for finding in rest.findings] == ["not-proven"]
+    assert not any(result.proven for step in rest.steps for result in step["results"].values())
 
 
 @pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
@@ -101,6 +104,7 @@ def test_a_brake_stops_a_mass(method):
     assert run.drift < 1e-4
 
 
+@pytest.mark.ordinary("law?-CentralDifference", "law0-Ida", "law1-Cvode")
 @pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
 @pytest.mark.parametrize("law", [LAW, CURVE])
 def test_a_mass_that_bounces_on_a_line_that_yields(method, law):
@@ -161,6 +165,39 @@ def test_three_bars_of_which_one_yields():
         loads = np.array([20.0, 30.0, 50.0, 70.0, 50.0, 10.0])
         other = (loads - weak) / 2.0
         np.testing.assert_allclose(found, np.column_stack([other, weak, other]), rtol=1e-7, atol=1e-7)
+
+
+def test_lines_of_three_laws_side_by_side():
+    """One that yields, one with a measured curve and one of tension alone, by statics and motion: each as by itself."""
+    points = [(0.0, 0.0), (0.01, 2e4), (0.02, 6e4), (0.05, 2e5)]
+    web = refweb.Inline(
+        points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]] * 3, supports=[0], groups={"rope": [0], "wire": [2]}
+    )  # fmt: skip
+    groups = {"rope": dict(law="table", stress=points), "wire": dict(law="tension-only", modulus=1e5)}
+    cable = refweb.Cable(**LAW, density=1.0, groups=groups)
+    rope, strains = PchipInterpolator(*np.transpose(points)), np.array([0.005, 0.03, 0.012, 0.04])
+    yielding = by_hand(strains, yield_curves(cable, web.web())[1, :2].tolist())
+    slope, stress = rope.derivative()(0.0), rope(strains)
+    assert slope > 0.0  # so that the curve is that of scipy
+    expected = np.column_stack([AREA * stress, yielding[:, 0], AREA * 1e5 * strains])
+    times = np.arange(1.0, 5.0)
+    path = np.column_stack([times, strains, 0.0 * strains, 0.0 * strains])
+    motion = refweb.Motion(node=1, displacement=[(0.0, 0.0, 0.0, 0.0), *path.tolist()])
+    moved = refweb.Scene(
+        web=web, cable=cable, effects=[motion], accuracy=refweb.Accuracy(error="none"),
+        solve=refweb.Dynamic(duration=4.0), output=refweb.Output(interval=1.0, frames=1),
+    )  # fmt: skip
+    found = np.array([state.tension for _, state in refweb.run(moved).frames[1:]])
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    factor = [(0.0, 0.0), *zip(times, expected.sum(axis=1), strict=True)]
+    loaded = refweb.Scene(
+        web=web, cable=cable, effects=[refweb.Load(node=1, force=(1.0, 0.0, 0.0), factor=factor)],
+        observe=[refweb.Observe(name=f"T{line}", quantity="tension", line=line) for line in range(3)],
+        solve=refweb.Static(load_steps=times.tolist()),
+    )  # fmt: skip
+    steps = refweb.run(loaded).steps
+    found = [[step["results"][f"T{line}"].value for line in range(3)] for step in steps]
+    np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7)
 
 
 @pytest.mark.parametrize("method", ["central-difference", pytest.param("cvode", marks=pytest.mark.slow)])
