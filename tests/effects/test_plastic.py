@@ -229,6 +229,40 @@ def test_a_net_catches_a_mass(method, tmp_path):
     np.testing.assert_allclose(meshio.read(last).cell_data["plastic_strain"][0], whole.state.plastic_strain)
 
 
+@pytest.mark.parametrize("method", ["cvode", pytest.param("ida", marks=pytest.mark.slow)])
+def test_a_ring_net_absorbs_what_an_elastic_one_gives_back(method):
+    """A mass that is thrown into rings that are hexagons: methods agree within ±, and the energy is kinetic or lost."""
+    web = refweb.Window(mesh="hexagon", rows=3, columns=3, side=0.15)
+    material = dict(modulus=1e7, area=1e-5, density=500.0)
+    scene = refweb.Scene(
+        web=web,
+        cable=refweb.Cable(law="elastic-plastic", yield_stress=1e5, hardening=1e5, **material),
+        effects=[refweb.PointMass(node="centre", mass=0.5), refweb.Velocity(node="centre", value=(0.0, 0.0, 2.0))],
+        observe=[
+            refweb.Observe(name="lost", quantity="plastic_energy"),
+            refweb.Observe(name="stored", quantity="strain_energy"),
+        ],
+        solve=refweb.Dynamic(duration=0.1), output=refweb.Output(interval=0.01),
+    )  # fmt: skip
+    explicit = refweb.run(scene)
+    implicit = refweb.run(scene.replace(solve=refweb.Dynamic(duration=0.1, method=method, rtol=1e-4)))
+    for name, result in explicit.results.items():
+        same = implicit.results[name]
+        assert abs(result.value - same.value) <= result.error + same.error < 0.01 * result.value
+    assert max(explicit.solver["energy_drift"], implicit.solver["energy_drift"]) < 1e-4
+    elastic = scene.replace(
+        cable=refweb.Cable(law="tension-only", **material), observe=[], solve=refweb.Dynamic(duration=0.2)
+    )
+    back = refweb.run(elastic).history
+    brought, centre = back["kinetic_energy"][0], web.web().centre
+    assert back["strain_energy"].max() > 0.9 * brought and back["kinetic_energy"][-1] > 0.9 * brought
+    lost, stored = (explicit.results[name].value for name in ("lost", "stored"))
+    assert lost > 0.2 * brought and stored < 0.1 * lost
+    kinetic = explicit.history["kinetic_energy"][-1]
+    np.testing.assert_allclose(kinetic + lost + stored, brought, rtol=1e-4)
+    assert 0.0 < explicit.state.v[centre, 2] < 2.0
+
+
 def test_refusals():
     with pytest.raises(InputError, match=r'yield_stress has no meaning with law = "smooth"'):
         refweb.Cable(modulus=1.0, area=1.0, density=1.0, yield_stress=1.0)
