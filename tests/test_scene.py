@@ -644,8 +644,8 @@ def test_not_utf_8(tmp_path):
     [
         ("hexagon-lod", 'did you mean "hexagon-load"?'),
         ("nowhere/at/all.toml", "no such file"),
-        ("", "known: capture-satellite"),
-        ("n" * 1000, "known: capture-satellite"),
+        ("", "known: braked-net"),
+        ("n" * 1000, "known: braked-net"),
         ("a\nb\0", "no such file"),
     ],
 )

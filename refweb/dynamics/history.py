@@ -48,6 +48,8 @@ def _probes_of_warnings(system, followed, step_size):
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
         for name, (column, scale) in scales.items()
     }
+    if system.weakness is not None and system.weakness.strains is not None:
+        by_name["break"] = probes.share_of_limits(system)
     if system.orbit_radius is not None:
         places = system.net.points[: system.rows - system.net.spins].copy()
         by_name["distance"] = probes.Probe(probes.displacement, [probes.MAGNITUDE, 0, len(places)], places, 1.0)
@@ -149,7 +151,7 @@ class Watch:
         self.probes += self._warned.values()
         self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
         self.events = self._add_events(scene.event, scene.solve.duration)
-        used = self._of_warning("utilisation")
+        used = self._of_warning("utilisation" if self._of_warning("break") is None else "break")
         if system.weakness is not None and used is not None:
             self.events.append(Event(used, 1.0, True, stop=True))
         energies, of_momentum = dynamic_energies(system), vectors(system)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from ..net.net import Net
     from ..net.rigid_body import RigidBody
+    from ..system.forces import PerCell
     from ..system.system import System
 
 LINE_OUT = np.dtype([(name, float) for name in ("tension", "strain", "damped_tension", "power", "length_power")])
@@ -471,15 +472,23 @@ class BreakLimits:
         Tension at which each element breaks [N], infinite for elements that cannot break.
     times : tuple of (float, int)
         Times at which elements break at any tension [s], increasing, with the element.
+    strains : ndarray, shape (elements,), optional
+        Strain at which each element breaks [1], infinite for elements that break by tension alone; None if all do.
     """
 
     limits: NDArray[np.float64]
     times: tuple[tuple[float, int], ...] = ()
+    strains: NDArray[np.float64] | None = None
 
     @property
     def watched(self) -> bool:
         """True if any limit is finite."""
-        return bool(np.isfinite(self.limits).any())
+        return self.strains is not None or bool(np.isfinite(self.limits).any())
+
+    def shares(self, per_cell: PerCell) -> NDArray[np.float64]:
+        """Tension of each element over its limit, or strain over its limit where that is larger, shape (elements,)."""
+        shares = per_cell.tension / self.limits
+        return shares if self.strains is None else np.maximum(shares, per_cell.lines[:, STRAIN] / self.strains)
 
 
 def column(rows: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int32]:

@@ -192,8 +192,7 @@ def kernels(law, record, first, corners, gradients, weights):
 def of(net):
     """The kernels for the curve and the element of a net."""
     element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
-    corners = sum(name.startswith("plastic_force_") for name in net.line_data.dtype.names)
-    return kernels(net.law, net.law_record, net.line_data.column(ROW), corners, *element)
+    return kernels(net.law, net.law_record, net.line_data.column(ROW), _corners(net), *element)
 
 
 def plastic_strain(net, x):
@@ -201,6 +200,23 @@ def plastic_strain(net, x):
     strain_there = np.empty((len(net.cells), len(net.weights)))
     of(net)[6](0.0, x, net.cells, net.line_data.matrix, strain_there.ravel())
     return strain_there
+
+
+def strain_at(net, plastic):
+    """Strain at which each element has a plastic strain while it yields, p + Y(p)/E, shape (elements,)."""
+    numbers = net.line_data
+    curve = [f"plastic_{kind}_{i}" for i in range(_corners(net)) for kind in ("strain", "force")]
+    (p0, y0), *rest = np.array([numbers[name] for name in curve]).reshape(-1, 2, len(plastic))
+    tension = y0
+    for p1, y1 in rest:
+        tension = np.where(plastic >= p0, y0 + (plastic - p0) * (y1 - y0) / (p1 - p0), tension)
+        p0, y0 = p1, y1
+    return plastic + tension / numbers.ea
+
+
+def _corners(net):
+    """Number of points of the curves of yield stress."""
+    return sum(name.startswith("plastic_force_") for name in net.line_data.dtype.names)
 
 
 def length_force(net):

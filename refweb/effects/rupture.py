@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..messages import short
 from ..net.groups import givers
 from ..tables import Several, Table, by_group, real, rows, table
 from .base import BreakLimits
 from .broken import HELD, held_energy
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..net.net import Net
     from .base import ForceTerm
 
@@ -34,11 +37,12 @@ class GroupRupture(Table):
     """
 
     strength: float | None = real(default=None, above=0, unit="Pa")
+    plastic_strain: float | None = real(default=None, above=0, unit="1")
 
 
 @table
 class Rupture(Table):
-    """Lines that break when their stress reaches their strength, or at given times.
+    """Lines that break when their stress reaches their strength, by plastic strain, or at given times.
 
     A line breaks at the element whose stress is the first to reach the strength; its other elements and their mass
     stay. If a line has one element, all of it breaks, and half of its mass stays at each end. The inner nodes of a
@@ -55,18 +59,22 @@ class Rupture(Table):
     strength : float, optional
         Nominal stress T/A at which a line breaks [Pa], damping included; by default the strength of ``[cable]`` and its
         groups. Lines without a strength do not break by stress.
+    plastic_strain : float, optional
+        Plastic strain at which lines of the law "elastic-plastic" break [1], > 0, whatever their stress is: also those
+        without a strength. A group may have another. Lines of other laws do not break by it.
     at : sequence of (line, t), optional
         Lines that break at a time [s] for any stress, in the middle element or in the element after the middle. Lines
         that are already broken stay as they are. In statics t is the load step.
     groups : dict of str to GroupRupture
-        Strengths by group of lines; only one of the groups that share a line may give a strength.
+        Strengths and plastic strains by group of lines; only one of the groups that share a line may give each.
 
     Raises
     ------
     InputError
-        For a strength that is not > 0, times < 0, and a line that breaks at two times. From ``on``, for a line or a
-        group that the web does not have, if no line can break, for moving nodes without mass, and for a consistent
-        mass, which would couple the ends of a broken line.
+        For a strength or a plastic strain that is not > 0, times < 0, and a line that breaks at two times. From ``on``,
+        for a line or a group that the web does not have, if no line can break, for a plastic strain of lines that do
+        not yield, for moving nodes without mass, and for a consistent mass, which would couple the ends of a broken
+        line.
 
     Examples
     --------
@@ -76,6 +84,7 @@ class Rupture(Table):
     """
 
     strength: float | None = real(default=None, above=0, unit="Pa")
+    plastic_strain: float | None = real(default=None, above=0, unit="1")
     at: Several = rows(2, default=None)
     groups: dict[str, Any] = by_group(GroupRupture, "rupture", default_factory=dict)
 
@@ -97,14 +106,42 @@ class Rupture(Table):
 
     def extend(self, net: Net) -> Net:
         """The net with the strengths of its lines, and the rupture energy in one more column of line data."""
-        web = net.web
-        strengths = np.full(len(web.lines), np.nan if self.strength is None else self.strength)
-        given = givers(web.groups, self.groups, len(web.lines)).get("strength", np.full(len(strengths), -1))
-        for number, group in enumerate(self.groups.values()):
-            if group.strength is not None:
-                strengths[given == number] = group.strength
-        strength = np.where(np.isnan(strengths[net.line]), net.strength, strengths[net.line])
+        strengths = self._by_element(net, "strength")
+        strength = np.where(np.isnan(strengths), net.strength, strengths)
         return replace(net, strength=strength).with_column(HELD, 0.0)
+
+    def _by_element(self, net: Net, key: str) -> NDArray[np.float64]:
+        """Value of a key for each element, NaN where none is given, shape (elements,)."""
+        web, common = net.web, getattr(self, key)
+        values = np.full(len(web.lines), np.nan if common is None else common)
+        given = givers(web.groups, self.groups, len(web.lines)).get(key, np.full(len(values), -1))
+        for number, group in enumerate(self.groups.values()):
+            if getattr(group, key) is not None:
+                values[given == number] = getattr(group, key)
+        return values[net.line]
+
+    def _strains(self, net: Net) -> NDArray[np.float64] | None:
+        """Strain at which each element has the plastic strain at which it breaks, None where no such is given."""
+        if self.plastic_strain is None and all(group.plastic_strain is None for group in self.groups.values()):
+            return None
+        plastic, yields = self._by_element(net, "plastic_strain"), net.law_is("plastic")
+        for name, group in self.groups.items():
+            lines = np.isin(net.line, net.web.groups[name])
+            for line in net.line[lines & ~yields][:1] if group.plastic_strain is not None else ():
+                law = net.laws[net.law_index[net.line == line][0]].name
+                raise InputError(
+                    f"groups.{short(name)}: plastic_strain = {group.plastic_strain:g} has no meaning with law = "
+                    f'"{law}", which line {line} has: leave it out'
+                )
+        if not yields.any():
+            raise InputError(
+                f"plastic_strain = {self.plastic_strain:g} needs lines that yield: give [cable] or a group of it law = "
+                '"elastic-plastic", or leave it out'
+            )
+        from .plastic import strain_at
+
+        strains = strain_at(net, np.nan_to_num(plastic))
+        return np.where(yields & ~np.isnan(plastic), strains, np.inf)
 
     def on(self, net: Net) -> BreakLimits | list[ForceTerm | BreakLimits]:
         """The elements that may break and, except in statics, the term of the rupture energy."""
@@ -112,13 +149,14 @@ class Rupture(Table):
         for i, (line, _) in enumerate(self._due):
             if line >= count:
                 raise InputError(f"at[{i}][0] = {line:g} is not a line, must be 0 … {count - 1}")
-        if not self._due and not np.isfinite(limits).any():
+        strains = self._strains(net)
+        if not self._due and strains is None and not np.isfinite(limits).any():
             raise InputError(
                 "strength is missing: give it here, in [cable] or in their groups, or give at = [[line, t]]"
             )
         elements = net.middle_of([line for line, _ in self._due])
         middles = [(time, int(element)) for (_, time), element in zip(self._due, elements, strict=True)]
-        weakness = BreakLimits(limits, tuple(sorted(middles)))
+        weakness = BreakLimits(limits, tuple(sorted(middles)), strains)
         if net.quasi_static:
             return weakness
         return [held_energy(net), weakness]

@@ -217,14 +217,8 @@ class Cable(Table):
         that is sold without a section, whose area then counts for mass and stress alone.
     yield_stress : float, optional
         Of the law "elastic-plastic": stress at which a line yields [Pa], > 0. It keeps its elongation: unloaded, it is
-        slack below it. Statics takes plastic strains on from load step to load step, without a proven bound.
-    hardening : float or list of list of float, optional
-        Of the same law: the slope of the yield stress over plastic strain [Pa], ≥ 0 and 0 by default, which is a brake
-        that pays out at constant force; or points of that curve, [[plastic strain, stress in Pa], ...], from a plastic
-        strain of 0 on in place of ``yield_stress``. Its last slope goes on.
-    yield_stress : float, optional
-        Of the law "elastic-plastic": stress at which a line yields [Pa], > 0. It keeps its elongation: unloaded, it is
-        slack below it. Statics takes plastic strains on from load step to load step, without a proven bound.
+        slack below it. Statics takes plastic strains on at each load step, and what happens between two of them does
+        not show: ± are estimates for these load steps, no proven bounds.
     hardening : float or list of list of float, optional
         Of the same law: the slope of the yield stress over plastic strain [Pa], ≥ 0 and 0 by default, which is a brake
         that pays out at constant force; or points of that curve, [[plastic strain, stress in Pa], ...], from a plastic
@@ -352,9 +346,10 @@ class Cable(Table):
             steepest = np.array([curve.steepest for curve in values["curve"][lines]])
             by_tension = np.array([curve.unit == "N" for curve in values["curve"][lines]])
             values["modulus"][lines] = steepest / np.where(by_tension, values["area"][lines], 1.0)
-        alone, values["modulus"] = values["modulus"], values["modulus"] + self._at_once(web, values["law"])
+        alone = {key: values[key] for key in ("modulus", "curve") if key in values}
+        values |= law_keys.with_springs(values, self._at_once(web, values["law"]))
         values["natural_length"] = _natural_lengths(web, values)
-        values["modulus"] = values["modulus"] if quasi_static else alone
+        values |= {} if quasi_static else alone
         forming, area = _forming(values["law"]), values["area"]
         density, force = values.pop("force_density"), values.pop("pretension")
         with np.errstate(over="ignore"):
@@ -376,8 +371,8 @@ class Cable(Table):
             chosen = self.viscous.chosen(web)
             for line in chosen[_forming(law)[chosen]][:1]:
                 raise InputError(f'line {line} has law = "{law[line]}" of form finding: leave it out')
-            straight = np.array([law_of(name).cone or law_of(name).bar for name in law])
-            for line in chosen[~straight[chosen]][:1] if self.viscous.statics == "short" else ():
+            known = np.array([law_of(name).cone or law_of(name).bar or name == "table" for name in law])
+            for line in chosen[~known[chosen]][:1] if self.viscous.statics == "short" else ():
                 raise InputError(
                     f'statics = "short" must be "long" with law = "{law[line]}", which line {line} has: with arms that '
                     "act as springs it is another law"

@@ -124,6 +124,19 @@ def _curve(given, key):
         return curve_of(tuple(map(tuple, columns.tolist())), CURVES[key])
 
 
+def with_springs(values, modulus):
+    """Moduli [Pa] and curves of lines with springs of a ``modulus`` [Pa] beside them, by key of ``values``."""
+    both = {"modulus": values["modulus"] + modulus}
+    if "curve" in values and np.any(modulus):
+        from .laws.curve import beside
+
+        both["curve"] = curves = values["curve"].copy()
+        for line in np.flatnonzero((values["law"] == "table") & (modulus > 0.0)):
+            area = values["area"][line] if curves[line].unit == "N" else 1.0
+            curves[line] = beside(curves[line], float(modulus[line] * area))
+    return both
+
+
 def parameters_of(cable, laws, given):
     """Numbers of lines by the columns of laws of other packages, a dict of arrays of shape (lines,).
 

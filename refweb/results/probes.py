@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 
 from ..compiled.rows import record_at
-from ..effects.base import FELT
+from ..effects.base import FELT, STRAIN
 from ..kernels import INTEGERS, MATRIX, kernel
 
 PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, MATRIX, INTEGERS)
@@ -237,6 +237,26 @@ def line_of(t, x, v, f, lines, rows, data, where):
         if n == 1 or value > best:
             best, where[0] = value, rows[n]
     return best
+
+
+@kernel(PROBE)
+def breaking(t, x, v, f, lines, rows, data, where):
+    """Largest of data × column over elements, of (tension, strain); ``rows`` are these columns."""
+    best, where[0] = -math.inf, -1
+    for n in range(data.shape[0]):
+        share = max(lines[n, rows[0]] * data[n, 0], lines[n, rows[1]] * data[n, 1])
+        if share > best:
+            best, where[0] = share, n
+    return best
+
+
+def share_of_limits(system):
+    """Probe of the largest share of a limit at which an element of a system breaks, 1 where it breaks."""
+    weakness = system.weakness
+    if weakness.strains is None:
+        return Probe(line, [system.tension_column, 0, len(weakness.limits)], 1.0 / weakness.limits[:, None], 1.0)
+    limits = np.column_stack([weakness.limits, weakness.strains])
+    return Probe(breaking, [system.tension_column, STRAIN], 1.0 / limits, 1.0)
 
 
 DISPLACEMENT, VELOCITY, REACTION = range(3)

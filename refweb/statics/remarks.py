@@ -132,13 +132,20 @@ def remarks_on(state, stats, utilisation, equilibrium):
 
 
 def _not_proven(state):
-    """A finding where one line, or a free body, keeps the errors of dead loads from being proven."""
+    """A finding where lines that yield, one line, or a free body keeps the errors of dead loads from being proven."""
     net = state.system.net
     proven = net.law_is("convex") & ~(net.forming & (net.line_data.ea <= 0.0))
     if state.system.resting and proven.all():
         name = state.system.resting[0].name
         text = f'body "{name}" is free: ± are estimates, as the proven bound asks for a web without free bodies'
         yield Finding("not-proven", text, "body")
+    if net.law_is("plastic").any():
+        yield Finding(
+            "not-proven",
+            'lines can yield (law = "elastic-plastic"): ± are estimates for these load steps, no proven bounds, and a '
+            "line that yields and turns back between two of them is not seen; compare with more load_steps",
+        )
+        return
     if not state.system.dead or proven.all() or not (proven.any() or net.forming.any()):
         return
     first = proven.argmin()

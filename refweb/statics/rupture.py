@@ -6,8 +6,6 @@ break. It searches equilibria between the last load step without a break and the
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..errors import SolverError
 
 FINE = 1e-6
@@ -17,8 +15,8 @@ TRIALS = 30
 
 
 def shares(system, equilibrium):
-    """Tension of each element over its limit in a `refweb.statics.equilibrium.Equilibrium`."""
-    return system.forces(equilibrium.step, equilibrium.x).per_cell.tension / system.weakness.limits
+    """Shares of the limits of elements, see `BreakLimits.shares`, in a `refweb.statics.equilibrium.Equilibrium`."""
+    return system.weakness.shares(system.forces(equilibrium.step, equilibrium.x).per_cell)
 
 
 def refuse_break(system, solve, equilibrium, before):
@@ -42,17 +40,17 @@ def refuse_break(system, solve, equilibrium, before):
     """
     net, due = system.net, [(t, element) for t, element in system.weakness.times if t <= equilibrium.step]
     utilisation = shares(system, equilibrium)
-    step, element = equilibrium.step, int(utilisation.argmax())
-    if utilisation[element] >= 1.0:
-        step, element = _first(system, solve, equilibrium, before)
+    step, reached = equilibrium.step, equilibrium
+    if utilisation.max() >= 1.0:
+        step, reached = _first(system, solve, equilibrium, before)
     elif not due:
         return
+    element = int(shares(system, reached).argmax())
     if due and due[0][0] <= step:
         step, element = due[0]
         why = "as [rupture] at says"
     else:
-        strength = net.strength[element]
-        why = f"where its stress reaches its strength of {strength:.6g} Pa"
+        why = _reason(system, reached, element)
     raise SolverError(
         f"line {net.line[element]} would break at load step {step:.6g}, {why}: what comes then depends on the motion; "
         'use kind = "dynamic", or load steps below that'
@@ -60,7 +58,7 @@ def refuse_break(system, solve, equilibrium, before):
 
 
 def _first(system, solve, equilibrium, before):
-    """(Load step, element) of the first break, or those of ``equilibrium`` if none before it is found."""
+    """(Load step, equilibrium) of the first break, or those of ``equilibrium`` if none before it is found."""
     known = [equilibrium]
 
     def over(step):
@@ -72,7 +70,17 @@ def _first(system, solve, equilibrium, before):
             from scipy.optimize import brentq
 
             step = brentq(over, before, equilibrium.step, xtol=FINE * abs(equilibrium.step), maxiter=TRIALS)
-            return step, int(np.argmax(shares(system, known[0])))
+            return step, known[0]
     except (SolverError, RuntimeError):  # nothing to be found between: what is known is the load step itself
         known[0] = equilibrium
-    return known[0].step, int(np.argmax(shares(system, known[0])))
+    return known[0].step, known[0]
+
+
+def _reason(system, equilibrium, element):
+    """Words for the limit at which an element breaks in an equilibrium."""
+    net, weakness = system.net, system.weakness
+    per_cell = system.forces(equilibrium.step, equilibrium.x).per_cell
+    by_tension = per_cell.tension[element] / weakness.limits[element]
+    if by_tension < weakness.shares(per_cell)[element]:
+        return "where its plastic strain reaches that of [rupture] plastic_strain"
+    return f"where its stress reaches its strength of {net.strength[element]:.6g} Pa"

@@ -10,6 +10,8 @@ import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
+from refweb.effects.plastic import PlasticLines
+from refweb.effects.viscous import ViscousArms
 from refweb.errors import InputError
 
 AXIAL, DENSE, MASS, FAST, GRAVITY = 1e3, 0.5, 0.3, 3.0, 9.81
@@ -115,6 +117,71 @@ def test_a_mass_that_is_whirled_by_sundials(solver, drum):
     coarse, fine = np.array(errors)
     assert (coarse > 7.0 * fine).all()
     assert fine[0] < 5e-4 and fine[1] < 1e-2 and fine[2] < 5e-3 and fine[3] < 5e-4 and fine[4] < 5e-5
+
+
+STIFF, YIELD, HARD, ARM = 100.0, 5.0, 10.0, (100.0, 0.05)
+"""EA, A Y and A H of a line that yields [N]; EA [N] and τ [s] of an arm."""
+
+
+def hoisted(yields, end):
+    """(Length, velocity, energy lost at the end) of a weight on a line that is reeled in, along it, by scipy.
+
+    Of a line that yields it is that of the material outside, A L ∫ Y dp.
+    """
+    speed = -0.8
+
+    def rate(t, y):
+        length, v, largest, z, lost = y
+        natural = 1.0 + speed * t
+        e, growth = length / natural - 1.0, (v - length * speed / natural) / natural
+        if yields:
+            p = max((STIFF * max(largest, e) - YIELD) / (STIFF + HARD), 0.0)
+            pull, dissipated, creep = STIFF * max(e - p, 0.0), 0.0, 0.0
+        else:
+            pull, material = STIFF * max(e, 0.0) + ARM[0] * (e - z), e
+            if pull < 0.0:  # slack, and its material is free of tension
+                pull, material = 0.0, ARM[0] * z / (ARM[0] + STIFF * (z > 0.0))
+            creep = (material - z) / ARM[1]
+            dissipated = natural * ARM[0] * ARM[1] * creep**2
+        mass, brought = MASS + 0.5 * DENSE * natural, 0.5 * DENSE * speed
+        force = mass * GRAVITY - pull - brought * v
+        return [v, force / mass, max(growth, 0.0) if e >= largest else 0.0, creep, dissipated]
+
+    length, v, largest, _, lost = solve_ivp(
+        rate, (0.0, end), [1.0, 0.0, 0.0, 0.0, 0.0], "DOP853", rtol=1e-9, atol=1e-12, max_step=1e-3
+    ).y[:, -1]
+    if yields:
+        p = (STIFF * largest - YIELD) / (STIFF + HARD)
+        lost = (1.0 + speed * end) * (YIELD * p + 0.5 * HARD * p * p)
+    return length, v, lost
+
+
+@pytest.mark.ordinary("*-CentralDifference")
+@pytest.mark.parametrize("solver", [CentralDifference, Cvode, Ida])
+@pytest.mark.parametrize("kind", ["yields", "arms"])
+def test_a_line_that_yields_or_relaxes_while_it_is_reeled_in(kind, solver):
+    """Material leaves with its plastic strain, or the state of its arms; books are closed."""
+    keys, end = dict(modulus=1e4 * STIFF, area=1e-4, density=DENSE / 1e-4), 0.4
+    if kind == "yields":
+        cable = refweb.Cable(law="elastic-plastic", yield_stress=1e4 * YIELD, hardening=1e4 * HARD, **keys)
+    else:
+        cable = refweb.Cable(law="tension-only", viscous=refweb.Viscous(arms=[(1e4 * ARM[0], ARM[1])]), **keys)
+    lines = [PlasticLines(cable)] if kind == "yields" else [ViscousArms(cable.viscous)]
+    reel = refweb.Reel(lines="all", factor=[(0.0, 1.0), (1.0, 0.2)], mass="follows")
+    weight = refweb.Gravity(acceleration=(GRAVITY, 0.0, 0.0))
+    effects = [*lines, refweb.PointMass(node=1, mass=MASS), reel, weight]
+    system = nets.system(straight().web(), cable, effects, quasi_static=False)
+    method = solver(system, **({"safety": 0.02} if solver is CentralDifference else {"rtol": 1e-7}))
+    run = method.start(system.settled(None))
+    method.advance(run, [end])
+    if kind == "yields":
+        lost = sum(system.energy_of(f, end, run.x).sum() for f in system.terms if f.balance.column == "plastic_energy")
+    else:
+        lost = -run.work[:-1][system.working < 0].sum()
+    truth = hoisted(kind == "yields", end)
+    assert truth[2] > 0.1
+    np.testing.assert_allclose([1.0 + run.x[1, 0], run.v[1, 0], lost], truth, rtol=2e-4, atol=2e-4)
+    assert run.drift < 1e-4
 
 
 def test_a_tether_keeps_its_angular_momentum():

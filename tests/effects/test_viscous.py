@@ -284,6 +284,39 @@ def test_limits_of_statics(law):
         np.testing.assert_allclose(arms.displacement, plain.displacement, rtol=1e-12, atol=1e-15)
 
 
+SOFT = ((0.004, 0.0), (0.01, 2e3), (0.03, 2e4), (0.1, 4e4))
+"""Strain and stress [Pa] of a measured rope that is slack at first."""
+
+
+@pytest.mark.parametrize("key", ["stress", "tension"])
+def test_short_arms_beside_a_curve(key):
+    """They bear what lines of their moduli bear that stand beside those of the curve; a run starts from there."""
+    web = refweb.Window(mesh="square", rows=4, columns=4, side=0.25).web()
+    count, size = len(web.lines), AREA if key == "tension" else 1.0
+    twice = refweb.Inline(
+        points=web.points, lines=np.vstack([web.lines, web.lines]), supports=web.rim,
+        groups={"springs": [*range(count, 2 * count)]},
+    )  # fmt: skip
+    springs = dict(law="tension-only", modulus=(TOTAL - EA) / AREA)
+    base = {"law": "table", "area": AREA, "density": 200.0, key: [(e, size * value) for e, value in SOFT]}
+    arms = refweb.Cable(**base, viscous=viscous(statics="short"))
+    load = [refweb.Load(node=web.centre, force=(0.1, 0.0, 2.0))]
+    given = dict(effects=load, solve=refweb.Static(), output=refweb.Output(), accuracy=refweb.Accuracy())
+    short = refweb.run(scene(web=web, cable=arms, **given))
+    both = refweb.run(scene(web=twice, cable=refweb.Cable(**base, groups={"springs": springs}), **given))
+    np.testing.assert_allclose(short.displacement, both.displacement, rtol=1e-9, atol=1e-12)
+    tension = both.state.tension.reshape(2, count)
+    np.testing.assert_allclose(short.state.tension, tension.sum(axis=0), rtol=1e-9)
+    assert tension[0].min() == 0.0 < tension[1].min()  # arms alone bear some lines
+    assert short.results["max_tension"].error < 1e-6 * tension.max()  # proven
+    start = scene(web=web, cable=arms, effects=load, solve=refweb.Dynamic(duration=1e-3, start="equilibrium"))
+    first = refweb.run(start).frames[0][1]
+    np.testing.assert_allclose(first.tension, short.state.tension, rtol=1e-6, atol=1e-6)
+    tight = refweb.Cable(**base, pretension=3.0, viscous=viscous(statics="short"))
+    system = scene(cable=tight, effects=[]).build()
+    np.testing.assert_allclose(system.forces(0.0, system.settled(None)).per_cell.tension, 3.0, rtol=1e-12)
+
+
 @pytest.mark.parametrize("limit", ["long", "short"])
 def test_a_start_at_rest_stays_there(limit):
     """The equilibrium with arms at rest stays; with new arms it is that of all moduli, and tensions relax from it."""

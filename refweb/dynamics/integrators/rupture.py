@@ -1,9 +1,10 @@
 """Any integrator with lines that break: it stops where the first breaks, and goes on as a new one of the torn system.
 
-A line breaks where the largest tension over its limit passes 1, which is an event that ends the run. CVODE, IDA and
-other observed methods find its moment on what they know within their step. Explicit steps only see that it has passed:
-they are taken again from before, to where it does, by Brent's method on the length of the last step or two. So nothing
-has to be taken back from the books, extremes and means, and the error of the moment is that of the motion.
+A line breaks where the largest tension over its limit, or strain over its limit, passes 1: an event that ends the run.
+CVODE, IDA and other observed methods find its moment on what they know within their step. Explicit steps only see that
+it has passed: they are taken again from before, to where it does, by Brent's method on the length of the last step or
+two. So nothing has to be taken back from the books, extremes and means, and the error of the moment is that of the
+motion.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 
 from ...effects.base import STRAIN
 from ...errors import InputError
-from ...results.probes import Probe, line, line_of, slack_fraction
+from ...results.probes import breaking, line, line_of, share_of_limits, slack_fraction
 from ...system.broken_lines import Breaks, tear, torn
 from .events import Event, ended_by
 from .extremes import begin_anew
@@ -153,9 +154,8 @@ class Rupturing:
         return watched and course.events[-1]["time"] < np.inf and not ended_by(course.events[:-1])
 
     def _shares(self, course):
-        """Tension of each element over its limit."""
-        per_cell = self.inner.system.forces(course.time, course.x, course.v).per_cell
-        return per_cell.tension / self._weakness.limits
+        """Shares of the limits of elements, see `refweb.effects.base.BreakLimits.shares`."""
+        return self._weakness.shares(self.inner.system.forces(course.time, course.x, course.v).per_cell)
 
     def _kept(self, course):
         """A course as arrays of its own."""
@@ -208,7 +208,8 @@ class Rupturing:
 
     def _break(self, course, elements, width=0.0):
         """Break elements of a course, and go on with the integrator of what is left."""
-        system, t, x, v = self.inner.system, course.time, course.x, course.v
+        system, t, v = self.inner.system, course.time, course.v
+        course.x[:] = x = system.taken_on(t, course.x)
         left, energies = tear(system, t, x, v, elements)
         places = system.net.points[system.net.cells[elements]] + x[system.net.cells[elements]]
         count = len(elements)
@@ -229,9 +230,8 @@ def with_breaks(make, system, probes):
     """The `Rupturing` of a system with some probes and what breaks need; ``make`` is of a system, probes and events."""
     weakness, events = system.weakness, []
     if weakness.watched:
-        share = Probe(line, [system.tension_column, 0, len(weakness.limits)], 1.0 / weakness.limits[:, None], 1.0)
         events = [Event(len(probes), 1.0, True, stop=True)]
-        probes = [*probes, share]
+        probes = [*probes, share_of_limits(system)]
     return Rupturing(make, system, probes, (), events)
 
 
@@ -240,7 +240,7 @@ def unstrained(probe, broken):
     if not len(broken):
         return probe
     data = np.array(probe.data, dtype=float)
-    if probe.kernel in (line, line_of) and probe.rows[0] == STRAIN:
+    if probe.kernel is breaking or (probe.kernel in (line, line_of) and probe.rows[0] == STRAIN):
         data[broken] = 0.0
     elif probe.kernel is slack_fraction:
         data[broken] = np.inf

@@ -11,6 +11,7 @@ these arrays, `refweb.net.net.Net.kept`.
 
 from __future__ import annotations
 
+import copy
 import functools
 
 import numpy as np
@@ -80,6 +81,21 @@ class Curve:
 def curve_of(points, unit):
     """The `Curve` of some points."""
     return Curve(points, unit)
+
+
+@functools.lru_cache(maxsize=64)
+def beside(curve, slope):
+    """The `Curve` of a line and a spring beside it, which bears ``slope`` [its unit] times the strain."""
+    both, pieces = copy.copy(curve), curve.pieces.copy()
+    pieces[:, 1:] *= curve.steepest
+    if curve.first > 0.0:
+        pieces = np.vstack([np.zeros(WIDTH), pieces])
+    begin = pieces[:, 0]
+    pieces[:, [1, 2, 5]] += slope * np.column_stack([begin, np.ones(len(begin)), 0.5 * begin**2])
+    both.first, both.steepest = 0.0, curve.steepest + slope
+    pieces[:, 1:] /= both.steepest
+    both.pieces = pieces
+    return both
 
 
 def _check(points, unit):
