@@ -5,17 +5,19 @@ The state of a line is its plastic strain p ≥ 0. With the yield stress Y(p), w
 
     stress          σ₀ while σ₀ ≤ Y(p); else p grows to where E (ε − p) = Y(p)      (return mapping)
     tangent         E, 0 of a slack line, E Y'/(E + Y') of one that yields           (consistent)
-    energy          A L ½ E max(ε − p, 0)², kept, and A L ∫ Y dp from 0 to p, lost.
+    energy          A L ½ E max(ε − p, 0)², kept, and A ∫ L Y dp, lost.
 
-A line that does not push yields in one direction alone, so that p is the largest that the strain has asked for. The
-energy that it has lost, the area of its loops, is a function of p, and the sum of both energies is the incremental
-potential: convex in the strain, and its gradient is the tension for any p of before. So states of steps that do not
-turn back need no history within the step. Beside ``law = "elastic-plastic"``, whose term has the elastic tension of p =
-0, this term has the rest.
+A line that does not push yields in one direction alone, so that p is the largest that the strain has asked for. Within
+a step the energy that it loses, the area of its loops, is a function of p, and the sum of both energies is the
+incremental potential: convex in the strain, and its gradient is the tension for any p of before. So states of steps
+that do not turn back need no history within the step. L is the natural length at the time at which the line yields:
+material that a reel pays out has lost nothing. Beside ``law = "elastic-plastic"``, whose term has the elastic tension
+of p = 0, this term has the rest.
 
-p stands in rows behind all places, see `refweb.effects.base.InternalVariables`, three quadrature points to a row. They
-are no unknowns: explicit steps take them on at their ends, load steps of statics at equilibria, and CVODE and IDA
-between their steps, which end where a line that yields turns back.
+p stands in rows behind all places, see `refweb.effects.base.InternalVariables`, three quadrature points to a row, and
+the energy that is lost over A Y(0) [m] in as many rows behind those of the element. They are no unknowns: explicit
+steps take them on at their ends, load steps of statics at equilibria, and CVODE and IDA between their steps, which end
+where a line that yields turns back.
 """
 
 from __future__ import annotations
@@ -38,6 +40,8 @@ if TYPE_CHECKING:
 
 ROW = "plastic_row"
 """Column of line data with the first row of an element; p and A Y [N] of each point of the curve follow it."""
+ROUNDING = 1e-12
+"""Stress above the yield stress, over it, up to which a line does not yield: it is there by rounding."""
 
 
 @functools.cache
@@ -59,7 +63,7 @@ def kernels(law, record, first, corners, gradients, weights):
     weights : tuple of float
         Quadrature weights.
     """
-    points, nodes = len(gradients), len(gradients[0])
+    points, nodes, width = len(gradients), len(gradients[0]), _rows_of(len(gradients))
     flat, stress = tuple(value for row in gradients for value in row), law.stress
     by_law_alone = elasticity.kernels(law, record, gradients, weights)[-1]
 
@@ -72,8 +76,9 @@ def kernels(law, record, first, corners, gradients, weights):
             p1, y1 = data[c, first + 3 + 2 * i], data[c, first + 4 + 2 * i]
             slope, last = (y1 - y0) / (p1 - p0), i == corners - 2
             if (p < p1 or last) and ea > 0.0:
-                beyond = ea * (e - p) - (y0 + slope * (p - p0))
-                if beyond <= 0.0:
+                limit = y0 + slope * (p - p0)
+                beyond = ea * (e - p) - limit
+                if beyond <= ROUNDING * limit:
                     break
                 yields, ahead = slope, p + beyond / (ea + slope)
                 p = ahead if last else min(ahead, p1)
@@ -97,6 +102,11 @@ def kernels(law, record, first, corners, gradients, weights):
     def state_of(x, data, c, q):
         """p of before at quadrature point q of cell c."""
         return x[int(data[c, first]) + q // 3, q % 3]
+
+    @kernel(forceinline=True)
+    def lost_before(x, data, c, q):
+        """Energy lost before at quadrature point q of cell c, over A Y(0) [m]."""
+        return x[int(data[c, first]) + width + q // 3, q % 3]
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -128,8 +138,11 @@ def kernels(law, record, first, corners, gradients, weights):
             total = 0.0
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
-                total += weights[q] * lost(plastic(e, state_of(x, data, c, q), data, c)[0], data, c)
-            out[c] = total * line_at(data, c).natural_length
+                before = state_of(x, data, c, q)
+                more = lost(plastic(e, before, data, c)[0], data, c) - lost(before, data, c)
+                earlier = data[c, first + 2] * lost_before(x, data, c, q)
+                total += weights[q] * (earlier + line_at(data, c).natural_length * more)
+            out[c] = total
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
@@ -164,8 +177,11 @@ def kernels(law, record, first, corners, gradients, weights):
         for c in range(cells.shape[0]):
             lost_energy[c], row = 0.0, int(data[c, first])
             for q in range(points if h > 0.0 else 0):
-                e = strain(x, cells, data, c, q, nodes, flat)[4]
-                x[row + q // 3, q % 3] = plastic(e, state_of(x, data, c, q), data, c)[0]
+                e, before = strain(x, cells, data, c, q, nodes, flat)[4], state_of(x, data, c, q)
+                p = plastic(e, before, data, c)[0]
+                more = line_at(data, c).natural_length * (lost(p, data, c) - lost(before, data, c))
+                x[row + q // 3, q % 3] = p
+                x[row + width + q // 3, q % 3] += more / data[c, first + 2]
 
     @kernel(ENERGY)
     def length_force(t, x, cells, data, out):
@@ -174,19 +190,23 @@ def kernels(law, record, first, corners, gradients, weights):
             ea = line_at(data, c).ea
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
-                p = plastic(e, state_of(x, data, c, q), data, c)[0]
+                before = state_of(x, data, c, q)
+                p = plastic(e, before, data, c)[0]
                 stretch, elastic = max(e - p, 0.0), max(e, 0.0)
                 more = stretch * (0.5 * stretch - (1.0 + e)) - elastic * (0.5 * elastic - (1.0 + e))
-                out[c] += weights[q] * (lost(p, data, c) + ea * more)
+                out[c] += weights[q] * (lost(p, data, c) - lost(before, data, c) + ea * more)
 
     @kernel(ENERGY)
-    def strains(t, x, cells, data, out):
+    def states(t, x, cells, data, out):
         for c in range(cells.shape[0]):
             for q in range(points):
-                e = strain(x, cells, data, c, q, nodes, flat)[4]
-                out[c * points + q] = plastic(e, state_of(x, data, c, q), data, c)[0]
+                e, before = strain(x, cells, data, c, q, nodes, flat)[4], state_of(x, data, c, q)
+                p = plastic(e, before, data, c)[0]
+                more = line_at(data, c).natural_length * (lost(p, data, c) - lost(before, data, c))
+                out[2 * points * c + q] = p
+                out[2 * points * c + points + q] = lost_before(x, data, c, q) + more / data[c, first + 2]
 
-    return force, kept, stiffness, gone, relax, length_force, strains
+    return force, kept, stiffness, gone, relax, length_force, states
 
 
 def of(net):
@@ -197,9 +217,19 @@ def of(net):
 
 def plastic_strain(net, x):
     """Plastic strain at each quadrature point of each element at displacement x, shape (cells, points)."""
-    strain_there = np.empty((len(net.cells), len(net.weights)))
-    of(net)[6](0.0, x, net.cells, net.line_data.matrix, strain_there.ravel())
-    return strain_there
+    return states(net, x)[:, 0]
+
+
+def states(net, x):
+    """Plastic strain and energy lost over A Y(0) [m] of each quadrature point, shape (cells, 2, points)."""
+    numbers = np.empty((len(net.cells), 2, len(net.weights)))
+    of(net)[6](0.0, x, net.cells, net.line_data.matrix, numbers.ravel())
+    return numbers
+
+
+def _rows_of(points):
+    """Number of rows for a number at each of so many quadrature points."""
+    return -(-points // 3)
 
 
 def strain_at(net, plastic):
@@ -239,7 +269,7 @@ class PlasticLines:
     def add_internal(self, net):
         """The net with rows for plastic strains behind all others, and numbers of the curves by element."""
         curves, numbers = yield_curves(self.cable, net.web), net.line_data
-        width, count = -(-len(net.weights) // 3), len(net.cells)
+        width, count = 2 * _rows_of(len(net.weights)), len(net.cells)
         numbers = numbers.with_column(ROW, float(len(net.points)) + width * np.arange(count))
         for i in range(curves.shape[1]):
             numbers = numbers.with_column(f"plastic_strain_{i}", curves[net.line, i, 0])
@@ -290,9 +320,9 @@ class PlasticLines:
     def taken_on(self, net, x):
         """Displacement of all rows with the plastic strains that it asks for, from those of before in x."""
         x = x.copy()
-        states = np.zeros((len(net.cells), 3 * (net.internal // len(net.cells))))
-        states[:, : len(net.weights)] = plastic_strain(net, x)
-        x[len(x) - net.internal :] = states.reshape(-1, 3)
+        rows = np.zeros((len(net.cells), 2, 3 * _rows_of(len(net.weights))))
+        rows[:, :, : len(net.weights)] = states(net, x)
+        x[len(x) - net.internal :] = rows.reshape(-1, 3)
         return x
 
     def settled(self, net, x):

@@ -86,7 +86,7 @@ class Reel(Table):
         mass, cells = np.zeros(net.nodes), net.cells[elements]
         for a, share in enumerate(lumped_shares(line_element(net.order))):
             np.add.at(mass, cells[:, a], share * net.element_mass[elements])
-        drums = None if self.drum is None else net.web.find(self.drum)
+        drums = None if self.drum is None else net.web.find(self.drum, "drum")
         touched = np.unique(cells)
         flow = MassFlow(lines, elements, touched, mass[touched], self.factor, drums)
         return replace(net, flows=(*net.flows, flow))

@@ -15,7 +15,7 @@ from . import law_keys
 from .groups import givers
 from .law_keys import numbers_by_name, points
 from .materials import FILLED, MATERIALS
-from .plastic_keys import check_yield, hardening_key
+from .plastic_keys import LAW, check_yield, hardening_key, yield_curves
 from .tension_laws import law_of, names_in, strains_of
 
 if TYPE_CHECKING:
@@ -348,6 +348,8 @@ class Cable(Table):
             values["modulus"][lines] = steepest / np.where(by_tension, values["area"][lines], 1.0)
         alone = {key: values[key] for key in ("modulus", "curve") if key in values}
         values |= law_keys.with_springs(values, self._at_once(web, values["law"]))
+        if (values["law"] == LAW).any():
+            values["yield_curve"] = np.fromiter(yield_curves(self, web), dtype=object)
         values["natural_length"] = _natural_lengths(web, values)
         values |= {} if quasi_static else alone
         forming, area = _forming(values["law"]), values["area"]

@@ -55,10 +55,41 @@ def check_yield(cable):
         stress = inherits.yield_stress if table.yield_stress is None else table.yield_stress
         if isinstance(table.hardening, tuple):
             _check_points(table.hardening, where)
-        if isinstance(hardening, tuple) and stress is not None:
-            raise InputError(f"{where}yield_stress = {stress:g} and the points of hardening both say it: leave one out")
+        if isinstance(hardening, tuple) and (stress if table is cable else table.yield_stress) is not None:
+            remedy = "leave one out" if table.hardening is not None else "give hardening of this group as well"
+            raise InputError(f"{where}yield_stress = {stress:g} and the points of hardening both say it: {remedy}")
         if not isinstance(hardening, tuple) and stress is None:
             raise InputError(f'{where}law = "{LAW}" needs yield_stress = ... [Pa], or hardening = [[0, stress], ...]')
+
+
+def plastic_strain_of(stress, curves):
+    """Plastic strain at which each line yields at a stress [Pa], 0 below its yield stress; shape (lines,).
+
+    Parameters
+    ----------
+    stress : ndarray, shape (lines,)
+        The stresses [Pa].
+    curves : ndarray of ndarray, shape (lines,)
+        That of `yield_curves` of each line.
+
+    Raises
+    ------
+    InputError
+        For a stress that no hardening reaches.
+    """
+    strain = np.zeros(len(stress))
+    for line in np.flatnonzero([value > curve[0, 1] for value, curve in zip(stress, curves, strict=True)]):
+        (p0, y0), (p1, y1) = curves[line][-2:]
+        if stress[line] <= y1:
+            strain[line] = np.interp(stress[line], curves[line][:, 1], curves[line][:, 0])
+        elif y1 > y0:
+            strain[line] = p0 + (stress[line] - y0) * (p1 - p0) / (y1 - y0)
+        else:
+            raise InputError(
+                f"line {line} cannot have a stress of {stress[line]:g} Pa: it yields at {y1:g} Pa at most, raise "
+                "yield_stress or hardening, or lower the tension"
+            )
+    return strain
 
 
 def yield_curves(cable, web):

@@ -15,6 +15,7 @@ from ..messages import nearest
 from ..registry import LAWS, known, load, possible
 from .laws.law import evaluate
 from .laws.line_data import LineData
+from .plastic_keys import plastic_strain_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -154,6 +155,8 @@ def strains_of(values, tension):
         own_values = {key: value[lines] for key, value in values.items()}
         axial, numbers = own_values["modulus"] * own_values["area"], law_numbers(law, own_values)
         strain[lines] = law.strain_of(tension[lines], LineData.of_law(axial, **numbers))
+        if law.plastic:
+            strain += plastic_strain_of(np.where(lines, tension / values["area"], 0.0), values["yield_curve"])
         for line in np.flatnonzero(lines & ~np.isfinite(strain))[:1]:
             raise InputError(
                 f'line {line} cannot have a tension of {tension[line]:g} N: law = "{name}" has none so large'

@@ -19,7 +19,7 @@ MOST = 400
 PATIENCE = 3000
 """Largest number of factorizations of the smooth law after the interior-point method has failed."""
 FAR = 1e4
-"""Way of a node over the size of the web from which on lines of form finding do not hold it."""
+"""Way of a node over the size of the web from which on lines of form finding, or lines that yield, do not hold it."""
 SOFTEST = 1e-2
 """Load over EA of the first net in a series of nets of growing stiffness."""
 
@@ -52,7 +52,7 @@ def solve(system, load_steps, progress=None):
             state = _equilibrium(newton, t, _start(system, t, states), warm=bool(states))
         except NotFound as error:
             raise with_reason(system, t, error) from None
-        if system.net.forming.any():
+        if system.net.forming.any() or system.net.law_is("plastic").any():
             _refuse_far(system, t, state)
         if system.convex:
             from .duality_bound import duality_bound
@@ -80,10 +80,12 @@ def _refuse_far(system, t, state):
     size = float(np.ptp(net.points, axis=0).max() + net.natural_length.max())
     distance = np.linalg.norm(state.x[: net.nodes], axis=1)
     if distance.max() > FAR * size:
+        reason, remedy = "as forces that do not grow with the length of lines cannot carry the loads", "pretension"
+        if not net.forming.any():
+            reason, remedy = "above the limit load, which lines that yield cannot carry", "yield_stress or hardening"
         raise NotFound(
             f"no equilibrium at load step {t:g}: node {distance.argmax()} goes further than {FAR:g} times the size of "
-            "the web, as forces that do not grow with the length of lines cannot carry the loads: lower these, or "
-            "raise pretension",
+            f"the web, {reason}: lower the loads, or raise {remedy}",
             state.stats,
         )
 

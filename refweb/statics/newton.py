@@ -291,13 +291,20 @@ class Newton:
         next_iterate = self._evaluated(t, self.system.moved(iterate.x, self.system.rows_of(p)), stats)
         return next_iterate if residual(self.system, next_iterate.force, scale) < error else iterate
 
+    def _remedy(self):
+        """What to try where no equilibrium was found."""
+        net = self.system.net
+        if net.law_is("plastic").any():
+            return "above the limit load of lines that yield there is none: lower the loads, or raise yield_stress"
+        smoothing = " use a larger smoothing," if net.law_is("smoothed").any() else ""
+        return f'raise the load in smaller load_steps,{smoothing} or use method = "relaxation"'
+
     def _not_found(self, t, iterate, error, limit, stats):
         row = self.system.sizes(np.where(self.system.supported, 0, iterate.force)).argmax()
         at = self.system.row_name(row)
         return NotFound(
             f"no equilibrium found at step {t:g} in {limit} factorizations: residual {error:.2e} at {at}, limit "
-            f"{LIMIT:g}; raise the load in smaller load_steps, use a larger smoothing, or "
-            'method = "relaxation"',
+            f"{LIMIT:g}; {self._remedy()}",
             stats,
             iterate.x,
         )

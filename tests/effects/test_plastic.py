@@ -3,7 +3,7 @@
 import nets
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import PchipInterpolator
 
 import refweb
@@ -350,3 +350,70 @@ def test_plastic_strains_of_lines_that_do_not_yield(keys, words):
     cable = refweb.Cable(law="tension-only", modulus=1.0, area=1.0, density=1.0)
     with pytest.raises(InputError, match=words):
         refweb.Scene(web=web, cable=cable, effects=[refweb.Rupture(**keys)]).build()
+
+
+def between(effects, law=LAW, **solve):
+    """A line of 1 m between two supports, with effects; solved in statics or dynamics."""
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1])
+    return refweb.Scene(
+        web=web,
+        cable=refweb.Cable(**law, density=1.0),
+        effects=effects,
+        observe=[refweb.Observe(name="lost", quantity="plastic_energy")],
+        accuracy=refweb.Accuracy(error="none"),
+        **solve,
+    )
+
+
+def test_a_reel_brings_material_that_has_lost_nothing():
+    """Reeled in until it yields, and paid out slack: ∫ L A Y dp of the material that was there, and then no more."""
+    factors = [(0.0, 1.0), (1.0, 0.9), (3.0, 3.0)]
+    scene = between(
+        [refweb.Reel(lines=0, factor=factors)],
+        solve=refweb.Dynamic(duration=3.0, step_size=1e-3),
+        output=refweb.Output(interval=0.5),
+    )
+    lost = refweb.run(scene).history["lost"]
+
+    # E (1/L − 1 − p) = Y + H p, from the L at which it begins to yield
+    def lost_at(length):
+        plastic = (MODULUS * (1.0 / length - 1.0) - STRESS) / (MODULUS + HARDENING)
+        return length * AREA * (STRESS + HARDENING * plastic) * MODULUS / (MODULUS + HARDENING) / length**2
+
+    exact = quad(lost_at, 0.9, 1.0 / (1.0 + STRESS / MODULUS), epsabs=0.0, epsrel=1e-12)[0]
+    np.testing.assert_allclose(lost[2:], exact, rtol=1e-4)  # L of the end of a step, in which it changes by 1e-4
+
+
+def test_no_load_above_the_limit_is_carried():
+    """A line that yields without hardening carries its yield force, three bars the sum of theirs, and no more."""
+    law = LAW | {"hardening": 0.0}
+    scene = between([refweb.Load(node=1, force=(10.5, 0, 0))], law, solve=refweb.Static())
+    hung = scene.replace(web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]))
+    with pytest.raises(refweb.SolverError, match="limit load"):
+        refweb.run(hung)
+    points = [[0, 0, 0], [-1, 0, 0], [1, 0, 0], [0, 0, -1]]
+    bars = refweb.Inline(points=points, lines=[[0, 3], [1, 3], [2, 3]], supports=[0, 1, 2])
+    for load in (31.0, 100.0):
+        with pytest.raises(refweb.SolverError, match="limit load"):
+            refweb.run(hung.replace(web=bars, effects=[refweb.Load(node=3, force=(0, 0, -load))]))
+
+
+@pytest.mark.parametrize("hardening", [0.0, 1.0])
+def test_a_vibration_about_a_yielded_state_is_elastic(hardening):
+    """The tangent of a line that has just yielded is EA/L, with hardening and without."""
+    stretched = rope(law=LAW | {"hardening": hardening})
+    x = np.zeros((stretched.rows, 3))
+    x[1, 0] = 0.02
+    x = stretched.taken_on(0.0, x)
+    along = stretched.pattern.matrix(stretched.stiffness(0.0, x)).toarray()[0, 0]
+    np.testing.assert_allclose(along, MODULUS * AREA, rtol=1e-9)
+
+
+def test_pretension_is_the_tension_that_is_asked_for():
+    """Above the yield force too, where hardening bears it; refused where none does, and in forms that are found."""
+    tense = between([], LAW | {"pretension": 12.0}, solve=refweb.Static())
+    np.testing.assert_allclose(refweb.run(tense).tension, 12.0, rtol=1e-9)
+    with pytest.raises(
+        InputError, match="pretension: line 0 cannot have a stress of 120000 Pa: it yields at 100000 Pa"
+    ):
+        between([], LAW | {"pretension": 12.0, "hardening": 0.0}, solve=refweb.Static()).build()

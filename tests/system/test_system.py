@@ -107,7 +107,8 @@ def test_one_power_of_the_lines():
 def test_threads_share_a_system():
     """Two ask for the same at other states, and neither is answered before both have computed.
 
-    A line of 1 m along x and along y: its tension is EA ε, K = EA/L e⊗e + T/l (1 − e⊗e), C = τ EA/L e⊗e.
+    A line of 1 m along x and along y that is reeled in: its tension is T = EA (ε + τ ε̇) with ε̇ = −l L'/L² of a line whose
+    ends rest, K = ∂T/∂l e⊗e + T/l (1 − e⊗e), C = τ EA/L e⊗e.
     """
     stiffness, time = 1e3, 0.02
     scene = refweb.Scene(
@@ -144,9 +145,10 @@ def test_threads_share_a_system():
         answers = list(threads.map(found, *zip(*states, strict=True)))
     for (t, place), (length, force, tension, K, C) in zip(states, answers, strict=True):
         far, natural = np.linalg.norm(place), 1.0 - 0.5 * t
-        along, pull = np.outer(place, place) / far**2, stiffness * (far / natural - 1.0)
+        along, slope = np.outer(place, place) / far**2, stiffness * time * 0.5 / natural**2
+        pull = stiffness * (far / natural - 1.0) + slope * far
         rates = stiffness / natural * along
         np.testing.assert_allclose([length, tension[0]], [natural, pull], rtol=1e-12)
         np.testing.assert_allclose(force, -pull * np.array(place) / far, rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(K, rates + pull / far * (np.eye(3) - along), rtol=1e-12, atol=1e-9)
+        np.testing.assert_allclose(K, rates + slope * along + pull / far * (np.eye(3) - along), rtol=1e-12, atol=1e-9)
         np.testing.assert_allclose(C, time * rates, rtol=1e-12, atol=1e-9)
