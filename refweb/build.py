@@ -209,7 +209,7 @@ class _Placed:
 
 
 def _acting(effects):
-    """Effects with the names of their tables: bodies, which others act on, threads, whose mass bodies take, the rest."""
+    """Effects with the names of their tables: bodies, which others act on, threads, whose mass they take, the rest."""
     names = [name_of(EFFECTS, effect) for effect in effects]
     tables = list(dict.fromkeys(["body", "thread", *names]))
     acting, count = [], {}

@@ -95,7 +95,7 @@ OBSERVABLES = {
     "tension": "refweb.results.observables.line:Tension",
     "stress": "refweb.results.observables.line:Stress",
     "strain": "refweb.results.observables.line:Strain",
-    "length": "refweb.results.observables.thread:OfThread",
+    "length": "refweb.results.observables.thread:Length",
     "kinetic_energy": "refweb.results.observables.balances:KineticEnergy",
     "strain_energy": "refweb.results.observables.balances:StrainEnergy",
     "potential_energy": "refweb.results.observables.balances:PotentialEnergy",

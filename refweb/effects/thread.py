@@ -193,7 +193,7 @@ class Thread(Table):
     --------
         [[thread]]
         name = "rope"
-        nodes = [0, "pulley", 1]
+        nodes = [0, "centre", 1]
         modulus = 1e9
         area = 1e-5
         density = 970.0
@@ -267,18 +267,18 @@ class Thread(Table):
     def _rows(self, web):
         """Numbers of its nodes in order, the first again at the end of a closed thread, int32."""
         if isinstance(self.nodes, str):
-            found = web.find_around(self.nodes).tolist()
-            if len(found) < 2:
-                raise InputError(f"nodes = {quote(self.nodes)} is {len(found)} node, must be two or more")
+            rows = web.find_around(self.nodes).tolist()
+            if len(rows) < 2:
+                raise InputError(f"nodes = {quote(self.nodes)} is {len(rows)} node, must be two or more")
         else:
-            found = []
+            rows = []
             for i, node in enumerate(self.nodes):
-                numbers = web.find(node, f"nodes[{i}]")
+                numbers = web.find(node, f"nodes[{i}]").tolist()
                 if len(numbers) != 1:
                     raise InputError(f"nodes[{i}] = {quote(node)} is {len(numbers)} nodes, must be one")
-                found.append(int(numbers[0]))
-        self._refuse_repeated(found)
-        return np.array([*found, found[0]] if self.closed else found, dtype=np.int32)
+                rows += numbers
+        self._refuse_repeated(rows)
+        return np.array([*rows, rows[0]] if self.closed else rows, dtype=np.int32)
 
     def on(self, net):
         """The term of one cell, whose ``out`` is tension, stress, strain and length."""

@@ -156,7 +156,7 @@ def carried_off(system, t, parts):
 
 
 def with_reason(system, t, error):
-    """The error with what may have to do with it: rings that meet, two contacts alike, parts that nothing else holds."""
+    """The error with what it may come from: rings that meet, two contacts alike, or parts that nothing else holds."""
     from ..system.unsupported_parts import find_parts
     from .contact_kinks import kink_remark
 

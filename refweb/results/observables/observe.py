@@ -142,8 +142,9 @@ class Observe(Table):
     @property
     def observable(self) -> Any:
         """The `refweb.results.observables.observable.Observable` of the quantity."""
-        threaded = self.thread is not None and self.quantity in ("tension", "stress", "strain")
-        return load(OBSERVABLES["length" if threaded else self.quantity])(self)
+        if self.thread is not None and self.quantity in ("tension", "stress", "strain"):
+            return load(f"refweb.results.observables.thread:{self.quantity.capitalize()}")(self)
+        return load(OBSERVABLES[self.quantity])(self)
 
     @property
     def unit(self) -> str:

@@ -10,9 +10,6 @@ from ...messages import nearest, quote
 from ..probes import PROBE, Probe
 from .observable import ANY, NOT_NEGATIVE, ROUNDING, Observable, Value
 
-UNITS = {"tension": "N", "stress": "Pa", "strain": "1", "length": "m"}
-"""Quantities of a thread in the order of what its force observes, and their units."""
-
 
 @kernel(PROBE)
 def of_cell(t, x, v, f, lines, rows, data, where):
@@ -22,18 +19,23 @@ def of_cell(t, x, v, f, lines, rows, data, where):
 
 
 class OfThread(Observable):
-    """Tension, stress, strain or current length of a thread, from its first node to its last through all others."""
+    """A number of a thread, which is that of all of it.
+
+    Attributes
+    ----------
+    column : int
+        Column of what the force of a thread observes.
+    pull : bool
+        True if the value has the sign of the tension.
+    """
 
     keys = ("thread",)
+    column = 0
+    pull = False
 
-    @property
-    def unit(self):
-        """Unit of the quantity."""
-        return UNITS[self.observe.quantity]
-
-    @property
-    def _column(self):
-        return list(UNITS).index(self.observe.quantity)
+    def scale(self, line):
+        """Change of the value by a strain of 1, of a thread as one ``line``."""
+        return 1.0
 
     def on(self, system):
         """Refuse a missing name, and one that is that of no thread."""
@@ -49,25 +51,61 @@ class OfThread(Observable):
 
     def of(self, state):
         """The value of the thread."""
-        return Value(float(state.threads[self.observe.thread][self._column]), None)
+        return Value(float(state.threads[self.observe.thread][self.column]), None)
 
     def probe(self, system):
         """Make the probe of the thread."""
-        return Probe(of_cell, [self._column], np.zeros((0, 0)), term=self._thread(system)[0])
+        return Probe(of_cell, [self.column], np.zeros((0, 0)), term=self._thread(system)[0])
 
     def bounds(self, system):
-        """Lengths are not negative, nor is what a thread that only pulls is drawn with."""
-        if self.observe.quantity == "length":
-            return NOT_NEGATIVE
-        if system is None or self.observe.quantity == "strain":
-            return ANY
-        return ANY if self._thread(system)[1].line.law.pushes else NOT_NEGATIVE
+        """A thread that only pulls has a tension that is not negative."""
+        pulls = self.pull and system is not None and not self._thread(system)[1].line.law.pushes
+        return NOT_NEGATIVE if pulls else ANY
 
     def error(self, state, equilibrium):
         """The estimate by deviations, and the rounding of the strain, which no node balances where all are held."""
         error = super().error(state, equilibrium)
-        if error is None:
-            return None
         line = self._thread(state.system)[1].line
-        scale = {"tension": line.axial[0], "stress": line.axial[0] / line.area[0], "strain": 1.0}
-        return error + ROUNDING * float(scale.get(self.observe.quantity, line.natural_length[0]))
+        return None if error is None else error + ROUNDING * float(self.scale(line))
+
+
+class Tension(OfThread):
+    """Tension of a thread."""
+
+    unit = "N"
+    pull = True
+
+    def scale(self, line):
+        """EA."""
+        return line.axial[0]
+
+
+class Stress(OfThread):
+    """Nominal stress of a thread, tension over area."""
+
+    unit, column = "Pa", 1
+    pull = True
+
+    def scale(self, line):
+        """E."""
+        return line.axial[0] / line.area[0]
+
+
+class Strain(OfThread):
+    """Engineering strain of a thread."""
+
+    column = 2
+
+
+class Length(OfThread):
+    """Current length of a thread, from its first node to its last through all others."""
+
+    unit, column = "m", 3
+
+    def bounds(self, system):
+        """Bounds of the value: a length is not negative."""
+        return NOT_NEGATIVE
+
+    def scale(self, line):
+        """Natural length."""
+        return line.natural_length[0]
