@@ -74,7 +74,8 @@ def roots(given, method):
     yield registered(STATICS[method] if static else INTEGRATORS[method].integrator)
     yield registered(WEBS[given["web"]["kind"]])
     yield from (registered(EFFECTS[effect]) for effect in given.keys() & EFFECTS.keys())
-    yield from (registered(OBSERVABLES[observe["quantity"]]) for observe in given.get("observe", DEFAULT))
+    for observe in given.get("observe", DEFAULT):
+        yield registered(OBSERVABLES["length" if "thread" in observe else observe["quantity"]])
     yield from (registered(SHAPES[shape]) for shape in shapes)
     cable = given["cable"]
     laws = {law, *(group.get("law", law) for group in cable.get("groups", {}).values())}

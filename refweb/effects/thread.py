@@ -157,7 +157,8 @@ class Thread(Table):
 
     A drawstring, a rope over pulleys or a line with rings on it: one tension rules all of it, by the sum of the
     distances of neighbours in the list. Nodes may be free, supported, moved, or on a body by ``[[attach]]``. A thread
-    may pass a node several times, as a tackle does. It does not touch bodies or lines, and does not break.
+    may pass a node several times, as a tackle does. It does not touch bodies or lines, and does not break. Rings that
+    nothing keeps apart slide together; statics finds no equilibrium there, where the thread has no direction.
 
     Its mass is shared by its nodes, half of each segment to either end as it lies in the web's position, and stays
     there: material that slides through a ring brings no mass along. Where masses of a thread count beside those of its

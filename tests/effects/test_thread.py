@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from nets import METHODS
 from scipy.integrate import quad, solve_ivp
+from scipy.linalg import eigh
 from scipy.optimize import brentq, least_squares
 
 import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.results.vtu import web_mesh
 
 G, EA = 9.81, 1e4
@@ -144,7 +146,7 @@ def test_two_rings():
 
 def test_rings_that_meet():
     """Nothing keeps them apart, and at one point the thread between them has no direction."""
-    with pytest.raises(refweb.SolverError, match=r'nodes 2 and 3 meet on thread "rope": .* make them one node'):
+    with pytest.raises(refweb.SolverError, match=r'nodes 2 and 3 come together on thread "rope", .* one node'):
         static(TWO, [0, 1], TWO_ROPE, dict(zip((2, 3), WEIGHTS, strict=True)))
 
 
@@ -281,6 +283,23 @@ def test_modes_of_a_string_over_a_bridge():
         for k in range(1, n + 1)
     )
     np.testing.assert_allclose(refweb.modes(given, number=8).frequency, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-3, 0.3])
+@pytest.mark.parametrize("nodes", [[0, 1], [0, 1, 2], [0, 1, 2, 0], [0, 1, 0, 1, 2, 1], [3, 0, 1, 2, 4]])
+def test_bound_of_steps(nodes, share):
+    """It is below 2/ω of the largest frequency, at any angle and strain, and nodes close to each other."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        points = rng.standard_normal((max(nodes) + 1, 3))
+        points[1] = points[0] + 10.0 ** rng.uniform(-4, 0) * (points[1] - points[0])
+        masses = dict(enumerate(10.0 ** rng.uniform(-2, 2, len(points))))
+        solve = {"kind": "dynamic", "duration": 1.0}
+        system = scene(points.tolist(), [], {"nodes": nodes, "prestrain": share}, solve, masses, gravity=[]).build()
+        x = np.zeros((system.rows, 3))
+        K = system.pattern.matrix(system.stiffness(0.0, x)).toarray()
+        largest = eigh(K, np.diag(np.repeat(system.net.mass, 3)[system.free]), eigvals_only=True)[-1]
+        assert CentralDifference(system).bound(x) <= 2.0 / np.sqrt(largest)
 
 
 # Bodies, mass, results and messages
