@@ -73,7 +73,7 @@ EFFECTS = {
     },
     "a thread through rings on it": {
         "thread": [
-            {"name": "rope", "nodes": [0, 5, 6, 10, 9, 15], "modulus": 1e6, "area": 1e-5, "density": 1000.0},
+            {"name": "rope", "nodes": [0, 3, 4, 8, 7, 11], "modulus": 1e6, "area": 1e-5, "density": 1000.0},
         ],
         "observe": [*SMALL["observe"], {"name": "rope", "quantity": "length", "thread": "rope", "reduce": "max"}],
     },
