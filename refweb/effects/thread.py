@@ -164,7 +164,7 @@ class Thread(Table):
     there: material that slides through a ring brings no mass along. Where masses of a thread count beside those of its
     nodes, use lines. Explicit steps are as short as with lines of the same material from node to node; in matrices a
     thread of n nodes is a dense block of 9 n² numbers. In statics errors of a scene with a thread are estimates, not
-    proven bounds. Reels, heat, damping and ``[rupture]`` are of lines, not of threads: to pull a thread in, move its
+    proven bounds. Reels, heat, material damping and ``[rupture]`` are of lines alone: to pull a thread in, move its
     end.
 
     Parameters
