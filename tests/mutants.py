@@ -122,8 +122,6 @@ MIRRORS = {
     "statics/simulation": "statics/test_statics.py results/test_frames.py",
     "statics/duality_bound": "net/test_curves.py statics/test_reused_factorization.py statics/test_statics.py "
     "dynamics/test_accuracy.py",
-    "statics/newton": "statics/test_reused_factorization.py statics/test_statics.py dynamics/test_accuracy.py "
-    "effects/test_thread.py",
     "statics": "statics/test_reused_factorization.py statics/test_statics.py dynamics/test_accuracy.py",
     "dynamics/accuracy_loop": "dynamics/test_budget.py test_faults.py dynamics/test_accuracy.py",
     "dynamics/budget": "dynamics/test_budget.py",
@@ -348,7 +346,6 @@ MUTANTS = [
     Mutant("effects/thread", "np.add.at(mass, rows[1:], 0.5", "np.add.at(mass, rows[:-1], 0.5"),
     Mutant("net/threads", "return self.line.element_mass[0] * self.distances", "return 0.0 * self.distances"),
     Mutant("system/system", "tension.mean() * term.tangent.across", "0.0 * term.tangent.across"),
-    Mutant("statics/newton", "strained = abs(per_cell[number][0, 0])", "strained = 0.0 * abs(per_cell[number][0, 0])"),
     Mutant("net/mesh_file", 'np.asarray(block.data["thread"]) == 0.0', 'np.asarray(block.data["thread"]) >= 0.0'),
     Mutant("effects/bending", "inner = ~np.isin(rows[:, 1], clamped)", "inner = rows[:, 1] >= 0"),
     Mutant("effects/turning_axes", "to, m = cells[c, a], 2.0 * velocity", "to, m = cells[c, a], -2.0 * velocity"),

@@ -181,16 +181,17 @@ class Thread(Table):
     prestrain : float
         Strain in the web's position [1], > −1; negative is slack.
     law : {"tension-only", "smooth", "table"}
-        Tension law, as in ``[cable]``; or that of another package, unless it is one of bars or of form finding.
+        Tension law, as in ``[cable]``; or that of another package, unless it is one of bars or of form finding, or
+        yields.
     material, modulus, area, density, slackness, smoothing, stress, tension, parameters
         As in ``[cable]``.
 
     Raises
     ------
     InputError
-        For fewer than two nodes, a node that follows itself, ``length`` beside ``prestrain``, a law of bars or of form
-        finding, and what ``[cable]`` refuses. From ``extend``, for a name that is listed twice, one that is not one
-        node of the web, and nodes that are all in one point.
+        For fewer than two nodes, a node that follows itself, ``length`` beside ``prestrain``, a law of bars, of form
+        finding or that yields, and what ``[cable]`` refuses. From ``extend``, for a name that is listed twice, one that
+        is not one node of the web, and nodes that are all in one point.
 
     Examples
     --------
@@ -235,8 +236,8 @@ class Thread(Table):
                 "leave one of them out"
             )
         law = law_of(self.law)
-        if law.bar or law.forming:
-            why = "is one of bars, which push" if law.bar else "is for form finding"
+        if law.bar or law.forming or law.plastic:
+            why = "is one of bars, which push" if law.bar else "is for form finding" if law.forming else "yields"
             raise InputError(f'law = "{self.law}" {why}: a thread takes "tension-only", "smooth" or "table"')
         self._cable()
 
