@@ -130,7 +130,7 @@ class State:
 
     @cached_property
     def slack_nodes(self) -> NDArray[np.int64]:
-        """Free nodes without a taut line or a bar, whose position is not unique."""
+        """Free nodes without a taut line, a taut thread or a bar, whose position is not unique."""
         net = self.system.net
         fixed = np.all(self.system.supported, axis=1)
         fixed[net.web.bare] = True  # by a link
