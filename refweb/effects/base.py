@@ -122,7 +122,7 @@ class Tangent(NamedTuple):
     stiffness: Callable[..., Any] | None = None
     bound: Callable[..., Any] | None = None
     symmetric: bool = True
-    across: np.ndarray | None = None
+    across: NDArray[np.float64] | None = None
 
 
 class VelocityForce(NamedTuple):

@@ -19,7 +19,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from ..registry import LAWS
 from ..tables import Several, Table, boolean, choice, nodes, real, table, text
 from .base import Balance, ForceTerm, Tangent
 from .line_kernels import line_at
+
+if TYPE_CHECKING:
+    from ..net.net import Net
 
 COLUMNS = 4
 """Numbers that the force observes: tension [N], stress [Pa], strain [1] and length [m]."""
@@ -222,7 +225,7 @@ class Thread(Table):
     tension: Any = points(unit="N")
     parameters: dict | None = numbers_by_name()
 
-    def check(self):
+    def check(self) -> None:
         """Refuse fewer than two nodes, a node that follows itself, two lengths, and what a cable refuses."""
         from ..net.tension_laws import law_of
 
@@ -255,7 +258,7 @@ class Thread(Table):
 
         return Cable(**{key: getattr(self, key) for key in OF_CABLE})
 
-    def extend(self, net):
+    def extend(self, net: Net) -> Net:
         """The net with the thread and its mass."""
         from ..net.threads import thread_line
 
@@ -284,7 +287,7 @@ class Thread(Table):
         self._refuse_repeated(rows)
         return np.array([*rows, rows[0]] if self.closed else rows, dtype=np.int32)
 
-    def on(self, net):
+    def on(self, net: Net) -> ForceTerm:
         """The term of one cell, whose ``out`` is tension, stress, strain and length."""
         return _term(next(thread for thread in net.threads if thread.name == self.name))
 

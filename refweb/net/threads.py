@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from . import discretisation
 from .web import Web
 
 if TYPE_CHECKING:
+    from .cable import Cable
     from .net import Net
 
 
@@ -30,33 +32,33 @@ class ThreadLine(NamedTuple):
     """
 
     name: str
-    rows: np.ndarray
-    vectors: np.ndarray
-    distances: np.ndarray
+    rows: NDArray[np.int32]
+    vectors: NDArray[np.float64]
+    distances: NDArray[np.float64]
     line: Net
 
     @property
-    def natural_length(self):
+    def natural_length(self) -> float:
         """Natural length [m]."""
         return float(self.line.natural_length[0])
 
     @property
-    def stiffness(self):
+    def stiffness(self) -> float:
         """Largest stiffness EA/L [N/m]."""
         return float(self.line.axial[0]) / self.natural_length
 
     @property
-    def masses(self):
+    def masses(self) -> NDArray[np.float64]:
         """Mass of each segment by its share of the distances [kg], shape (segments,)."""
         return self.line.element_mass[0] * self.distances / self.distances.sum()
 
     @property
-    def segments(self):
+    def segments(self) -> NDArray[np.int32]:
         """Nodes of each segment, shape (segments, 2)."""
         return np.column_stack([self.rows[:-1], self.rows[1:]])
 
     @property
-    def across(self):
+    def across(self) -> NDArray[np.float64]:
         """Stiffness across itself by a unit tension, in the web's position [1/m], shape (1, 3 nodes, 3 nodes)."""
         number = np.arange(len(self.distances))
         inverse = 1.0 / np.maximum(self.distances, 1e-3 * self.distances.mean())
@@ -66,7 +68,9 @@ class ThreadLine(NamedTuple):
         return np.kron(chain, np.eye(3))[None]
 
 
-def thread_line(name, places, rows, cable, length=None):
+def thread_line(
+    name: str, places: NDArray[np.float64], rows: NDArray[np.int32], cable: Cable, length: float | None = None
+) -> ThreadLine:
     """The `ThreadLine` of a cable through nodes at some places [m], shape (nodes, 3).
 
     Raises

@@ -54,7 +54,7 @@ class State:
         return force, per_cell.tension, contact, felt, threads
 
     @property
-    def threads(self):
+    def threads(self) -> dict[str, NDArray[np.float64]]:
         """Tension [N], stress [Pa], strain [1] and length [m] of each thread by name."""
         return self._forces[4]
 

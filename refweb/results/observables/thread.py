@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...errors import InputError
@@ -9,6 +11,12 @@ from ...kernels import kernel
 from ...messages import nearest, quote
 from ..probes import PROBE, Probe
 from .observable import ANY, NOT_NEGATIVE, ROUNDING, Observable, Value
+
+if TYPE_CHECKING:
+    from ...net.net import Net
+    from ...statics.equilibrium import Equilibrium
+    from ...system.system import System
+    from ..state import State
 
 
 @kernel(PROBE)
@@ -29,15 +37,15 @@ class OfThread(Observable):
         True if the value has the sign of the tension.
     """
 
-    keys = ("thread",)
+    keys: tuple[str, ...] = ("thread",)
     column = 0
     pull = False
 
-    def scale(self, line):
+    def scale(self, line: Net) -> float:
         """Change of the value by a strain of 1, of a thread as one ``line``."""
         return 1.0
 
-    def on(self, system):
+    def on(self, system: System) -> None:
         """Refuse a missing name, and one that is that of no thread."""
         names, name = [thread.name for thread in system.net.threads], self.observe.thread
         if name not in names:
@@ -49,24 +57,24 @@ class OfThread(Observable):
         """(Number of the term, the thread)."""
         return next(item for item in system.threads.items() if item[1].name == self.observe.thread)
 
-    def of(self, state):
+    def of(self, state: State) -> Value:
         """The value of the thread."""
         return Value(float(state.threads[self.observe.thread][self.column]), None)
 
-    def probe(self, system):
+    def probe(self, system: System) -> Probe:
         """Make the probe of the thread."""
         return Probe(of_cell, [self.column], np.zeros((0, 0)), term=self._thread(system)[0])
 
-    def bounds(self, system):
+    def bounds(self, system: System | None) -> tuple[float, float]:
         """A thread that only pulls has a tension that is not negative."""
         pulls = self.pull and system is not None and not self._thread(system)[1].line.law.pushes
         return NOT_NEGATIVE if pulls else ANY
 
-    def error(self, state, equilibrium):
+    def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """The estimate by deviations, and the rounding of the strain, which no node balances where all are held."""
         error = super().error(state, equilibrium)
         line = self._thread(state.system)[1].line
-        return None if error is None else error + ROUNDING * float(self.scale(line))
+        return None if error is None else error + ROUNDING * self.scale(line)
 
 
 class Tension(OfThread):
@@ -75,9 +83,9 @@ class Tension(OfThread):
     unit = "N"
     pull = True
 
-    def scale(self, line):
+    def scale(self, line: Net) -> float:
         """EA."""
-        return line.axial[0]
+        return float(line.axial[0])
 
 
 class Stress(OfThread):
@@ -86,9 +94,9 @@ class Stress(OfThread):
     unit, column = "Pa", 1
     pull = True
 
-    def scale(self, line):
+    def scale(self, line: Net) -> float:
         """E."""
-        return line.axial[0] / line.area[0]
+        return float(line.axial[0] / line.area[0])
 
 
 class Strain(OfThread):
@@ -102,10 +110,10 @@ class Length(OfThread):
 
     unit, column = "m", 3
 
-    def bounds(self, system):
+    def bounds(self, system: System | None) -> tuple[float, float]:
         """Bounds of the value: a length is not negative."""
         return NOT_NEGATIVE
 
-    def scale(self, line):
+    def scale(self, line: Net) -> float:
         """Natural length."""
-        return line.natural_length[0]
+        return float(line.natural_length[0])
