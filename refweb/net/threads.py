@@ -65,7 +65,7 @@ class ThreadLine(NamedTuple):
         chain = np.zeros((len(self.rows), len(self.rows)))
         for i, j, sign in ((0, 0, 1.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)):
             chain[number + i, number + j] += sign * inverse
-        return np.kron(chain, np.eye(3))[None]
+        return np.asarray(np.kron(chain, np.eye(3))[None], dtype=np.float64)
 
 
 def thread_line(

@@ -59,7 +59,7 @@ class OfThread(Observable):
 
     def of(self, state: State) -> Value:
         """The value of the thread."""
-        return Value(float(state.threads[self.observe.thread][self.column]), None)
+        return Value(float(state.threads[self._thread(state.system)[1].name][self.column]), None)
 
     def probe(self, system: System) -> Probe:
         """Make the probe of the thread."""
