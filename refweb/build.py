@@ -135,12 +135,13 @@ def _web(web, folder):
 
 def _check_bare(system):
     """Refuse nodes that nothing ties to the web."""
-    linked = np.concatenate([[], *(constraint.cells.ravel() for constraint in system.constraints)])
+    linked = [constraint.cells.ravel() for constraint in system.constraints]
+    linked += [thread.rows for thread in system.net.threads]
     bare = system.net.web.bare
-    bare = bare[~np.isin(bare, linked)]
+    bare = bare[~np.isin(bare, np.concatenate([[], *linked]))]
     if len(bare):
         more = f" (and {len(bare) - 1} more)" if len(bare) > 1 else ""
-        raise InputError(f"[web] node {bare[0]}{more} is used by no line and no [[link]]")
+        raise InputError(f"[web] node {bare[0]}{more} is used by no line, no [[link]] and no [[thread]]")
 
 
 def _check_memory(lines, cable, effects, solve):
@@ -208,9 +209,9 @@ class _Placed:
 
 
 def _acting(effects):
-    """Effects with the names of their tables: bodies, which others act on, then table by table."""
+    """Effects with the names of their tables: bodies, which others act on, threads, whose mass they take, the rest."""
     names = [name_of(EFFECTS, effect) for effect in effects]
-    tables = list(dict.fromkeys(["body", *names]))
+    tables = list(dict.fromkeys(["body", "thread", *names]))
     acting, count = [], {}
     for name, effect in sorted(zip(names, effects, strict=True), key=lambda pair: tables.index(pair[0])):
         count[name] = count.get(name, 0) + 1

@@ -78,6 +78,13 @@ EXAMPLES = {
     "Bending": [dict(stiffness=2.0), dict(stiffness=2.0, clamp=[1, 4])],
     "Attach": [dict(body="wall", node=[1, 3]), dict(body="wall", node=2, point=(0.1, 0.2, -0.3))],
     "Link": [dict(nodes=[0, 4]), dict(nodes=[5, 4, 2, 3])],
+    "Thread": [
+        dict(name="rope", nodes=[0, 4, 2, 3], modulus=1e5, area=2e-4, density=0.0, prestrain=-0.05),
+        dict(name="rope", nodes=[5, 1, 4, 1, 3], closed=True, modulus=1e5, area=2e-4, density=0.0, prestrain=0.3),
+        dict(name="rope", nodes=[0, 2, 5], area=1e-4, density=0.0, prestrain=0.2, law="smooth", modulus=1e5),
+        dict(name="rope", nodes=[0, 2, 5], area=1e-4, density=0.0, length=2.5, law="table")
+        | dict(stress=[[0.01, 0.0], [0.1, 1e4], [0.5, 1e5]]),
+    ],
     "Reel": [
         dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
         dict(lines="all", factor=[(0.5, 1.0), (0.9, 1.1)]),

@@ -139,6 +139,11 @@ EFFECTS = {
         table(body=st.sampled_from(["ball", "b"]), node=NODE, optional={"point": VECTOR}), min_size=1, max_size=1
     ),
     "link": st.lists(table(nodes=NUMBERS), min_size=1, max_size=1),
+    "thread": st.lists(
+        table(name=st.just("rope"), nodes=NUMBERS, modulus=ANY, area=ANY, density=ANY, optional={"prestrain": SIGNED}),
+        min_size=1,
+        max_size=1,
+    ),
     "damping": table(optional={"time": ANY, "rate": ANY}),
     "bending": table(stiffness=ANY, optional={"clamp": NODE}),
     "self_contact": table(radius=ANY, optional={"stiffness": ANY, "damping": ANY}),

@@ -7,6 +7,7 @@ compiled loop is called with.
 """
 
 import importlib.util
+import itertools
 import json
 import subprocess
 import sys
@@ -73,7 +74,8 @@ def roots(given, method):
     yield registered(STATICS[method] if static else INTEGRATORS[method].integrator)
     yield registered(WEBS[given["web"]["kind"]])
     yield from (registered(EFFECTS[effect]) for effect in given.keys() & EFFECTS.keys())
-    yield from (registered(OBSERVABLES[observe["quantity"]]) for observe in given.get("observe", DEFAULT))
+    for observe in given.get("observe", DEFAULT):
+        yield registered(OBSERVABLES["length" if "thread" in observe else observe["quantity"]])
     yield from (registered(SHAPES[shape]) for shape in shapes)
     cable = given["cable"]
     laws = {law, *(group.get("law", law) for group in cable.get("groups", {}).values())}
@@ -280,6 +282,7 @@ TABLES = {
     "contact": {"stiffness": 1e4},
     "attach": {"body": "wall", "node": 9},
     "link": {"nodes": [5, 6]},
+    "thread": {"name": "rope", "nodes": [5, 6, 10], "modulus": 1e9, "area": 1e-6, "density": 1.0},
     "frame": {"angular_velocity": [0.0, 0.0, 1.0]},
     "orbit": {"mean_motion": 1.0},
     "drag": {"density": 1.2},
@@ -297,7 +300,7 @@ SOLVED = ("detection", "law")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
 LISTED += ("relax", "motion", "work of lengths", "impulse", "near", "collisions", "probe")
 TERM = {"force": 1, "energy": 1, "bound": 1}
-KERNELS = {name: TERM for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
+KERNELS = {name: TERM for name in ("gravity", "load", "contact", "pressure", "thrust", "bending", "thread")}
 KERNELS |= {name: {**TERM, "impulse": 1} for name in ("gravity", "load")}
 KERNELS |= {name: {**TERM, "near": 1} for name in ("contact", "self_contact")}
 KERNELS["self_contact"] |= {"collisions": 2}  # with lines, and with neighbours along the net
@@ -371,6 +374,8 @@ def expected(*effects):
         held = set()
     if "bending" in effects:
         pairs = pairs + continued(web)
+    if "thread" in effects:  # every node of it with every other
+        pairs = pairs + list(itertools.combinations(TABLES["thread"]["nodes"], 2))
     if "self_contact" in effects:  # every line with every other
         pairs = pairs + [(one, other) for one in range(rows) for other in range(one) if apart(web, one, other)]
     if "motion" in effects:

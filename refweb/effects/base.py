@@ -116,11 +116,14 @@ class Tangent(NamedTuple):
         Bound on the row sums of |K|, for the step of an explicit method; None where it is zero.
     symmetric : bool
         True if stiffness and damping are symmetric.
+    across : ndarray, shape (cells, 3 arity, 3 arity), optional
+        Stiffness of cells that are threads across themselves, by a unit tension [1/m].
     """
 
     stiffness: Callable[..., Any] | None = None
     bound: Callable[..., Any] | None = None
     symmetric: bool = True
+    across: NDArray[np.float64] | None = None
 
 
 class VelocityForce(NamedTuple):
@@ -308,6 +311,8 @@ class ForceTerm:
         Optional parts, see the classes.
     adds_tension : bool
         True for a force over the lines beside their law, which writes the whole tension to ``out``.
+    observed : int
+        Number of values per cell in ``out`` that observables read, of a thread.
     """
 
     name: str
@@ -324,6 +329,7 @@ class ForceTerm:
     elements: CellElements = CellElements()
     internal: InternalVariables | None = None
     adds_tension: bool = False
+    observed: int = 0
 
     @property
     def over_lines(self) -> bool:
@@ -337,6 +343,8 @@ class ForceTerm:
             return CONTACT_COLUMNS
         if self.adds_tension and self.balance.power is None:
             return DAMPED_TENSION + 1
+        if self.observed:
+            return self.observed
         return int(self.contact.crossing is not None) if self.balance.power is None else self.balance.power + 1
 
     @property

@@ -165,6 +165,7 @@ def remarks(web):
 
 def _web_of(mesh, edges=None):
     """The web of a `refweb.net.mesh_readers.Mesh`; ``edges`` is the key of that name."""
+    mesh = _without_threads(mesh)
     _check_cells(mesh)
     unused = any(block.kind in CORNERS for block in mesh.blocks)
     mesh, edge_groups, notes = decided(mesh, edges)
@@ -265,6 +266,17 @@ def _merged(lines, mesh):
     order = np.argsort(first)
     position = np.argsort(order)[number.ravel()]
     return first[order], position
+
+
+def _without_threads(mesh):
+    """The mesh of a frame without the segments of its threads, which are no lines of the web."""
+
+    def lines_of(block):
+        lines = np.asarray(block.data["thread"]) == 0.0
+        return block._replace(cells=block.cells[lines], data={key: data[lines] for key, data in block.data.items()})
+
+    known = [{"thread", "natural_length"} <= block.data.keys() for block in mesh.blocks]
+    return mesh._replace(blocks=[lines_of(b) if drawn else b for b, drawn in zip(mesh.blocks, known, strict=True)])
 
 
 def _joined(key, blocks):

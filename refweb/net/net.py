@@ -63,6 +63,8 @@ class Net:
         Knot factor over safety factor, the allowed share of the strength; None if it is 1 everywhere.
     point_mass : ndarray, shape (nodes,), optional
         Point masses in ``mass`` [kg]; None if there are none.
+    threads : tuple of refweb.net.threads.ThreadLine
+        Threads through nodes.
     kept : tuple of refweb.net.laws.curve.Curve
         Curves whose addresses stand in ``line_data``: they live as long as the net.
     gradients : ndarray, shape (points, nodes per cell)
@@ -117,6 +119,7 @@ class Net:
     end: float = math.inf
     allowed_share: NDArray[np.float64] | None = None
     point_mass: NDArray[np.float64] | None = None
+    threads: tuple[Any, ...] = ()
     kept: tuple[Any, ...] = ()
 
     @property

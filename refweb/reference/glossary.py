@@ -80,6 +80,7 @@ GLOSSARY = {
         "drag": "Force of a fluid, quadratic in the relative velocity.",
         "reel": "Device that changes the natural length of lines over time.",
         "link": "Rigid bar between two nodes, an algebraic constraint.",
+        "thread": "Line that slides through several nodes without friction, with one tension.",
         "rupture": "Break of a line at its strength, or at a given time.",
         "rotating frame": "Axes that turn at a constant angular velocity; adds centrifugal and Coriolis forces.",
         "centrifugal force": "Inertia force m ω²r away from the axis of a rotating frame [N].",

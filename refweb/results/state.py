@@ -50,7 +50,13 @@ class State:
         lines = [i for i, term in enumerate(self.system.terms) if term.contact.with_lines]
         contact = {i: records_of(TOUCH, per_cell[i])["value"] for i in lines}
         felt = self.system.contact_forces.of(per_cell) if any(f.contact.felt for f in self.system.terms) else None
-        return force, per_cell.tension, contact, felt
+        threads = {thread.name: per_cell[i][0] for i, thread in self.system.threads.items()}
+        return force, per_cell.tension, contact, felt, threads
+
+    @property
+    def threads(self) -> dict[str, NDArray[np.float64]]:
+        """Tension [N], stress [Pa], strain [1] and length [m] of each thread by name."""
+        return self._forces[4]
 
     def overlap(self, body: Any) -> NDArray[np.float64]:
         """Depth of the deepest contact of each element with a body [m], 0 without contact, shape (cells,)."""
@@ -124,11 +130,13 @@ class State:
 
     @cached_property
     def slack_nodes(self) -> NDArray[np.int64]:
-        """Free nodes without a taut line or a bar, whose position is not unique."""
+        """Free nodes without a taut line, a taut thread or a bar, whose position is not unique."""
         net = self.system.net
         fixed = np.all(self.system.supported, axis=1)
         fixed[net.web.bare] = True  # by a link
         fixed[net.cells[net.law_is("bar") | ~self.element_slack].ravel()] = True
+        for thread in net.threads:
+            fixed[thread.rows] |= self.threads[thread.name][0] > 0.0
         return np.flatnonzero(~fixed[: net.nodes])
 
     @cached_property

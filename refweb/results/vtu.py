@@ -37,7 +37,8 @@ def meshes(state, shape=None):
 def web_mesh(state, shape=None):
     """The web of a state: current positions, and lines in the numbering of the web, as float64.
 
-    Elements of order 2 and 3 are quadratic and cubic cells. The elements of one line follow each other. A mode
+    Elements of order 2 and 3 are quadratic and cubic cells. The elements of one line follow each other. Segments of
+    threads come after all lines; their cell data ``thread`` is the number of their thread from 1 on, 0 of lines. A mode
     ``shape`` is added to the positions.
     """
     import meshio
@@ -45,7 +46,23 @@ def web_mesh(state, shape=None):
     points, point_data, cell_data = frame_data(state, shape)
     net = state.system.net
     lines = [({1: "line", 2: "line3", 3: "line4"}[net.order], net.cells)]
-    return meshio.Mesh(points, lines, point_data, {key: [values] for key, values in cell_data.items()})
+    cells = {key: [values] for key, values in cell_data.items()}
+    for number, thread in enumerate(net.threads, 1):
+        cells.setdefault("thread", [np.zeros(len(net.cells))])
+        lines.append(("line", thread.segments))
+        drawn = _of_thread(state, thread) | {"thread": float(number), "line": -1.0}
+        for key, values in cells.items():
+            values.append(np.broadcast_to(drawn.get(key, 0.0), len(thread.distances)).copy())
+    return meshio.Mesh(points, lines, point_data, cells)
+
+
+def _of_thread(state, thread):
+    """Cell data of the segments of a thread by name; its natural length in the shares of their lengths."""
+    tension, stress, strain, length = state.threads[thread.name]
+    apart = np.linalg.norm(np.diff(state.position[thread.rows], axis=0), axis=1)
+    natural = apart * (thread.natural_length / length) if length > 0.0 else apart
+    slack = float(strain <= thread.line.slackness[0])
+    return dict(zip(CELL_DATA, (tension, stress, strain, natural, slack), strict=True))
 
 
 def body_mesh(body, state, shape=None):

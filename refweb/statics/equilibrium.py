@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-10
 """Residual at which an iteration stops; `LIMIT` is what it may end at when rounding allows no further step."""
 LIMIT = 1e-9
+NEAR = 1e-3
+"""Distance of rings that have come together, over the length of their thread."""
 WITH_A_WAY_AROUND = 25
 """Largest number of factorizations of Newton's method where an interior point can take over."""
 
@@ -154,10 +156,12 @@ def carried_off(system, t, parts):
 
 
 def with_reason(system, t, error):
-    """The error with what contact may have to do with it: two contacts alike, or parts that nothing else holds."""
+    """The error with what it may come from: rings together, two contacts alike, or parts that nothing else holds."""
     from ..system.unsupported_parts import find_parts
     from .contact_kinks import kink_remark
 
+    if error.x is not None and (together := _together(system, error.x)) is not None:
+        return NotFound(f"no equilibrium found at step {t:g}: {together}", error.stats)
     if system.contact and error.x is not None and (kink := kink_remark(system, error.x)) is not None:
         return NotFound(f"no equilibrium found at step {t:g}: {kink}", error.stats)
 
@@ -165,6 +169,19 @@ def with_reason(system, t, error):
     if carried is None:
         return error
     return NotFound(f"{error}; while it touches nothing, {carried}, or start where it touches", error.stats)
+
+
+def _together(system, x):
+    """Text that names nodes that have come together on a thread, which pulls them so; None where none have."""
+    for thread in system.net.threads:
+        apart = np.linalg.norm(np.diff((system.net.points + x)[thread.rows], axis=0), axis=1)
+        free = ~system.supported[thread.segments].all(axis=(1, 2))
+        for first, second in thread.segments[(apart < NEAR * thread.natural_length) & free][:1]:
+            return (
+                f'nodes {first} and {second} come together on thread "{thread.name}", which has no direction there: '
+                'keep them apart by a line or a load, make them one node, or try method = "relaxation"'
+            )
+    return None
 
 
 def force_scale(system, t, x, tension):

@@ -370,6 +370,11 @@ class Newton:
         moved = np.linalg.norm(state.x, axis=1)[net.cells].max(axis=1)
         size = np.zeros(system.rows)
         np.add.at(size, net.cells, np.finfo(float).eps * (np.abs(state.tension) + stiffness * moved)[:, None])
+        for number, thread in system.threads.items():
+            far = np.linalg.norm(state.x[thread.rows], axis=1).max()
+            tension = system.forces(state.step, state.x).per_cell[number][0, 0]
+            strained = abs(tension) + thread.stiffness * far
+            np.add.at(size, thread.rows, np.finfo(float).eps * strained)
         forces = np.zeros((3, system.rows, 3))
         forces.reshape(3, -1)[:, system.free] = np.random.default_rng(0).choice((-1.0, 1.0), (3, len(system.free)))
         forces *= size[:, None]

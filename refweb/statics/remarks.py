@@ -139,6 +139,9 @@ def _not_proven(state):
         name = state.system.resting[0].name
         text = f'body "{name}" is free: ± are estimates, as the proven bound asks for a web without free bodies'
         yield Finding("not-proven", text, "body")
+    if net.threads and proven.all():
+        text = f'thread "{net.threads[0].name}" runs through several nodes: ± are estimates, as the proven bound asks '
+        yield Finding("not-proven", text + "for lines between two nodes", "thread")
     if net.law_is("plastic").any():
         yield Finding(
             "not-proven",

@@ -193,6 +193,12 @@ class System:
         return next((term for term in self.terms if term.over_lines), None)
 
     @property
+    def threads(self) -> dict[int, Any]:
+        """The `refweb.net.threads.ThreadLine` of the net by the numbers of their terms."""
+        numbers = [number for number, term in enumerate(self.terms) if term.observed]
+        return dict(zip(numbers, self.net.threads, strict=True))
+
+    @property
     def _in_tangent(self):
         """Terms with a stiffness or a damping, in the order of the pattern."""
         return [f for f in self.terms if f.tangent.stiffness is not None or f.velocity.damping is not None]
@@ -585,11 +591,15 @@ class System:
     def across_lines(self, tension: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of the stiffness of lines from a tension in each element alone [N], shape (elements,), as built.
 
-        Free bodies get the stiffness of the mean line as well, so that the matrix is definite.
+        Threads get that of the mean tension. Free bodies get the stiffness of the mean line as well, so that the matrix
+        is definite.
         """
         force = tension / self.net.natural_length
         blocks = self.net.unit_tension * force[:, None, None]
         values = self.assemble_lines(blocks)
+        for number, term in enumerate(self._in_tangent):
+            if term.tangent.across is not None:
+                values += self.pattern.assemble_one(number, tension.mean() * term.tangent.across)
         if self.resting:
             rows = [row for body in self.resting for row in (body.row, body.spin) if row is not None]
             unknowns = np.flatnonzero(np.isin(self.free // 3, rows))

@@ -61,6 +61,11 @@ MORE = {
     "self_contact": {"self_contact": {"radius": 1e-3, "stiffness": 1e3}},
     "attach": {"attach": [{"body": "box", "node": END}]},
     "link": {"link": [{"nodes": [5, 6]}]},
+    "thread": {
+        "thread": [
+            {"name": "rope", "nodes": [5, 6, 10, 9], "closed": True, "modulus": 1e6, "area": 1e-5, "density": 100.0},
+        ],
+    },
     "frame": {"frame": {"angular_velocity": [0.1, 0.2, 1.0]}},
     "orbit": {"orbit": {"mean_motion": 0.5}},
     "pressure": {"pressure": [{"lines": [8, 9], "normal": [0.0, 0.0, 1.0], "value": 3.0}]},
@@ -74,6 +79,8 @@ MORE = {
     "fold": {"fold": {"kind": "positions", "file": "folded.csv"}},
 }
 """What each effect adds to the scene."""
+ROPE = 1e6 * 1e-5
+"""EA of the thread [N]."""
 METHODS = {
     "static": {"kind": "static"},
     "central-difference": {"kind": "dynamic", "duration": DURATION},
@@ -112,6 +119,7 @@ LOOKED_AT = {
     "tension": [{}, {"select": "min"}],
     "stress": [{}],
     "strain": [{}, {"select": "min"}, {"line": [3, 20], "select": "abs"}],
+    "length": [{"thread": "rope"}],
     **{quantity: [{}] for quantity in KINDS},
     "work": [{}],
     "overlap": [{"body": "ball"}, {"body": "box"}],
@@ -199,7 +207,7 @@ class Frame:
         web = meshio.read(folder / "frames" / f"web_{number:06d}.vtu")
         self.x, self.u, self.v = web.points, web.point_data["displacement"], web.point_data["velocity"]
         self.mass, self.reaction = web.point_data["mass"].ravel(), web.point_data["reaction"]
-        cells = {name: values[0].ravel() for name, values in web.cell_data.items()}
+        cells = {name: values[0].ravel()[: len(LINES)] for name, values in web.cell_data.items()}
         self.tail, self.head = np.array(LINES).T
         self.way = self.x[self.head] - self.x[self.tail]
         self.length, self.natural = np.linalg.norm(self.way, axis=1), cells["natural_length"]
@@ -207,6 +215,10 @@ class Frame:
         self.strain = whole * (self.length / self.natural - 1.0)
         self.tension = whole * EA * np.maximum(self.strain, 0.0)
         self.pull, self.energy = cells["tension"], 0.5 * (self.tension * np.maximum(self.strain, 0.0) * self.natural)
+        self.rope, self.stretched = 0.0, 0.0
+        for i, j in np.vstack([block.data for block in web.cells])[len(LINES) :]:
+            self.rope += np.linalg.norm(self.x[j] - self.x[i])
+            self.stretched += np.linalg.norm(self.x[j] - self.x[i]) - np.linalg.norm(np.subtract(POINTS[j], POINTS[i]))
         self.ball, self.box = (meshio.read(folder / "frames" / f"{name}_{number:06d}.vtu") for name in ("ball", "box"))
         self.places, self.speeds = [self.ball.points.mean(axis=0)], [self.ball.point_data["velocity"].mean(axis=0)]
         self.follow_box()
@@ -250,6 +262,11 @@ class Frame:
         return motion + 0.5 * MOMENT * self.turning @ self.turning + 0.2 * BALL_MASS * RADIUS**2 * spin @ spin
 
     @property
+    def rope_energy(self):
+        """Strain energy of the thread [J]."""
+        return 0.5 * ROPE * max(self.stretched, 0.0) ** 2 / (self.rope - self.stretched) if self.rope else 0.0
+
+    @property
     def angle(self):
         """By which the box has turned [rad]."""
         turn = self.turn
@@ -285,7 +302,8 @@ def numbers(frame, spin, effect, static):
         "strain 0": frame.strain.max(),
         "strain 1": frame.strain.min(),
         "strain 2": np.abs(frame.strain[[3, 20]]).max(),
-        "strain_energy 0": frame.energy.sum(),
+        "strain_energy 0": frame.energy.sum() + frame.rope_energy,
+        "length 0": frame.rope,
         "contact_energy 0": 0.5 * STIFFNESS * (frame.depth**2).sum(),
         "self_contact_energy 0": 0.0,
         "body_contact_energy 0": 0.0,

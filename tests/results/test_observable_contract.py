@@ -31,12 +31,14 @@ EFFECTS = (
     refweb.Contact(stiffness=1e3, damping=0.2),
     refweb.Bending(stiffness=0.02),
     refweb.Damping(time=1e-3, rate=0.5),
+    refweb.Thread(name="rope", nodes=[0, 4, 2, 3], modulus=1e5, area=2e-4, density=10.0, prestrain=0.02),
 )
 FRAME = refweb.Frame(angular_velocity=(0.3, -0.5, 0.7))
 WHERE = {
     "node": [{}, {"node": 3}, {"node": [1, 2, 4]}, {"node": [5, 0, 3]}],
     "body": [{"body": "ball"}, {"body": "wall"}, {"body": ["wall", "ball"]}],
     "line": [{}, {"line": 0}, {"line": 7}],
+    "thread": [{"thread": "rope"}],
     "component": [{}, *({"component": axis} for axis in "xyz")],
     "to": [{"to": "ball"}],
     "select": [{}, *({"select": choice} for choice in ("max", "min", "abs"))],
@@ -45,6 +47,7 @@ WHERE = {
 """What each key of ``[[observe]]`` is given as; a quantity is looked at for every mixture of those it takes."""
 OWN = {
     "distance": [{"node": [5, 0]}, {"node": 3, "to": "ball"}, {"body": "ball", "to": "wall"}],
+    "length": WHERE["thread"],
     **dict.fromkeys(("mouth_area", "mouth_perimeter"), WHERE["node"][2:]),
 }
 """Places of quantities that are of a few of them together."""
@@ -59,10 +62,9 @@ def tables(name):
     if name in ONE_BODY:
         places = [place for place in places if not isinstance(place.get("body"), list)]
     mixed = [places, *(WHERE[key] for key in ("component", "select", "part") if key in keys)]
-    return [
-        refweb.Observe(name="_", quantity=name, **{key: value for given in parts for key, value in given.items()})
-        for parts in itertools.product(*mixed)
-    ]
+    mixed = [{key: value for given in parts for key, value in given.items()} for parts in itertools.product(*mixed)]
+    mixed += WHERE["thread"] if "thread" in keys and name not in OWN else []  # in place of lines
+    return [refweb.Observe(name="_", quantity=name, **given) for given in mixed]
 
 
 def random_state(law, seed, pieces=2, turning=False):

@@ -164,7 +164,9 @@ def test_a_double_pendulum_on_links_alone():
 def test_nodes_that_nothing_holds_are_refused():
     """Links hold no length in statics and modes, which say so; a node that no link names either is in nothing."""
     lone = hung([[1, 2]], [[0.7, 0.0, 0.0], [0.9, 0.0, 0.0]], [2.0, 1.0], 0.1)
-    with pytest.raises(refweb.InputError, match=r"\[web\] node 3 is used by no line and no \[\[link\]\]"):
+    with pytest.raises(
+        refweb.InputError, match=r"\[web\] node 3 is used by no line, no \[\[link\]\] and no \[\[thread\]\]"
+    ):
         refweb.run(lone)
     with pytest.raises(refweb.InputError, match=r"node 2 has no mass: give density > 0 or a \[\[point_mass\]\]"):
         refweb.run(hung([[1, 2]], [[0.7, 0.0, 0.0]], [], 0.1))

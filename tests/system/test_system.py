@@ -107,8 +107,8 @@ def test_one_power_of_the_lines():
 def test_threads_share_a_system():
     """Two ask for the same at other states, and neither is answered before both have computed.
 
-    A line of 1 m along x and along y that is reeled in: its tension is T = EA (ε + τ ε̇) with ε̇ = −l L'/L² of a line whose
-    ends rest, K = ∂T/∂l e⊗e + T/l (1 − e⊗e), C = τ EA/L e⊗e.
+    A line of 1 m along x and along y that is reeled in: its tension is T = EA (ε + τ ε̇), ε̇ = −l L'/L² of ends at
+    rest, K = ∂T/∂l e⊗e + T/l (1 − e⊗e), C = τ EA/L e⊗e.
     """
     stiffness, time = 1e3, 0.02
     scene = refweb.Scene(

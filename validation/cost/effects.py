@@ -98,6 +98,7 @@ EFFECTS = {
     "viscous, one arm": {"cable": PLAIN["cable"] | {"viscous": {"arms": [[7e7, 1e-3]]}}},
     "lines that may yield": {"cable": PLAIN["cable"] | {"law": "elastic-plastic", "yield_stress": 1e5}},
     "bending": {"bending": {"stiffness": 1e-3}},
+    "thread": {"thread": [{"name": "rope", "nodes": "rim", "modulus": 7e7, "area": 1e-4, "density": 200.0}]},
     "reel": {"reel": [{"lines": "all", "factor": [[0.0, 1.0], [1.0, 0.9]]}]},
     "temperature": {"temperature": {"expansion": 1e-5, "change": -10.0}},
 }

@@ -8,8 +8,8 @@ that is changes with every digit.
 
 Effects that no impact has stand in a small thrown net, an orbit much faster than any among them, so that it shows, a
 box that tumbles into it, one that is tied to its middle, one on an axle, one that falls on a ball, a ball that is
-pressed into it, a line that is reeled in with its mass, and lines so weak that some break; two strings are thrown at
-each other. The three methods have to agree as well, on which lines break, and when.
+pressed into it, a line that is reeled in with its mass, a thread through six of its nodes, and lines so weak that some
+break; two strings are thrown at each other. The three methods have to agree as well, on which lines break, and when.
 
 Where nothing is hit there are digits to compare: 1 kg thrown at 1 m/s from the centre of a square web (smooth law,
 η = 1e-4). Central differences of two step sizes, extrapolated by their order 2, CVODE at rtol = 1e-10 and the explicit
@@ -70,6 +70,12 @@ EFFECTS = {
     "a line that is reeled in with its mass": {
         "reel": [{"lines": 0, "factor": [[0.0, 1.0], [0.2, 0.9], [0.3, 1.0]], "mass": "follows"}],
         "gravity": {"acceleration": [0.0, 0.0, -9.81]},
+    },
+    "a thread through rings on it": {
+        "thread": [
+            {"name": "rope", "nodes": [0, 3, 4, 8, 7, 11], "modulus": 1e6, "area": 1e-5, "density": 1000.0},
+        ],
+        "observe": [*SMALL["observe"], {"name": "rope", "quantity": "length", "thread": "rope", "reduce": "max"}],
     },
     "a ball that is pressed into it": {
         "body": [{"name": "press", "radius": 0.3, "position": [0.0, 0.0, 0.32]}],

@@ -71,7 +71,7 @@ class KineticEnergy(Booked):
 
 
 class StrainEnergy(Booked):
-    """Strain energy of the lines."""
+    """Strain energy of the lines and threads."""
 
     signed = False
 

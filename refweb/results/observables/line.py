@@ -34,7 +34,7 @@ class Line(Observable):
         True if the value has the sign of the tension.
     """
 
-    keys: tuple[str, ...] = ("line", "part", "select")
+    keys: tuple[str, ...] = ("line", "thread", "part", "select")
     at = "line"
     pull = True
 

@@ -62,6 +62,8 @@ class Observe(Table):
         Body at the end of a distance from one node or another body. Without it, the distance is that of two nodes.
     line : int, str or list, optional
         Lines of a line quantity, by number or group, see `refweb.net.groups`; without ``line`` all.
+    thread : str, optional
+        Thread of a tension, stress, strain or length, which is that of the whole thread.
     part : {"start", "middle", "end"}, optional
         Element of each line that a line quantity is looked at in: that at its first node, that at its middle or behind
         it, or that at its last node; without it all elements. A value of an element of order 1 is that of its middle;
@@ -110,6 +112,7 @@ class Observe(Table):
     body: Several = field(_bodies, default=None)
     to: str | None = text(default=None)
     line: Several = nodes(default=None, what="line")
+    thread: str | None = text(default=None, limit=80)
     part: str | None = choice("start", "middle", "end", default=None)
     select: str | None = choice("max", "min", "abs", default=None)
     component: int | None = component(default=None, axes="xyzw")
@@ -122,7 +125,7 @@ class Observe(Table):
             raise InputError(
                 f"name = {quote(self.name)} must have no commas and no quotes: it heads a column of history.csv"
             )
-        for key in ("node", "body", "to", "component", "line", "part", "select"):
+        for key in ("node", "body", "to", "component", "line", "thread", "part", "select"):
             if getattr(self, key) is not None and key not in self.observable.keys:
                 value = quote(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')
@@ -139,6 +142,8 @@ class Observe(Table):
     @property
     def observable(self) -> Any:
         """The `refweb.results.observables.observable.Observable` of the quantity."""
+        if self.thread is not None and self.quantity in ("tension", "stress", "strain"):
+            return load(f"refweb.results.observables.thread:{self.quantity.capitalize()}")(self)
         return load(OBSERVABLES[self.quantity])(self)
 
     @property

@@ -1,0 +1,310 @@
+"""Threads: lines of one material that run through a list of nodes in order, and slide there without friction.
+
+One tension rules a whole thread. With the lengths l_s of its segments, its natural length L and a unit vector t_s along
+each segment, from its first node to its second,
+
+    strain            ε = (Σ l_s − L)/L
+    force on node a   T (t_a − t_(a−1)), of the segment behind it and the one before it
+    stiffness         (dT/dε/L) g⊗g + Σ (T/l_s) (I − t_s⊗t_s) of each segment,      g = ∂(Σ l_s)/∂x
+
+The energy L ∫T dε is convex in the positions where that of the law is, and T is not negative. The first part of the
+stiffness couples every node with every other: of n nodes the matrix has a dense block of 9 n² numbers.
+
+A segment that gets short turns fast: T/l_s has no bound. The bound of explicit steps takes T and l_s as they are at
+each row of the history.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..compiled.rows import record_at
+from ..errors import InputError
+from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..messages import quote
+from ..net.law_keys import numbers_by_name, points
+from ..net.materials import MATERIALS
+from ..net.threads import ThreadLine
+from ..registry import LAWS
+from ..tables import Several, Table, boolean, choice, nodes, real, table, text
+from .base import Balance, ForceTerm, Tangent
+from .line_kernels import line_at
+
+if TYPE_CHECKING:
+    from ..net.net import Net
+
+COLUMNS = 4
+"""Numbers that the force observes: tension [N], stress [Pa], strain [1] and length [m]."""
+TAUT = 0.01
+"""Strain up to which bounds of steps hold for tensions that are not there yet."""
+OF_CABLE = ("law", "material", "modulus", "area", "density", "slackness", "smoothing", "stress", "tension")
+OF_CABLE += ("parameters", "prestrain")
+"""Keys that mean what they mean in ``[cable]``."""
+
+
+@functools.cache
+def kernels(law, record, width):
+    """Force, energy, stiffness and bound kernels.
+
+    Parameters
+    ----------
+    law : type
+        Law of the thread.
+    record : numpy.dtype
+        Numbers of a line that it reads.
+    width : int
+        Columns of a cell ahead of 1/A and of the vector and distance of each segment in the web's position.
+    """
+    stress, tangent, energy_density = law.stress, law.tangent, law.energy_density
+
+    @kernel(forceinline=True)
+    def segment(x, cells, data, c, s):
+        """(Vector, 1/length or 0, length, length less that in the web's position) of segment s of cell c."""
+        i, j, k = cells[c, s], cells[c, s + 1], width + 1 + 4 * s
+        r0, r1, r2, distance = data[c, k], data[c, k + 1], data[c, k + 2], data[c, k + 3]
+        u0, u1, u2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+        p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
+        length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
+        square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2
+        both = length + distance
+        return p0, p1, p2, 1.0 / length if length > 0.0 else 0.0, length, square / both if both > 0.0 else 0.0
+
+    @kernel()
+    def strain_of(x, cells, data, c):
+        line = line_at(data, c)
+        longer = line.distance - line.natural_length
+        for s in range(cells.shape[1] - 1):
+            longer += segment(x, cells, data, c, s)[5]
+        return longer / line.natural_length
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            line, strain = record_at(record, data, c, 0), strain_of(x, cells, data, c)
+            tension = stress(strain, line)
+            for s in range(cells.shape[1] - 1):
+                p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
+                i, j, scale = cells[c, s], cells[c, s + 1], tension * inverse
+                f[i, 0] += scale * p0
+                f[i, 1] += scale * p1
+                f[i, 2] += scale * p2
+                f[j, 0] -= scale * p0
+                f[j, 1] -= scale * p1
+                f[j, 2] -= scale * p2
+            out[c, 0], out[c, 1], out[c, 2] = tension, tension * data[c, width], strain
+            out[c, 3] = line.natural_length * (1.0 + strain)
+
+    @kernel(ENERGY)
+    def energy(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            line = record_at(record, data, c, 0)
+            out[c] = line.natural_length * energy_density(strain_of(x, cells, data, c), line)
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        size = 3 * cells.shape[1]
+        g = np.empty(size)
+        for c in range(cells.shape[0]):
+            line, strain = record_at(record, data, c, 0), strain_of(x, cells, data, c)
+            along, tension = tangent(strain, line) / line.natural_length, stress(strain, line)
+            if definite and tension < 0.0:
+                tension = 0.0
+            for i in range(size):
+                g[i] = 0.0
+            for s in range(cells.shape[1] - 1):
+                p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
+                p = (p0 * inverse, p1 * inverse, p2 * inverse)
+                for k in range(3):
+                    g[3 * s + k] -= p[k]
+                    g[3 * s + 3 + k] += p[k]
+            for i in range(size):
+                for j in range(size):
+                    blocks[c, i, j] = along * g[i] * g[j]
+            for s in range(cells.shape[1] - 1):
+                p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
+                p = (p0 * inverse, p1 * inverse, p2 * inverse)
+                for k in range(3):
+                    for m in range(3):
+                        across = tension * inverse * ((1.0 if k == m else 0.0) - p[k] * p[m])
+                        first, second = 3 * s + k, 3 * s + m
+                        blocks[c, first, second] += across
+                        blocks[c, first + 3, second + 3] += across
+                        blocks[c, first, second + 3] -= across
+                        blocks[c, first + 3, second] -= across
+
+    @kernel(BOUND)
+    def bound(reach, speed, x, mass, rates, cells, data):
+        # Parts of g are 1 at most for each end of a segment, and 2 of each segment together.
+        for c in range(cells.shape[0]):
+            line, segments = record_at(record, data, c, 0), cells.shape[1] - 1
+            along = 2.0 * segments * abs(line.ea) / line.natural_length
+            tension = abs(stress(strain_of(x, cells, data, c), line))
+            for s in range(segments):
+                inverse, distance = segment(x, cells, data, c, s)[3], data[c, width + 4 + 4 * s]
+                soon = TAUT * abs(line.ea) / max(distance, TAUT * line.natural_length)
+                across = 2.0 * max(tension * inverse, soon)
+                rates[cells[c, s]] += along + across
+                rates[cells[c, s + 1]] += along + across
+
+    return force, energy, stiffness, bound
+
+
+@table
+class Thread(Table):
+    """A thread of one material through a list of nodes, on which it slides without friction.
+
+    A drawstring, a rope over pulleys or a line with rings on it: one tension rules all of it, by the sum of the
+    distances of neighbours in the list. Nodes may be free, supported, moved, or on a body by ``[[attach]]``. A thread
+    may pass a node several times, as a tackle does. It does not touch bodies or lines, and does not break. Rings that
+    nothing keeps apart slide together; statics finds no equilibrium there, where the thread has no direction.
+
+    Its mass is shared by its nodes, half of each segment to either end as it lies in the web's position, and stays
+    there: material that slides through a ring brings no mass along. Where masses of a thread count beside those of its
+    nodes, use lines. Explicit steps are as short as with lines of the same material from node to node; in matrices a
+    thread of n nodes is a dense block of 9 n² numbers. In statics errors of a scene with a thread are estimates, not
+    proven bounds. Reels, heat, material damping and ``[rupture]`` are of lines alone: to pull a thread in, move its
+    end.
+
+    Parameters
+    ----------
+    name : str
+        Name of the thread, for observables.
+    nodes : list or str
+        Two nodes or more in the order of the thread, by number or name; or one name of several nodes, counterclockwise
+        around their middle.
+    closed : bool
+        True if the thread runs on from its last node to the first.
+    length : float, optional
+        Natural length [m]; by default the sum of the distances over 1 + ``prestrain``.
+    prestrain : float
+        Strain in the web's position [1], > −1; negative is slack.
+    law : {"tension-only", "smooth", "table"}
+        Tension law, as in ``[cable]``; or that of another package, unless it is one of bars or of form finding, or
+        yields.
+    material, modulus, area, density, slackness, smoothing, stress, tension, parameters
+        As in ``[cable]``.
+
+    Raises
+    ------
+    InputError
+        For fewer than two nodes, a node that follows itself, ``length`` beside ``prestrain``, a law of bars, of form
+        finding or that yields, and what ``[cable]`` refuses. From ``extend``, for a name that is listed twice, one that
+        is not one node of the web, and nodes that are all in one point.
+
+    Examples
+    --------
+        [[thread]]
+        name = "rope"
+        nodes = [0, "centre", 1]
+        modulus = 1e9
+        area = 1e-5
+        density = 970.0
+    """
+
+    several = True
+    either = ("modulus", "density"), ("material",), ("stress", "density"), ("tension", "density")
+
+    name: str = text(limit=80)
+    nodes: Several = nodes()
+    closed: bool = boolean(default=False)
+    length: float | None = real(default=None, above=0.0, unit="m")
+    prestrain: float = real(default=0.0, above=-1, unit="1")
+    law: str = choice(LAWS, default="tension-only")
+    material: str | None = choice(*MATERIALS, default=None)
+    modulus: Any = real(default=None, above=0, unit="Pa")
+    area: float = real(above=0, unit="m²")
+    density: Any = real(default=None, at_least=0, unit="kg/m³")
+    slackness: float | None = real(default=None, at_least=0, unit="1")
+    smoothing: float | None = real(default=None, at_least=0, unit="1")
+    stress: Any = points(unit="Pa")
+    tension: Any = points(unit="N")
+    parameters: dict | None = numbers_by_name()
+
+    def check(self) -> None:
+        """Refuse fewer than two nodes, a node that follows itself, two lengths, and what a cable refuses."""
+        from ..net.tension_laws import law_of
+
+        if isinstance(self.nodes, int) or (isinstance(self.nodes, tuple) and len(self.nodes) < 2):
+            raise InputError(f"nodes = {quote(self.nodes)} must be a list of two nodes or more, or a name of several")
+        if isinstance(self.nodes, tuple):
+            self._refuse_repeated(self.nodes)
+        if self.length is not None and self.prestrain != 0.0:
+            raise InputError(
+                f"length = {self.length:g} and prestrain = {self.prestrain:g} both say what the natural length is: "
+                "leave one of them out"
+            )
+        law = law_of(self.law)
+        if law.bar or law.forming or law.plastic:
+            why = "is one of bars, which push" if law.bar else "is for form finding" if law.forming else "yields"
+            raise InputError(f'law = "{self.law}" {why}: a thread takes "tension-only", "smooth" or "table"')
+        self._cable()
+
+    def _refuse_repeated(self, listed):
+        """Refuse neighbours that are one node."""
+        ends = [*listed, listed[0]] if self.closed else listed
+        for i, (first, second) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+            if first == second:
+                why = "closes to itself: leave out the last" if i + 1 == len(listed) else "follows itself"
+                raise InputError(f"nodes[{i}] = {quote(first)} {why}")
+
+    def _cable(self):
+        """The `refweb.Cable` of its material and law."""
+        from ..net.cable import Cable
+
+        return Cable(**{key: getattr(self, key) for key in OF_CABLE})
+
+    def extend(self, net: Net) -> Net:
+        """The net with the thread and its mass."""
+        from ..net.threads import thread_line
+
+        if any(thread.name == self.name for thread in net.threads):
+            raise InputError(f"name = {quote(self.name)} is listed twice: names of threads are unique")
+        rows = self._rows(net.web)
+        thread = thread_line(self.name, net.web.points[rows], rows, self._cable(), self.length)
+        mass = net.mass.copy()
+        np.add.at(mass, rows[:-1], 0.5 * thread.masses)
+        np.add.at(mass, rows[1:], 0.5 * thread.masses)
+        return replace(net, mass=mass, threads=(*net.threads, thread), kept=(*net.kept, *thread.line.kept))
+
+    def _rows(self, web):
+        """Numbers of its nodes in order, the first again at the end of a closed thread, int32."""
+        if isinstance(self.nodes, str):
+            rows = web.find_around(self.nodes).tolist()
+            if len(rows) < 2:
+                raise InputError(f"nodes = {quote(self.nodes)} is {len(rows)} node, must be two or more")
+        else:
+            rows = []
+            for i, node in enumerate(self.nodes):
+                numbers = web.find(node, f"nodes[{i}]").tolist()
+                if len(numbers) != 1:
+                    raise InputError(f"nodes[{i}] = {quote(node)} is {len(numbers)} nodes, must be one")
+                rows += numbers
+        self._refuse_repeated(rows)
+        return np.array([*rows, rows[0]] if self.closed else rows, dtype=np.int32)
+
+    def on(self, net: Net) -> ForceTerm:
+        """The term of one cell, whose ``out`` is tension, stress, strain and length."""
+        return _term(next(thread for thread in net.threads if thread.name == self.name))
+
+
+def _term(thread: ThreadLine):
+    """The term of a thread."""
+    line = thread.line
+    numbers = line.line_data.matrix
+    force, energy, stiffness, bound = kernels(line.law, line.law_record, numbers.shape[1])
+    segments = np.column_stack([thread.vectors, thread.distances])
+    return ForceTerm(
+        name="thread",
+        cells=thread.rows[None, :],
+        data=np.concatenate([numbers[0], 1.0 / line.area, segments.ravel()])[None, :],
+        force=force,
+        energy=energy,
+        tangent=Tangent(stiffness, bound, across=thread.across),
+        balance=Balance("strain_energy", internal=True),
+        observed=COLUMNS,
+    )
