@@ -292,7 +292,7 @@ class Newton:
         return next_iterate if residual(self.system, next_iterate.force, scale) < error else iterate
 
     def _remedy(self):
-        """What to try where no equilibrium was found."""
+        """Remedy for a load step without an equilibrium, in words."""
         net = self.system.net
         if net.law_is("plastic").any():
             return "above the limit load of lines that yield there is none: lower the loads, or raise yield_stress"
