@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .effects.rupture import Rupture as Rupture
     from .effects.self_contact.table import SelfContact as SelfContact
     from .effects.temperature import Temperature as Temperature
+    from .effects.thread import Thread as Thread
     from .effects.thrust import Thrust as Thrust
     from .effects.velocity import Velocity as Velocity
     from .errors import InputError as InputError

@@ -232,6 +232,9 @@ ALIKE = (
     "ring-on-slack-cable",
     "closing-net",
     "by ida",
+    "reeled-tether",
+    "winch-drum",
+    "platform-on-ropes",
 )
 """Scenes that call for what others call for, on another web, or each part of which others call for."""
 

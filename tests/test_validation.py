@@ -33,6 +33,9 @@ LONG = (
     "frequencies",
     "drag_and_link",
     "cable_law",
+    "winches",
+    "free_net",
+    "price_of_modelling",
 )
 """Cases that take more than two seconds with ``--quick``; what they show has tests of its own beside them."""
 

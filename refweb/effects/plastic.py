@@ -10,9 +10,9 @@ The state of a line is its plastic strain p ≥ 0. With the yield stress Y(p), w
 A line that does not push yields in one direction alone, so that p is the largest that the strain has asked for. Within
 a step the energy that it loses, the area of its loops, is a function of p, and the sum of both energies is the
 incremental potential: convex in the strain, and its gradient is the tension for any p of before. So states of steps
-that do not turn back need no history within the step. L is the natural length at the time at which the line yields:
-material that a reel pays out has lost nothing. Beside ``law = "elastic-plastic"``, whose term has the elastic tension
-of p = 0, this term has the rest.
+that do not turn back need no history within the step. L is the natural length at which the line yields, at the end of
+a step: material that a reel pays out has lost nothing. Beside ``law = "elastic-plastic"``, whose term has the elastic
+tension of p = 0, this term has the rest.
 
 p stands in rows behind all places, see `refweb.effects.base.InternalVariables`, three quadrature points to a row, and
 the energy that is lost over A Y(0) [m] in as many rows behind those of the element. They are no unknowns: explicit

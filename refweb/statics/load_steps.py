@@ -82,10 +82,10 @@ def _refuse_far(system, t, state):
     if distance.max() > FAR * size:
         reason, remedy = "as forces that do not grow with the length of lines cannot carry the loads", "pretension"
         if not net.forming.any():
-            reason, remedy = "above the limit load, which lines that yield cannot carry", "yield_stress or hardening"
+            reason, remedy = "as lines that yield cannot carry loads above the limit load", "yield_stress or hardening"
         raise NotFound(
             f"no equilibrium at load step {t:g}: node {distance.argmax()} goes further than {FAR:g} times the size of "
-            f"the web, {reason}: lower the loads, or raise {remedy}",
+            f"the web, {reason}: lower these, or raise {remedy}",
             state.stats,
         )
 

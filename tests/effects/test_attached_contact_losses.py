@@ -257,6 +257,7 @@ def test_central_differences_have_their_order_towards_cvode():
         assert one.solver["momentum_drift"] < 1e-13 and one.solver["angular_momentum_drift"] < 1e-13
 
 
+@pytest.mark.slow
 def test_a_bridle_that_wraps_is_that_of_cvode():
     """A box that rubs on the lines it carries, with damped lines besides, which kicks iterate with what they solve."""
     given = lambda **keys: bridled(contact=RUBBED, solve={"kind": "dynamic", "duration": 0.1} | keys)  # noqa: E731

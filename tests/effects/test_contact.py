@@ -811,6 +811,7 @@ def overlapping(shape, contact, mass, seed):
     return system, x, np.repeat(system.net.mass, 3)[system.free]
 
 
+@pytest.mark.ordinary("1e-05-*-1", "0.001-*-1.5", "1.0-*-1", "1000.0-*-1.5")
 @pytest.mark.parametrize("exponent", [1, 1.5])
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("mass", [1e-5, 1e-3, 1.0, 1e3])

@@ -244,6 +244,9 @@ def polygon(links, length, axial, weight, span):
         return joints, np.array(tension, dtype=float), float(H)
 
 
+@pytest.mark.ordinary(
+    "0.0-700000.0-tension-only", "0.7-70000000.0-linear", "0.0-7000000000.0-linear", "0.7-7000000000.0-tension-only"
+)
 @pytest.mark.parametrize("name", ["tension-only", "linear"])
 @pytest.mark.parametrize("modulus", [7e5, 7e7, 7e9])
 @pytest.mark.parametrize("drop", [0.0, 0.7])
