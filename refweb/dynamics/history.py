@@ -48,6 +48,12 @@ def _probes_of_warnings(system, followed, step_size):
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
         for name, (column, scale) in scales.items()
     }
+    curved = {i: thread for i, thread in system.threads.items() if thread.line.curve_scale is not None}
+    if curved:
+        from ..results.observables.thread import of_cell
+
+        none = np.zeros((0, 0))
+        by_name |= {t.title: probes.Probe(of_cell, [2], none, sign=1.0, term=i) for i, t in curved.items()}
     if system.weakness is not None and system.weakness.strains is not None:
         by_name["break"] = probes.share_of_limits(system)
     if system.orbit_radius is not None:
@@ -380,6 +386,12 @@ class Watch:
         if (at := self._of_warning("curve")) is None:
             return None
         return float(course.extremes.values[at]), int(course.extremes.places[at])
+
+    def shares_of_threads(self, course):
+        """Pairs of a thread and its largest strain over the last one of its curve in all steps [1], a list."""
+        threads = [thread for thread in self.system.net.threads if self._of_warning(thread.title) is not None]
+        values = course.extremes.values
+        return [(t, float(values[self._of_warning(t.title)] * t.line.curve_scale[0])) for t in threads]
 
     def overlap_of_lines(self, course):
         """(Deepest overlap of lines in all steps [m], its time [s], its cell), None where lines do not touch lines."""

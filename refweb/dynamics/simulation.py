@@ -309,6 +309,7 @@ class Simulation:
         if (used := watch.utilisation(course)) is not None:
             solution.utilisation, solution.margin = used, watch.margin(course)
         self._strain, self._share_of_curve = watch.strain(course), watch.share_of_curve(course)
+        self._shares_of_threads = watch.shares_of_threads(course)
         if self.overlaps is not None:
             solution.bodies = self.overlaps.plain()
             if (pairs := self.overlaps.pairs) is not None:
@@ -366,6 +367,8 @@ class Simulation:
         yield from strain_remark(self.system.net, self._strain)
         if self._share_of_curve is not None:
             yield from curve_remark(self.system.net, *self._share_of_curve)
+        for thread, share in self._shares_of_threads:
+            yield from curve_remark(thread.line, share, 0, thread.title)
         yield from self.system.remarks()
         if self.overlaps is not None:
             yield from self.overlaps.remarks()

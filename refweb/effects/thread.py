@@ -175,8 +175,8 @@ class Thread(Table):
     name : str
         Name of the thread, for observables.
     nodes : list or str
-        Two nodes or more in the order of the thread, by number or name; or one name of several nodes, counterclockwise
-        around their middle.
+        Two nodes or more in the order of the thread, by number or name; or one name of several nodes, in the order of
+        the name, of a closed thread counterclockwise around their middle.
     closed : bool
         True if the thread runs on from its last node to the first.
     length : float, optional
@@ -274,7 +274,7 @@ class Thread(Table):
     def _rows(self, web):
         """Numbers of its nodes in order, the first again at the end of a closed thread, int32."""
         if isinstance(self.nodes, str):
-            rows = web.find_around(self.nodes).tolist()
+            rows = (web.find_around if self.closed else web.find)(self.nodes).tolist()
             if len(rows) < 2:
                 raise InputError(f"nodes = {quote(self.nodes)} is {len(rows)} node, must be two or more")
         else:

@@ -38,6 +38,11 @@ class ThreadLine(NamedTuple):
     line: Net
 
     @property
+    def title(self) -> str:
+        """Its name in messages."""
+        return f'thread "{self.name}"'
+
+    @property
     def natural_length(self) -> float:
         """Natural length [m]."""
         return float(self.line.natural_length[0])

@@ -231,15 +231,18 @@ def strain_remark(net: Net, strain: tuple[float, int]) -> Iterator[Finding]:
         )
 
 
-def curve_remark(net: Net, share: float, element: int) -> Iterator[Finding]:
-    """Find a strain beyond the last point of the curve of an element, by the largest ``share`` of that strain."""
+def curve_remark(net: Net, share: float, element: int, name: str = "") -> Iterator[Finding]:
+    """Find a strain beyond the last point of the curve of an element, by the largest ``share`` of that strain.
+
+    ``name`` is that of the line in messages, by default its number.
+    """
     if share > 1.0:
-        last = net.line_data.last_strain[element]
+        last, line = net.line_data.last_strain[element], name or f"line {net.line[element]}"
         yield Finding(
             "beyond-curve",
-            f"line {net.line[element]} is strained by {100.0 * share * last:.4g} %, beyond the last point of its curve "
-            f"at {100.0 * last:.4g} %, where its last slope goes on: give the curve more points, or lower what acts",
-            "cable",
+            f"{line} is strained by {100.0 * share * last:.4g} %, beyond the last point of its curve at "
+            f"{100.0 * last:.4g} %, where its last slope goes on: give the curve more points, or lower what acts",
+            "thread" if name else "cable",
         )
 
 

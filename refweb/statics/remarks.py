@@ -128,6 +128,10 @@ def remarks_on(state, stats, utilisation, equilibrium):
     if (scale := net.curve_scale) is not None:
         shares = state.element_strain * scale
         yield from curve_remark(net, float(shares.max()), int(shares.argmax()))
+    for thread in net.threads:
+        if (scale := thread.line.curve_scale) is not None:
+            share = float(state.threads[thread.name][2] * scale[0])
+            yield from curve_remark(thread.line, share, 0, thread.title)
     yield from collapse_remark(state)
 
 

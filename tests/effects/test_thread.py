@@ -409,3 +409,36 @@ def test_names_are_unique():
     rope = {**ROPE, "nodes": [0, 2, 1]}
     with pytest.raises(refweb.InputError, match=r'\[\[thread\]\] 2 name = "rope" is listed twice'):
         scene([[0, 0, 0], [2, 0, 0], [1, 0, -1]], [0, 1], {}, {"kind": "static"}, thread=[rope, rope]).build()
+
+
+RING = {
+    "web": {"kind": "inline", "points": [[-1, 0, 0], [1, 0, 0.5], [0.1, 0, -0.8]], "lines": [[0, 1]]}
+    | {"supports": [0, 1], "names": {"way": [0, 2, 1]}},
+    "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-5, "density": 970.0},
+    "gravity": {"acceleration": [0.0, 0.0, -9.81]},
+    "point_mass": [{"node": 2, "mass": 3.0}],
+}
+"""A ring on a thread between two supports."""
+
+
+@pytest.mark.parametrize("solve", [{"kind": "static"}, {"kind": "dynamic", "duration": 0.05}])
+def test_a_strain_beyond_the_curve_is_said(solve):
+    """The ring needs more than the 15 N at which the curve of the thread ends."""
+    curve = [[0.0, 0.0], [0.0005, 5.0], [0.001, 15.0]]
+    thread = {"name": "t", "nodes": [0, 2, 1], "area": 1e-5, "density": 0.0, "law": "table", "length": 2.6}
+    run = refweb.run(refweb.Scene.from_dict(RING | {"thread": [thread | {"tension": curve}], "solve": solve}))
+    said = [finding.text for finding in run.findings if finding.code == "beyond-curve"]
+    assert len(said) == 1 and said[0].startswith('thread "t" is strained by')
+    enough = [*curve, [0.5, 1e5]]
+    run = refweb.run(refweb.Scene.from_dict(RING | {"thread": [thread | {"tension": enough}], "solve": solve}))
+    assert not any(finding.code == "beyond-curve" for finding in run.findings)
+
+
+def test_an_open_thread_runs_in_the_order_of_a_name():
+    thread = {"name": "t", "area": 1e-5, "density": 0.0, "modulus": 1e9, "length": 2.6}
+    tensions = [
+        refweb.run(refweb.Scene.from_dict(RING | {"thread": [thread | {"nodes": nodes}], "solve": {"kind": "static"}}))
+        .state.threads["t"][0]
+        for nodes in ("way", [0, 2, 1])
+    ]  # fmt: skip
+    assert tensions[0] == tensions[1] < 29.43
