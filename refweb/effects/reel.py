@@ -31,7 +31,7 @@ class Reel(Table):
     mass : {"stays", "follows"}
         "stays": nodes keep their mass. "follows": a line has the mass of its natural length. Material leaves and comes
         through the drum, at the velocity of the drum's node, with its momentum and its energy, which counts as
-        ``work``. The mass of the drum stays, and so does the share of a line's end that is on a body. Forces of the
+        ``work``. Point masses and bodies keep theirs, a body with the share of a line's end on it. Forces of the
         size ρA (dL/dt)², of material that slides along the line, are left out.
     drum : int, str or list, optional
         Node at the drum, with ``mass = "follows"``: one of each connected part of the lines. By default the one that is

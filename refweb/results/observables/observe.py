@@ -128,7 +128,8 @@ class Observe(Table):
         for key in ("node", "body", "to", "component", "line", "thread", "part", "select"):
             if getattr(self, key) is not None and key not in self.observable.keys:
                 value = quote(getattr(self, key))
-                raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')
+                beside = " of a thread" if self.thread is not None and key != "thread" else ""
+                raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"{beside}')
         if self.component == 3 and self.quantity != "orientation":
             raise InputError(f'component = "w" has no meaning for quantity = "{self.quantity}"')
         if self.node is not None and self.body is not None:
