@@ -360,6 +360,7 @@ def bridled(**tables):
     return refweb.Scene.from_dict(given | tables)
 
 
+@pytest.mark.slow
 def test_books_of_a_bridle_close(tmp_path):
     """Energy by the order, momentum to rounding; both faces of observables agree; frames have the nodes at the box."""
     drifts = []

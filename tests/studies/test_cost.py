@@ -407,7 +407,9 @@ def test_auto_does_not_take_friction_for_damping():
 DYNAMIC_SCENES = [path.stem for path in sorted(scenes.SHIPPED_SCENES.glob("*.toml")) if "duration" in path.read_text()]
 
 
-@pytest.mark.parametrize("name", DYNAMIC_SCENES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n == "capture-satellite")) for n in DYNAMIC_SCENES]
+)
 @pytest.mark.parametrize("digits", [None, 8])
 def test_auto_takes_every_shipped_scene(name, digits):
     """The solver that is chosen can be built, which it refuses where it does not take the scene."""
