@@ -27,6 +27,7 @@ from .time_tables import flattened, interpolate
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..net.net import Net
     from ..system.system import System
 
 
@@ -40,7 +41,7 @@ class MassFlow(NamedTuple):
     elements : ndarray of int, shape (elements,)
         Elements of the lines.
     rows : ndarray of int, shape (nodes,)
-        Their nodes but for those on bodies.
+        Their nodes.
     mass : ndarray, shape (nodes,)
         Mass of each that a factor of 1 is worth [kg].
     table : sequence of (t, factor)
@@ -55,6 +56,10 @@ class MassFlow(NamedTuple):
     mass: np.ndarray
     table: tuple
     drums: np.ndarray | None
+
+    def off_bodies(self, net: Net) -> NDArray[np.bool_]:
+        """True for each of the nodes that no body carries: the share of a line's end on a body stays."""
+        return ~np.isin(self.rows, [node for body in net.bodies for node in body.carried])
 
 
 class FollowedMass(Record):

@@ -110,9 +110,9 @@ def damping_bound(reach, speed, x, mass, rates, cells, data):
 
 def force_terms(net, frame, pull, name):
     """The two terms of each flow of a net, see `refweb.effects.turning_axes.force_terms`."""
-    terms, on_bodies = [], [node for body in net.bodies for node in body.carried]
+    terms = []
     for flow in net.flows:
-        moves = ~np.isin(flow.rows, on_bodies)
+        moves = flow.off_bodies(net)
         rows, data = flow.rows[moves], np.zeros(np.count_nonzero(moves), FLOW)
         added = [(t, factor - 1.0) for t, factor in flow.table]
         data["pull"], data["speed"], data["mass"] = pull, frame.angular_velocity, flow.mass[moves]

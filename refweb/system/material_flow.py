@@ -32,11 +32,9 @@ class MaterialFlow:
 
     def __init__(self, system):
         self._net = net = system.net
-        on_bodies = [node for body in net.bodies for node in body.carried]
         self.flows = []
         for flow in net.flows:
-            drums = _drums(system, flow)
-            moves = ~np.isin(flow.rows, on_bodies)
+            drums, moves = _drums(system, flow), flow.off_bodies(net)
             self.flows.append(flow._replace(rows=flow.rows[moves], mass=flow.mass[moves], drums=drums[moves]))
         frames = [term.frame.angular_velocity for term in system.rotating]
         self.speed = np.array(frames[0] if frames else (0.0, 0.0, 0.0), dtype=float)
