@@ -20,7 +20,7 @@ matrix and knows no other effect.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -285,6 +285,33 @@ class InternalVariables(NamedTuple):
     relax: Callable
     space: int
     follower: Any = None
+
+
+def with_internal(net: Net, name: str, each: int, length_force: Callable[[Net], Any]) -> Net:
+    """The net with rows for ``each`` internal variables of every element behind all others, three to a row.
+
+    The first row of an element stands in a new column ``name`` of line data. ``length_force`` makes the kernel of ∂E/∂L
+    of the net, internal variables included.
+    """
+    count, width = len(net.cells), -(-each // 3)
+    more = np.zeros((width * count, 3))
+    return replace(
+        net.with_column(name, float(len(net.points)) + width * np.arange(count)),
+        points=np.vstack([net.points, more]),
+        mass=np.append(net.mass, more[:, 0]),
+        spins=net.spins + len(more),
+        internal=len(more),
+        length_force=length_force,
+    )
+
+
+def with_numbers(net: Net, x: NDArray[np.float64] | None, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Displacement of all rows, by default 0, with other internal variables, shape (elements, each)."""
+    x = np.zeros(net.points.shape) if x is None else x.copy()
+    rows = np.zeros((len(net.cells), 3 * (net.internal // len(net.cells))))
+    rows[:, : numbers.shape[1]] = numbers
+    x[len(x) - net.internal :] = rows.reshape(-1, 3)
+    return x
 
 
 @dataclass(frozen=True, eq=False)

@@ -263,9 +263,8 @@ class Damping(Table):
 
             refuse_beside(net, f"time = {self.time:g} [s]")
         if self.time:
-            element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
             at, changing = net.line_data.column("damping_time"), len(net.factors) > 0
-            force, stiffness, damping, bound = kernels(net.law, net.law_record, at, changing, *element)
+            force, stiffness, damping, bound = kernels(net.law, net.law_record, at, changing, *net.quadrature)
             terms.append(
                 ForceTerm(
                     name="damping",

@@ -18,7 +18,7 @@ from ..compiled.rows import record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..tables import Table, table
 from .base import LINE_OUT, Balance, ForceTerm, Tangent
-from .line_kernels import line_at, pull_together, strain
+from .line_kernels import add_row_sums, add_stiffness, line_at, pull_together, strain
 
 
 @functools.cache
@@ -105,13 +105,7 @@ def kernels(law, record, gradients, weights):
                 tension = stress(e, line)
                 across = 0.0 if definite and tension < 0.0 else weights[q] * tension * inverse
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
-                for a in range(nodes):
-                    for b in range(nodes):
-                        d = flat[q * nodes + a] * flat[q * nodes + b]
-                        for i in range(3):
-                            for j in range(3):
-                                blocks[c, 3 * a + i, 3 * b + j] += d * (along - across) * p[i] * p[j]
-                            blocks[c, 3 * a + i, 3 * b + i] += d * across
+                add_stiffness(blocks, c, q, nodes, flat, along, across, p)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
@@ -119,11 +113,7 @@ def kernels(law, record, gradients, weights):
             line = line_at(data, c)
             axial = abs(line.ea) / line.natural_length
             for q in range(points):
-                total = 0.0
-                for a in range(nodes):
-                    total += abs(flat[q * nodes + a])
-                for a in range(nodes):
-                    rates[np.uint64(cells[c, a])] += weights[q] * abs(flat[q * nodes + a]) * total * axial
+                add_row_sums(rates, cells, c, q, nodes, flat, weights[q], axial)
 
     @kernel(ENERGY)
     def every_strain(t, x, cells, data, out):
@@ -147,7 +137,7 @@ def kernels(law, record, gradients, weights):
 
 def of(net):
     """The kernels for the laws and the element of a net."""
-    return kernels(net.law, net.law_record, tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist()))
+    return kernels(net.law, net.law_record, *net.quadrature)
 
 
 def strains(net, x):

@@ -65,6 +65,34 @@ def strain(x, cells, data, c, q, nodes, gradients):
 
 
 @kernel(forceinline=True)
+def add_stiffness(blocks, c, q, nodes, gradients, along, across, p):
+    """Add the stiffness along the direction p and ``across`` it, at quadrature point q, to the block of cell c."""
+    for a in range(nodes):
+        for b in range(nodes):
+            d = gradients[q * nodes + a] * gradients[q * nodes + b]
+            for i in range(3):
+                for j in range(3):
+                    blocks[c, 3 * a + i, 3 * b + j] += d * (along - across) * p[i] * p[j]
+                blocks[c, 3 * a + i, 3 * b + i] += d * across
+
+
+@kernel(forceinline=True)
+def add_row_sums(rates, cells, c, q, nodes, gradients, weight, axial):
+    """Add the row sums of |K| of a stiffness EA/L ``axial`` [N/m] at quadrature point q to those of nodes of cell c."""
+    total = 0.0
+    for a in range(nodes):
+        total += abs(gradients[q * nodes + a])
+    for a in range(nodes):
+        rates[np.uint64(cells[c, a])] += weight * abs(gradients[q * nodes + a]) * total * axial
+
+
+@kernel(forceinline=True)
+def internal_number(x, row, n):
+    """Number n of an element whose internal variables begin at a row, see `refweb.effects.base.with_internal`."""
+    return x[row + n // 3, n % 3]
+
+
+@kernel(forceinline=True)
 def pull_together(f, cells, c, q, nodes, gradients, scale, p0, p1, p2):
     """Add the forces −``scale`` dN/dξ dx/dξ of a tension at quadrature point q to the nodes of cell c."""
     for a in range(nodes):

@@ -45,12 +45,8 @@ GROWTH = "growth"
 
 
 def work_of_lengths(net):
-    """The kernel (signature `refweb.kernels.ENERGY`) of ∂E/∂L of each element [N], of its law and its arms."""
-    if not net.internal:
-        return length_force(net)
-    from . import plastic, viscous
-
-    return (viscous if viscous.ROW in net.line_data.dtype.names else plastic).length_force(net)
+    """The kernel (signature `refweb.kernels.ENERGY`) of ∂E/∂L of each element [N], internal variables included."""
+    return (net.length_force or length_force)(net)
 
 
 class NaturalLengths(Record):

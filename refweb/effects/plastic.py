@@ -14,16 +14,16 @@ that do not turn back need no history within the step. L is the natural length a
 a step: material that a reel pays out has lost nothing. Beside ``law = "elastic-plastic"``, whose term has the elastic
 tension of p = 0, this term has the rest.
 
-p stands in rows behind all places, see `refweb.effects.base.InternalVariables`, three quadrature points to a row, and
-the energy that is lost over A Y(0) [m] in as many rows behind those of the element. They are no unknowns: explicit
-steps take them on at their ends, load steps of statics at equilibria, and CVODE and IDA between their steps, which end
-where a line that yields turns back.
+Numbers of each element stand in rows behind all places, see `refweb.effects.base.InternalVariables`: p of each
+quadrature point, then the energy that each has lost over A Y(0) [m]. They are no unknowns: explicit steps take them on
+at their ends, load steps of statics at equilibria, and CVODE and IDA between their steps, which end where a line that
+yields turns back.
 """
 
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,8 +32,8 @@ from ..compiled.rows import record_at
 from ..kernels import ENERGY, FORCE, RELAX, STIFFNESS, kernel
 from ..net.plastic_keys import yield_curves
 from . import elasticity
-from .base import LINE_OUT, Balance, ForceTerm, InternalVariables, Tangent, no_force
-from .line_kernels import line_at, pull_together, strain
+from .base import LINE_OUT, Balance, ForceTerm, InternalVariables, Tangent, no_force, with_internal, with_numbers
+from .line_kernels import add_stiffness, internal_number, line_at, pull_together, strain
 
 if TYPE_CHECKING:
     from ..net.cable import Cable
@@ -63,7 +63,7 @@ def kernels(law, record, first, corners, gradients, weights):
     weights : tuple of float
         Quadrature weights.
     """
-    points, nodes, width = len(gradients), len(gradients[0]), _rows_of(len(gradients))
+    points, nodes = len(gradients), len(gradients[0])
     flat, stress = tuple(value for row in gradients for value in row), law.stress
     by_law_alone = elasticity.kernels(law, record, gradients, weights)[-1]
 
@@ -101,12 +101,13 @@ def kernels(law, record, first, corners, gradients, weights):
     @kernel(forceinline=True)
     def state_of(x, data, c, q):
         """p of before at quadrature point q of cell c."""
-        return x[int(data[c, first]) + q // 3, q % 3]
+        return internal_number(x, int(data[c, first]), q)
 
-    @kernel(forceinline=True)
-    def lost_before(x, data, c, q):
-        """Energy lost before at quadrature point q of cell c, over A Y(0) [m]."""
-        return x[int(data[c, first]) + width + q // 3, q % 3]
+    @kernel()
+    def lost_now(p, x, data, c, q):
+        """Energy lost at quadrature point q of cell c where its plastic strain is p, over A Y(0) [m]."""
+        more = line_at(data, c).natural_length * (lost(p, data, c) - lost(state_of(x, data, c, q), data, c))
+        return internal_number(x, int(data[c, first]), points + q) + more / data[c, first + 2]
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -138,11 +139,9 @@ def kernels(law, record, first, corners, gradients, weights):
             total = 0.0
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
-                before = state_of(x, data, c, q)
-                more = lost(plastic(e, before, data, c)[0], data, c) - lost(before, data, c)
-                earlier = data[c, first + 2] * lost_before(x, data, c, q)
-                total += weights[q] * (earlier + line_at(data, c).natural_length * more)
-            out[c] = total
+                p = plastic(e, state_of(x, data, c, q), data, c)[0]
+                total += weights[q] * lost_now(p, x, data, c, q)
+            out[c] = total * data[c, first + 2]
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
@@ -164,24 +163,17 @@ def kernels(law, record, first, corners, gradients, weights):
                 along = weights[q] * slope / line.natural_length
                 across = weights[q] * (line.ea * max(e - state, 0.0) - elastic) * inverse
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
-                for a in range(nodes):
-                    for b in range(nodes):
-                        d = flat[q * nodes + a] * flat[q * nodes + b]
-                        for i in range(3):
-                            for j in range(3):
-                                blocks[c, 3 * a + i, 3 * b + j] += d * (along - across) * p[i] * p[j]
-                            blocks[c, 3 * a + i, 3 * b + i] += d * across
+                add_stiffness(blocks, c, q, nodes, flat, along, across, p)
 
     @kernel(RELAX)
     def relax(h, x, cells, data, before, lost_energy):
         for c in range(cells.shape[0]):
             lost_energy[c], row = 0.0, int(data[c, first])
             for q in range(points if h > 0.0 else 0):
-                e, before = strain(x, cells, data, c, q, nodes, flat)[4], state_of(x, data, c, q)
-                p = plastic(e, before, data, c)[0]
-                more = line_at(data, c).natural_length * (lost(p, data, c) - lost(before, data, c))
+                e, n = strain(x, cells, data, c, q, nodes, flat)[4], points + q
+                p = plastic(e, state_of(x, data, c, q), data, c)[0]
+                x[row + n // 3, n % 3] = lost_now(p, x, data, c, q)
                 x[row + q // 3, q % 3] = p
-                x[row + width + q // 3, q % 3] += more / data[c, first + 2]
 
     @kernel(ENERGY)
     def length_force(t, x, cells, data, out):
@@ -200,36 +192,28 @@ def kernels(law, record, first, corners, gradients, weights):
     def states(t, x, cells, data, out):
         for c in range(cells.shape[0]):
             for q in range(points):
-                e, before = strain(x, cells, data, c, q, nodes, flat)[4], state_of(x, data, c, q)
-                p = plastic(e, before, data, c)[0]
-                more = line_at(data, c).natural_length * (lost(p, data, c) - lost(before, data, c))
-                out[2 * points * c + q] = p
-                out[2 * points * c + points + q] = lost_before(x, data, c, q) + more / data[c, first + 2]
+                e, begin = strain(x, cells, data, c, q, nodes, flat)[4], 2 * points * c + q
+                p = plastic(e, state_of(x, data, c, q), data, c)[0]
+                out[begin], out[begin + points] = p, lost_now(p, x, data, c, q)
 
     return force, kept, stiffness, gone, relax, length_force, states
 
 
 def of(net):
     """The kernels for the curve and the element of a net."""
-    element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
-    return kernels(net.law, net.law_record, net.line_data.column(ROW), _corners(net), *element)
+    return kernels(net.law, net.law_record, net.line_data.column(ROW), _corners(net), *net.quadrature)
 
 
 def plastic_strain(net, x):
     """Plastic strain at each quadrature point of each element at displacement x, shape (cells, points)."""
-    return states(net, x)[:, 0]
+    return states(net, x)[:, : len(net.weights)]
 
 
 def states(net, x):
-    """Plastic strain and energy lost over A Y(0) [m] of each quadrature point, shape (cells, 2, points)."""
-    numbers = np.empty((len(net.cells), 2, len(net.weights)))
+    """Plastic strain and energy lost over A Y(0) [m] of each quadrature point, shape (cells, 2 points)."""
+    numbers = np.empty((len(net.cells), 2 * len(net.weights)))
     of(net)[6](0.0, x, net.cells, net.line_data.matrix, numbers.ravel())
     return numbers
-
-
-def _rows_of(points):
-    """Number of rows for a number at each of so many quadrature points."""
-    return -(-points // 3)
 
 
 def strain_at(net, plastic):
@@ -268,21 +252,11 @@ class PlasticLines:
 
     def add_internal(self, net):
         """The net with rows for plastic strains behind all others, and numbers of the curves by element."""
-        curves, numbers = yield_curves(self.cable, net.web), net.line_data
-        width, count = 2 * _rows_of(len(net.weights)), len(net.cells)
-        numbers = numbers.with_column(ROW, float(len(net.points)) + width * np.arange(count))
+        curves, net = yield_curves(self.cable, net.web), with_internal(net, ROW, 2 * len(net.weights), length_force)
         for i in range(curves.shape[1]):
-            numbers = numbers.with_column(f"plastic_strain_{i}", curves[net.line, i, 0])
-            numbers = numbers.with_column(f"plastic_force_{i}", net.area * curves[net.line, i, 1])
-        more = np.zeros((width * count, 3))
-        return replace(
-            net,
-            line_data=numbers,
-            points=np.vstack([net.points, more]),
-            mass=np.append(net.mass, more[:, 0]),
-            spins=net.spins + len(more),
-            internal=len(more),
-        )
+            net = net.with_column(f"plastic_strain_{i}", curves[net.line, i, 0])
+            net = net.with_column(f"plastic_force_{i}", net.area * curves[net.line, i, 1])
+        return net
 
     def on(self, net):
         """Terms of the tension that lines do not have by their law, and of the energy that is lost."""
@@ -319,14 +293,8 @@ class PlasticLines:
 
     def taken_on(self, net, x):
         """Displacement of all rows with the plastic strains that it asks for, from those of before in x."""
-        x = x.copy()
-        rows = np.zeros((len(net.cells), 2, 3 * _rows_of(len(net.weights))))
-        rows[:, :, : len(net.weights)] = states(net, x)
-        x[len(x) - net.internal :] = rows.reshape(-1, 3)
-        return x
+        return with_numbers(net, x, states(net, x))
 
     def settled(self, net, x):
         """Displacement of all rows with the plastic strains of new lines there."""
-        x = np.zeros(net.points.shape) if x is None else x.copy()
-        x[len(x) - net.internal :] = 0.0
-        return self.taken_on(net, x)
+        return self.taken_on(net, with_numbers(net, x, np.zeros((len(net.cells), 0))))

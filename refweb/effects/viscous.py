@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,8 +31,8 @@ from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, RELAX, STIFFNESS, kernel
 from . import elasticity
-from .base import LINE_OUT, POWER, Balance, ForceTerm, InternalVariables, Tangent, Timing
-from .line_kernels import line_at, pull_together, strain
+from .base import LINE_OUT, POWER, Balance, ForceTerm, InternalVariables, Tangent, Timing, with_internal, with_numbers
+from .line_kernels import add_row_sums, add_stiffness, internal_number, line_at, pull_together, strain
 
 if TYPE_CHECKING:
     from ..net.cable import Viscous
@@ -109,8 +109,7 @@ def kernels(law, record, first, arms, gradients, weights):
     @kernel(forceinline=True)
     def state_of(x, data, c, q, k):
         """z of an arm at quadrature point q of cell c."""
-        number = q * arms + k
-        return x[int(data[c, first]) + number // 3, number % 3]
+        return internal_number(x, int(data[c, first]), q * arms + k)
 
     @kernel()
     def arms_at(x, e, data, c, q):
@@ -173,13 +172,9 @@ def kernels(law, record, first, arms, gradients, weights):
                 along = weights[q] * (0.0 if definite and slope < 0.0 else slope) / line.natural_length
                 across = 0.0 if definite and pull < 0.0 else weights[q] * pull * inverse
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
+                add_stiffness(blocks, c, q, nodes, flat, along, across, p)
                 for a in range(nodes):
                     for i in range(3):
-                        for b in range(nodes):
-                            d = flat[q * nodes + a] * flat[q * nodes + b]
-                            for j in range(3):
-                                blocks[c, 3 * a + i, 3 * b + j] += d * (along - across) * p[i] * p[j]
-                            blocks[c, 3 * a + i, 3 * b + i] += d * across
                         for k in range(arms if taut else 0):
                             mixed = -weights[q] * flat[q * nodes + a] * p[i] * arm(data, c, k)
                             blocks[c, 3 * a + i, begin + k] += mixed
@@ -200,11 +195,7 @@ def kernels(law, record, first, arms, gradients, weights):
             for k in range(arms):
                 axial += arm(data, c, k) / line_at(data, c).natural_length
             for q in range(points):
-                total = 0.0
-                for a in range(nodes):
-                    total += abs(flat[q * nodes + a])
-                for a in range(nodes):
-                    rates[np.uint64(cells[c, a])] += weights[q] * abs(flat[q * nodes + a]) * total * axial
+                add_row_sums(rates, cells, c, q, nodes, flat, weights[q], axial)
 
     @kernel(FORCE)
     def power(t, x, v, f, cells, data, out):
@@ -269,8 +260,7 @@ def of(net):
     """The kernels for the laws, the arms and the element of a net."""
     names = [*net.line_data.dtype.names]
     arms = sum(name.startswith("arm_time_") for name in names)
-    element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
-    return kernels(net.law, net.law_record, net.line_data.column(ROW), arms, *element)
+    return kernels(net.law, net.law_record, net.line_data.column(ROW), arms, *net.quadrature)
 
 
 def length_force(net):
@@ -292,22 +282,12 @@ class ViscousArms:
 
     def add_internal(self, net):
         """The net with rows for the states of the arms behind all others, and numbers of the arms by element."""
-        arms, numbers = self.viscous.arms, net.line_data
-        stiffness = net.area * np.isin(net.line, self.viscous.chosen(net.web))
-        width, count = -(-len(arms) * len(net.weights) // 3), len(net.cells)
-        numbers = numbers.with_column(ROW, float(len(net.points)) + width * np.arange(count))
-        numbers = numbers.with_column("arm_bar", net.law_is("bar").astype(float))
+        arms, stiffness = self.viscous.arms, net.area * np.isin(net.line, self.viscous.chosen(net.web))
+        net = with_internal(net, ROW, len(arms) * len(net.weights), length_force)
+        net = net.with_column("arm_bar", net.law_is("bar").astype(float))
         for k, (modulus, time) in enumerate(arms):
-            numbers = numbers.with_column(f"arm_ea_{k}", modulus * stiffness).with_column(f"arm_time_{k}", time)
-        more = np.zeros((width * count, 3))
-        return replace(
-            net,
-            line_data=numbers,
-            points=np.vstack([net.points, more]),
-            mass=np.append(net.mass, more[:, 0]),
-            spins=net.spins + len(more),
-            internal=len(more),
-        )
+            net = net.with_column(f"arm_ea_{k}", modulus * stiffness).with_column(f"arm_time_{k}", time)
+        return net
 
     def on(self, net):
         """Terms of the springs of the arms, with the tension of lines and arms, and of their dashpots."""
@@ -349,16 +329,12 @@ class ViscousArms:
 
     def settled(self, net, x):
         """Displacement of all rows [m] with arms that have come to rest, or as new where statics is "short"."""
-        x = np.zeros(net.points.shape) if x is None else x.copy()
-        x[len(x) - net.internal :] = 0.0
+        x = with_numbers(net, x, np.zeros((len(net.cells), 0)))
         if self.viscous.statics == "short":
             return x
-        strain, arms = elasticity.strains(net, x), len(self.viscous.arms)
+        strain = elasticity.strains(net, x)
         strain = np.where(net.law_is("bar")[:, None], strain, np.maximum(strain, 0.0))
-        states = np.zeros((len(net.cells), 3 * (net.internal // len(net.cells))))
-        states[:, : arms * len(net.weights)] = np.repeat(strain, arms, axis=1)
-        x[len(x) - net.internal :] = states.reshape(-1, 3)
-        return x
+        return with_numbers(net, x, np.repeat(strain, len(self.viscous.arms), axis=1))
 
 
 def refuse_beside(net, what):

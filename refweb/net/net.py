@@ -91,6 +91,8 @@ class Net:
         vector [rad] and angular velocity [rad/s]; another body has two rows, see `refweb.net.rotation`.
     internal : int
         Number of rows at the end that are internal variables of lines, which have no mass.
+    length_force : callable, optional
+        Makes the kernel of ∂E/∂L of the net, where lines have internal variables.
     """
 
     web: Web
@@ -114,6 +116,7 @@ class Net:
     bodies: tuple[RigidBody, ...] = ()
     spins: int = 0
     internal: int = 0
+    length_force: Any = None
     factors: tuple[Any, ...] = ()
     flows: tuple[Any, ...] = ()
     end: float = math.inf
@@ -238,6 +241,11 @@ class Net:
     def bar_vectors(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Vector of each bar [m] at the displacement x, shape (bars, 3)."""
         return self.bars @ self.points + self.bars @ x
+
+    @cached_property
+    def quadrature(self) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
+        """dN/dξ by quadrature point and node, and weights, as tuples: keys of factories of kernels."""
+        return tuple(map(tuple, self.gradients.tolist())), tuple(self.weights.tolist())
 
     @property
     def unit_tension(self) -> NDArray[np.float64]:

@@ -20,6 +20,8 @@ from .plastic_keys import plastic_strain_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Numbers = float | NDArray[np.float64]
+
 
 def law_of(name) -> Any:
     """Class of a law by its name.
@@ -76,52 +78,31 @@ class Law:
         return out.reshape(strain.shape)[()]
 
     def stress(
-        self,
-        strain: float | NDArray[np.float64],
-        modulus: float | NDArray[np.float64] = 1.0,
-        slackness: float | NDArray[np.float64] = 0.0,
-        smoothing: float | NDArray[np.float64] = 0.0,
+        self, strain: Numbers, modulus: Numbers = 1.0, slackness: Numbers = 0.0, smoothing: Numbers = 0.0
     ) -> Any:
         """Stress σ = T/A [Pa]."""
         return self._evaluate("stress", strain, modulus, slackness, smoothing)
 
     def strain(
-        self,
-        stress: float | NDArray[np.float64],
-        modulus: float | NDArray[np.float64] = 1.0,
-        slackness: float | NDArray[np.float64] = 0.0,
-        smoothing: float | NDArray[np.float64] = 0.0,
+        self, stress: Numbers, modulus: Numbers = 1.0, slackness: Numbers = 0.0, smoothing: Numbers = 0.0
     ) -> Any:
         """Strain of a tension, stress σ > 0 [Pa]; of the linear law of any σ."""
         stress, *numbers = np.broadcast_arrays(stress, modulus, slackness, smoothing)
         return law_of(self.name).strain_of(stress.ravel(), LineData.of_law(*numbers)).reshape(stress.shape)[()]
 
     def tangent(
-        self,
-        strain: float | NDArray[np.float64],
-        modulus: float | NDArray[np.float64] = 1.0,
-        slackness: float | NDArray[np.float64] = 0.0,
-        smoothing: float | NDArray[np.float64] = 0.0,
+        self, strain: Numbers, modulus: Numbers = 1.0, slackness: Numbers = 0.0, smoothing: Numbers = 0.0
     ) -> Any:
         """Tangent modulus dσ/dε [Pa]."""
         return self._evaluate("tangent", strain, modulus, slackness, smoothing)
 
     def energy_density(
-        self,
-        strain: float | NDArray[np.float64],
-        modulus: float | NDArray[np.float64] = 1.0,
-        slackness: float | NDArray[np.float64] = 0.0,
-        smoothing: float | NDArray[np.float64] = 0.0,
+        self, strain: Numbers, modulus: Numbers = 1.0, slackness: Numbers = 0.0, smoothing: Numbers = 0.0
     ) -> Any:
         """Energy per natural volume ∫σ dε, zero at ε = 0 [J/m³]."""
         return self._evaluate("energy_density", strain, modulus, slackness, smoothing)
 
-    def floor(
-        self,
-        modulus: float | NDArray[np.float64] = 1.0,
-        slackness: float | NDArray[np.float64] = 0.0,
-        smoothing: float | NDArray[np.float64] = 0.0,
-    ) -> Any:
+    def floor(self, modulus: Numbers = 1.0, slackness: Numbers = 0.0, smoothing: Numbers = 0.0) -> Any:
         """Largest stress under compression, αE [Pa]; 0 for tension-only, infinite for laws without a floor."""
         numbers = np.broadcast_arrays(modulus, slackness, smoothing)
         return law_of(self.name).floor(LineData.of_law(*numbers)).reshape(numbers[0].shape)[()]
