@@ -108,3 +108,6 @@ An effect that refweb ships is a line in `refweb.registry.EFFECTS` instead. ``te
 against energies and stiffness against forces for every effect and asks for numbers of it, ``tests/reference`` for an
 ``Examples`` section of its docstring.
 """
+
+# This docstring is a page of the site, and tests/how_to/test_effect.py runs its example; test_architecture.py
+# compares the first sentence.

@@ -8,6 +8,8 @@ the body: the centre of mass of both moves by s, and the tensor of inertia about
 
 M being the mass of the body alone; the row of the body is that of this centre. Nothing else changes in the equations,
 which have no multipliers. On a fixed body a node is a support. One that tables move has no mass, and its nodes none.
+
+`net.rotation` moves the nodes, `system.attached_nodes` and `resting_bodies` have the tangents: they change together.
 """
 
 from __future__ import annotations

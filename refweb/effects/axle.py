@@ -1,4 +1,7 @@
-"""Axles of bodies: the table of one, and the torque about it."""
+"""Axles of bodies: the table of one, and the torque about it.
+
+`System` calls `torques`; data are the direction and a table of `time_tables`, and a cell ends with the angle's row.
+"""
 
 from __future__ import annotations
 

@@ -15,6 +15,9 @@ matrix and knows no other effect.
     Writes initial velocities; the points of this net are the positions at the start.
 ``lay(net, supported)``
     Returns the displacement of all rows at the start of a run.
+
+Kernels, `results.probes` and `results.state` read columns of `LINE_OUT`, `TOUCH` and `FELT`; effects of users make
+`ForceTerm` and its parts, so that a new field needs a default.
 """
 
 from __future__ import annotations

@@ -15,6 +15,8 @@ so that tiny deflections keep their digits.
 A clamp is a spring at the end of a line: a is a constant vector in the direction of the element, whose half bends, so
 that k = 2 B/L. A cantilever of n such elements has springs B n inside and 2 B n at the clamp, and under a load P at its
 tip it bends by P L³/(3 B) (1 + 1/(2 n²)).
+
+Force, energy, stiffness and bound follow from one energy; k is the first number, which `without` zeroes at a break.
 """
 
 from __future__ import annotations

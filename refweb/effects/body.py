@@ -1,4 +1,7 @@
-"""Rigid bodies as a table of the scene."""
+"""Rigid bodies as a table of the scene.
+
+Keys of a shape are the fields of its class in `registry.SHAPES`; bodies get their rows in the order of their tables.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 A body of momentum P and angular momentum L about its centre feels the force −γ P and the moment −γ L, so that both fade
 as exp(−γ t) where nothing else acts, and the power −γ (v·P + ω·L) ≤ 0 is lost.
+
+`damping` gives the kernels of places; data are the coefficient of the drag and then W by rows.
 """
 
 from __future__ import annotations

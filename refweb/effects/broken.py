@@ -1,6 +1,8 @@
 """Values of broken elements: tension and strain 0, and their constant rupture energy.
 
 Every system with broken elements has this term, also if they were broken in the initial web.
+
+`system.broken_lines` and `results.folder` use the column `HELD` by name, and a broken element is one of EA 0.
 """
 
 from __future__ import annotations

@@ -28,6 +28,8 @@ nodes in a fluid. A force term has a kernel that detects its contacts, and one f
 while all others stay. `friction_law` is friction with damping. A force on a node that is attached to a body is a force
 and a moment on the body: rows of the body replace those of the node.
 
+`friction_law` and `contact.friction` have one law; another order of contacts or sums changes bits of results.
+
 References
 ----------
 .. [1] M. Jean, "The non-smooth contact dynamics method", Comput. Methods Appl. Mech. Engrg. 177 (1999) 235–257,

@@ -14,6 +14,9 @@ dx/dξ, l = |p| and t = p/l, a quadrature point has
 and the power −w L N ε̇ ≤ 0. Where L changes, by reels and heat, ∂N/∂ε has −(∂N/∂ε̇) L'/L as well, and what changes it
 does the work −(1 + ε) N L' w. The force of a line without smoothing jumps when it snaps taut, and central differences
 are of order 1 across this jump.
+
+`natural_lengths` finds `GROWTH` by name, kernels here find it directly behind ``damping_time``, and force, stiffness
+and damping change together.
 """
 
 from __future__ import annotations

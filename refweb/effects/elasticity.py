@@ -6,6 +6,8 @@ With x' = dx/dξ at a quadrature point, l = |x'|, L the natural length and t = x
     stiffness of (a, b)     w dN_a/dξ dN_b/dξ [(EA/L)(σ'/E) t⊗t + (T/l)(I − t⊗t)]
 
 and the strain ε = (2 X'·u' + u'·u' + |X'|² − L²)/(L(l + L)), which keeps its digits at tiny displacements.
+
+`plastic` and `viscous` take the last of `kernels`, others unpack them; the order of sums decides bits of all results.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Folded initial positions of a web: all lines slack and apart from each other."""
+"""Folded initial positions of a web: all lines slack and apart from each other.
+
+`registry.with_fold` makes this table of ``[web] fold`` and ``positions``, and `net.folding` has the geometry.
+"""
 
 from __future__ import annotations
 

@@ -6,6 +6,8 @@ velocity v is
     m (Ω²I − ΩΩᵀ) r − 2 m Ω × v,      with the potential −½ m |Ω × r|² of the first part;
 
 `refweb.effects.turning_axes` has the kernels.
+
+Statics, modes and reeled masses read Ω from `MovingFrame` of the terms.
 """
 
 from __future__ import annotations

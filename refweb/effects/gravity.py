@@ -1,4 +1,7 @@
-"""Gravity: a uniform acceleration on every mass."""
+"""Gravity: a uniform acceleration on every mass.
+
+`force`, `energy` and `impulse` change together; the energy is 0 in the web's position.
+"""
 
 from __future__ import annotations
 

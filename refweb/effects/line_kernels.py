@@ -3,6 +3,8 @@
 ``gradients`` are dN/dξ of the reference element, by quadrature point and node, as one tuple of numbers. ``data`` of a
 kernel over lines is `refweb.net.laws.line_data.LineData.matrix`: all terms of the compiled loop take matrices. `LINE`
 gives its first columns their names, and `refweb.net.net.Net.law_record` those that the laws of a net read.
+
+Kernels of all lines inline these functions: another order of sums changes the bits of all results.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Rigid links: pairs of nodes that keep their distance."""
+"""Rigid links: pairs of nodes that keep their distance.
+
+Data are the vector and the length that `base.Constraint` reads; `system.links` has the equations.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Dead loads: forces of fixed direction on nodes, with an optional factor over time."""
+"""Dead loads: forces of fixed direction on nodes, with an optional factor over time.
+
+`outer_load` has the kernels; `statics.simulation` finds dead loads by the name "load".
+"""
 
 from __future__ import annotations
 

@@ -13,6 +13,8 @@ momentum of all, and the angular momentum about a drum at rest, are kept.
 
 An explicit step brings Δm in the middle of its drift, where v − v_d goes with 1/m: that is the exact solution for F =
 0, and the step stays its own adjoint.
+
+The explicit loop uses `FollowedMass`, other methods `system.material_flow`: both have the same equations.
 """
 
 from __future__ import annotations

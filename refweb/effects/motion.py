@@ -1,4 +1,7 @@
-"""Prescribed motion: nodes and bodies whose displacement, and rotation, are functions of time."""
+"""Prescribed motion: nodes and bodies whose displacement, and rotation, are functions of time.
+
+`rotations_over_time` writes and `turn` reads rows of `ROW` numbers; these kernels write x and v and no force.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 Reels and heat add factors to the net; nothing else changes natural lengths. Only `set_lengths` computes them; it writes
 them to the line data of its caller.
+
+`explicit_loop` and `step_bound` count on ∞ and −∞ behind the corners; `damping` adds the column `GROWTH`.
 """
 
 from __future__ import annotations

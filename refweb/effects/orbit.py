@@ -8,6 +8,8 @@ n of the orbit. In these axes masses move by the equations of Clohessy and Wilts
 which have the difference of gravity from its value at the origin, to first order in r over the radius R of the orbit,
 and the inertia forces of the axes. `refweb.effects.turning_axes` has the kernels, with G = n² diag(3, 0, −1). The sum
 of the kinetic energy, −½ m n² (3x² − z²) and the energies of all other effects is constant: the Jacobi integral.
+
+± of what the linear equations neglect follows from the radius in `MovingFrame`, by `System.orbit_radius`.
 """
 
 from __future__ import annotations

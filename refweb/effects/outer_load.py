@@ -3,6 +3,8 @@
 Each cell of such a load has first its numbers, and then those of the factor: its largest size; constant and slope
 without a table, which are 1 and 0, in statics 0 and 1; its table. Without a table the factor is 1, in statics the load
 step.
+
+`pressure` and `thrust` give `factor_at` the column behind their numbers, and their bounds read its first number.
 """
 
 from __future__ import annotations

@@ -18,6 +18,8 @@ Numbers of each element stand in rows behind all places, see `refweb.effects.bas
 quadrature point, then the energy that each has lost over A Y(0) [m]. They are no unknowns: explicit steps take them on
 at their ends, load steps of statics at equilibria, and CVODE and IDA between their steps, which end where a line that
 yields turns back.
+
+Kernels read the columns behind `ROW` by position; `System` and `yielding` call `PlasticLines` as the ``follower``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Point masses on nodes."""
+"""Point masses on nodes.
+
+Pictures and checkpoints read ``point_mass`` of the net, methods ``mass``.
+"""
 
 from __future__ import annotations
 

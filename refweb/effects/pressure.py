@@ -7,6 +7,8 @@ With the unit normal n of the plane, p per current length and x' = dx/dξ along 
 
 exactly, for every order: the force depends on positions and not on natural length. On a closed loop in a plane it has
 the potential −p × area. On other lines it has no potential, and its work depends on the path.
+
+`PUSH` names the numbers of a cell, behind which `outer_load` puts the factor; a broken element has the normal 0.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Reels: lines whose natural length is a function of time, such as those of a winch or a closing line."""
+"""Reels: lines whose natural length is a function of time, such as those of a winch or a closing line.
+
+`natural_lengths` and `mass_flow` do the work; the table of the factor is one of `time_tables`.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 A broken element has no stiffness: its tension, strain and energy are 0, and forces through it end. The energy that it
 had stored, and the energy of the forces that end with it, become the constant energy of a separate term, so that the
 energy balance closes through every break. `refweb.dynamics.integrators.rupture` finds the times of breaks.
+
+`integrators.rupture` and `statics.rupture` read `BreakLimits`, whose limits are tensions of elements.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Temperature: natural lengths that expand, L (1 + α ΔT)."""
+"""Temperature: natural lengths that expand, L (1 + α ΔT).
+
+`GroupTemperature` has keys of `Temperature`, which `net.groups.givers` finds by name; factors multiply those of reels.
+"""
 
 from __future__ import annotations
 

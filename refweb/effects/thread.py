@@ -12,6 +12,8 @@ stiffness couples every node with every other: of n nodes the matrix has a dense
 
 A segment that gets short turns fast: T/l_s has no bound. The bound of explicit steps takes T and l_s as they are at
 each row of the history.
+
+Kernels count columns of data from ``width``, observables read ``out`` by position, and `OF_CABLE` are keys of `Cable`.
 """
 
 from __future__ import annotations

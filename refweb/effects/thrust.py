@@ -6,6 +6,8 @@ With d = ±dx/dξ at the node, into the line, and e = d/|d|
     stiffness towards b   −F (∂d/∂x_b) (I − e⊗e)/|d|.
 
 It has no potential. If dx/dξ is zero at the node, the line has no direction and no thrust acts.
+
+`end_of` has the force first, since `without(0)` zeroes it; ``slopes`` begin with that of the pushed node.
 """
 
 from __future__ import annotations

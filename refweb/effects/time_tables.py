@@ -2,6 +2,8 @@
 
 A table of rows (t, values...) is stored in a row of ``data``: the number of rows, then the rows one after another. Its
 values are constant before the first and after the last time.
+
+`system.material_flow` interpolates the same tables by numpy; a force gives its times to `Timing`: steps end there.
 """
 
 from __future__ import annotations

@@ -11,6 +11,8 @@ axes. A ring keeps its plane in these axes, and this moment does not act about i
 `refweb.effects.turning_bodies` has the moments on bodies that rotate in space.
 
 Consistent mass couples the nodes of an element here as in M v'.
+
+`turning_bodies` and `turning_flows` have the same forces on bodies and on reeled mass, and change with these.
 """
 
 from __future__ import annotations

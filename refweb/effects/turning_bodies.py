@@ -7,6 +7,8 @@ Let S = ∫ r⊗r dm of a body, which is ½ tr(J) 1 − J with its tensor of ine
 
 The first moment, which includes gravity gradients, has the potential −½ tr(S G). The second does no work. ω is the
 angular velocity in these axes, see `refweb.net.rotation`. A rotation δθ changes S by δθ × S − S × δθ.
+
+`BODY` names the numbers of a cell; `system.resting_bodies` has the Coriolis moment once more, by angular velocities.
 """
 
 from __future__ import annotations

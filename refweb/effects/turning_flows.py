@@ -2,6 +2,8 @@
 
 They are those of `refweb.effects.turning_axes` for a mass m (φ(t) − 1) at each node, with the factor φ of the reel. The
 force m (φ − 1) G r does work, since its potential changes with time; that of Coriolis does none.
+
+`FLOW` names the numbers of a cell, behind which the table stands; forces change with those of `turning_axes`.
 """
 
 from __future__ import annotations

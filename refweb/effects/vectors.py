@@ -1,4 +1,7 @@
-"""Products of vectors of three numbers, as compiled kernels."""
+"""Products of vectors of three numbers, as compiled kernels.
+
+Vectors are tuples of three numbers, and another order of sums changes the bits of all results.
+"""
 
 from __future__ import annotations
 

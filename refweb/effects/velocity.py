@@ -1,4 +1,7 @@
-"""Initial velocities of nodes."""
+"""Initial velocities of nodes.
+
+`system.start` calls `start` in the order of the tables, so that later tables write over earlier ones.
+"""
 
 from __future__ import annotations
 

@@ -16,6 +16,8 @@ the time, and so are the rates.
 
 The states are rows of the unknowns behind all places, `refweb.effects.base.InternalVariables`, three to a row, those of
 a quadrature point after those of the one before.
+
+Kernels read the columns behind `ROW` by position, `of` counts arms by ``arm_time_…``, and callers unpack `kernels`.
 """
 
 from __future__ import annotations

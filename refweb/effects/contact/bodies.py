@@ -3,6 +3,8 @@
 A cell is two bodies: the rows of both, and two rows of rotation of each. If a body has fewer rows of rotation, its
 position row fills their columns and is not read. The skeleton of a sphere is one point with the whole thickness. It
 determines the contact with another body, whose skeleton is then left out.
+
+`_pair` and `_side` write numbers in the order in which `BODIES`, `SIDE` and `pair` name them.
 """
 
 from __future__ import annotations

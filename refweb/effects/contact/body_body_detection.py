@@ -6,6 +6,8 @@ point has one contact. An arc has one contact, at the coordinate ξ where W δ^(
 sin²(π ξ). Each contact has the energy k/(p + 1) W δ^(p + 1). Since ξ is an extreme, the force is that of a fixed ξ.
 With G = ∂δ/∂y at the contact point y, it is −k W δ^p G on the body with the skeleton, and the opposite on the other
 body, both at y. Therefore momentum and angular momentum are conserved to rounding.
+
+`bodies` writes `BODIES` and `SIDE` by position; friction remembers forces by ``slot``, of which a part has three.
 """
 
 from __future__ import annotations

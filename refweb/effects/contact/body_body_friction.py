@@ -4,6 +4,8 @@ The law is that of `refweb.effects.contact.friction`, with the contacts of `refw
 u is the velocity of the first body relative to the second at the contact point, half the depth below the surface of
 each, so that a rolling sphere has no slip. F acts there on both bodies, with the moment a × F about the first body's
 row at the arm a. `refweb.effects.contact_solver` solves for F in a kick; such a contact moves two rotations.
+
+The law is that of `friction` and of `contact_solver`; `SLOTS` is the number of values of ``slot`` of a part.
 """
 
 from __future__ import annotations

@@ -7,6 +7,9 @@ p of the penalty and the window W = 4 ξ (1 − ξ). On a straight element this 
 concave. It does not jump, and its force vanishes near an end, where the contact of the end takes over. A curved element
 that bends away from the body may have two such ξ; the deeper one counts. Where both are equal, the energy has a kink
 and the force jumps.
+
+`penalty`, `friction`, `line_body_friction`, `line_body_ccd` and `body_body_detection` unpack `Places` by position, and
+its limit of 3 is `SLOTS` of `line_body_friction`.
 """
 
 from __future__ import annotations

@@ -12,6 +12,9 @@ ring rotates about its normal only, other bodies as in `refweb.net.rotation`. Th
 matrices A = ∂F/∂y and B = ∂F/∂u, tangents follow from dF = A dy + B du + F dW/W, where dy, du and dW include the change
 of ξ. `refweb.effects.contact_solver` solves for F in explicit kicks.
 
+`contact_solver.friction_law` solves the same law in explicit kicks, so that both change together; `pair` has the layout
+of ``data``, and ``out`` has the power [W] and the force on the body [N].
+
 References
 ----------
 .. [1] K. H. Hunt, F. R. E. Crossley, "Coefficient of restitution interpreted as damping in vibroimpact", J. Appl. Mech.

@@ -10,6 +10,9 @@ concave. From any point it rises by at most its slope there times the distance t
 times the depth of the contacts. Let ξ be that of the largest W δ^(p + 1), W = 4 ξ (1 − ξ). From W'/W ≤ 1/ξ follows |δ'|
 ≤ δ/((p + 1) ξ), and the deepest point is at most ξ away: (p + 2)/(p + 1) ≤ `SHOWN`. In a body that is not convex, the
 largest gradient of depth gives a bound.
+
+``met`` gets two nodes, the row of the body and 1 where the line is in the core, which `integrators.ccd` and
+`penetration` read by position; `MIDDLE` and `SHOWN` follow from geometry.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@
 
 Lines that end at one node touch a body there at one point, with one normal and one slip. They are one contact with the
 sum of their forces, so that sweeps need not distribute the force among them.
+
+Tags are 0 between the ends and 1 and 2 at them; `detect` reads the body of a contact at an end as its second part.
 """
 
 from __future__ import annotations

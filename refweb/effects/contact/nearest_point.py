@@ -3,6 +3,8 @@
 A sphere has one contact with a line, at the line's point nearest its centre, for any number of elements.
 
 `far` and `touched` are inlined: a line out of reach then costs 4 ns, and 20 ns with calls.
+
+Shape functions are flat, by power and then node; `far` may say False of what is far, and never True of what may touch.
 """
 
 from __future__ import annotations

@@ -13,6 +13,8 @@ distance from the surface, and samples there are left out.
 Friction and damping have no energy. Each maximum counts with a share of its push: the fall of F to both sides, on
 average, over F. Minima do not count. The sum of these shares equals the total rise, no share is negative, and friction
 always dissipates.
+
+`contact_points` unpacks what `several` returns; `STEEPEST` must bound gradients of depths that are not convex.
 """
 
 from __future__ import annotations

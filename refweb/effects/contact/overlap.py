@@ -25,6 +25,8 @@ the deepest place of each element alone, which jumps along a face      0.09, 0.1
 one for all lines at a node in place of their ends, with (1 − 2 ξ)²     0.006, 0.036, 0.17
 ∫ δ² ds along all lines, which is another law of depth, of power 1.5   0
 =====================================================================  ==================================
+
+Keys of `plain` stand in ``run.json``, `runner` reads the stiffness of `too_soft`, and `line_body_ccd` uses `CORE`.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 Data of a cell begin with a `SPHERE` and the vectors from the centre to the cell's nodes in the web's position; behind
 these stands a `SURFACE`, which spheres alone do not need, and at the end a `TURNING` of a body that turns in space.
+
+`pair_data`, and `bodies` for bodies, write by position what `SPHERE`, `SURFACE` and `TURNING` name.
 """
 
 from __future__ import annotations

@@ -7,6 +7,8 @@ overlap of all steps is less than the least distance from a middle to its surfac
 The bound of explicit steps limits the approach to 0.2 times that distance times ``safety``. For explicit steps of a
 given size, it follows from the step and the largest speed of the run. Steps of CVODE and IDA are checked one by one,
 see `refweb.dynamics.integrators.passages`.
+
+Texts of `passage` and keys of `plain` stand in ``run.json``; `WAY` follows from the bound of `body_body_penalty`.
 """
 
 from __future__ import annotations

@@ -9,6 +9,9 @@ for the body, g = ∂δ/∂x and the matrix H = ∂²δ/∂x² at the contact po
 
 A rotating body has the moment y × F of its push F about its centre, with y from the centre to the line's point.
 `refweb.effects.contact.rotational_stiffness` has the stiffness of this moment.
+
+Layout of ``cells`` and ``data`` stands in `pair`; `friction`, `line_body_ccd`, `line_body_friction` and
+`body_body_penalty` import helpers, and `table` unpacks force, energy, stiffness and bound in this order.
 """
 
 from __future__ import annotations

@@ -7,6 +7,8 @@ the start of a run, it is proven that nothing has passed. A line in the core at 
 
 The middle of a mesh is that of its field, see `refweb.net.boundary.field`. Walls that are thinner than nearly all of
 the surface are not checked.
+
+Texts of `status` stand in ``run.json``; `record` takes a row of the crossings, `would_pass` one without its time.
 """
 
 from __future__ import annotations

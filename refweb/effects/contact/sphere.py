@@ -4,6 +4,8 @@ The penalty acts once per line of the web, at the line's point nearest the centr
 the radius R the energy is ½ k (R − d)₊². The shape functions N of the element distribute the force to the nodes.
 Contact is thus the same for any number of elements. Let p be the vector from the centre to that point, ξ its coordinate
 on the element, p' = ∂p/∂ξ, and m = ∂(p·p')/∂q. Then the Hessian of ½ d² is BᵀB − m mᵀ/(|p'|² + p·p'') while 0 < ξ < 1.
+
+Force, energy and stiffness change together, ``out`` is a `TOUCH`, and the order of sums decides the bits of impacts.
 """
 
 from __future__ import annotations

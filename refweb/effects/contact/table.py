@@ -3,6 +3,9 @@
 The kernels for spheres are in `refweb.effects.contact.sphere`, those for other shapes and exponents in
 `refweb.effects.contact.penalty`, and those of damping and friction in `refweb.effects.contact.friction`. Explicit steps
 use the solver in `refweb.effects.contact_solver`. Bodies with the same kernels make one term.
+
+The order of `KEYS` is that of `pair.pair_data` and of contact between bodies, names in `Balance` are columns of
+``history.csv``, and `scene`, `overlap` and `pair_overlap` call methods of `Contact`.
 """
 
 from __future__ import annotations

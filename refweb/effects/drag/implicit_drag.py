@@ -10,6 +10,8 @@ Its solution is unique, since −F is the gradient of a convex function of u. Ne
 without drag, or with the drag of the sweep before. Equations of different nodes are independent, so that one sweep
 solves all of them. Nodes that are attached to one body are an exception: M⁻¹ is then the block J M⁻¹ Jᵀ of
 `refweb.effects.contact_solver`, and their equations are coupled, which takes a few sweeps.
+
+The force is that of `force`; contacts of a row stand together, and the first has their number as ``group``.
 """
 
 from __future__ import annotations

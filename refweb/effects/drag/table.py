@@ -1,6 +1,8 @@
 """Drag of a fluid, at rest or in steady wind, on lines and on free bodies.
 
 The force is in `refweb.effects.drag.force`, and its solver for explicit steps in `refweb.effects.drag.implicit_drag`.
+
+Cells of a node stand together for `implicit_drag`; `without` zeroes the first two numbers of `force.end_of`.
 """
 
 from __future__ import annotations

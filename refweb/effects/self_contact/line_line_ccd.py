@@ -9,6 +9,9 @@ contact.
 Two elements that share a node meet if one folds flat onto the other: their distance is that of the far node of each
 from the other element. They do not push each other, nor do elements that are near along the net. Such meetings are
 reported, not prevented. A pair with a distance d needs no new check before rows have moved by d relative to each other.
+
+`meets` and `soon` have the signatures `MEETS` and `TIME_TO_CONTACT`; cells are pairs or single elements,
+`integrators.ccd` uses the last three entries of ``due``, and no change may miss a meeting.
 """
 
 from __future__ import annotations

@@ -10,6 +10,8 @@ of elements cross, and up to √2 of it towards their ends. F has no resultant a
 motion does not change it. Its power m f·v is not positive. With K = −∂f/∂x,
 
     −∂F/∂v = d f f/|f| where m > −1,        −∂F/∂x = m K − f ∂m/∂x,        ∂δ̇/∂x = K v/|f| − (f·v) K f/|f|³.
+
+Forces follow from `line_line_penalty.pushed`; `table` takes `force`, `stiffness` and `bound` by these names.
 """
 
 from __future__ import annotations

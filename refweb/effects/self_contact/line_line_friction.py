@@ -29,6 +29,8 @@ contact c.
 
 In explicit kicks `refweb.effects.contact_solver` solves for friction contact by contact, along the two directions for
 which J M⁻¹ Jᵀ has no mixed term. Only iterations of implicit methods use tangents of N, by differences.
+
+`contact_solver.friction_law` has the same law; `table` takes `force`, `stiffness` and `bound` by these names.
 """
 
 from __future__ import annotations

@@ -19,6 +19,8 @@ overlap δ the push is 3.08 k δ^(3/2)/√r, as for crossed cylinders by Hertz. 
 overlap is further than c from all ends, these closed forms are exact to rounding, and no sums are needed. Lines that
 lie along each other push with 2 κ f h (c² − h²)·2 along their common length, so that the push of a pair is at most k r
 again. Therefore the stiffness of a pair is of the order of k at any angle, and parallel lines need no shorter steps.
+
+`overlap_integrals`, the closed form here and `penetration.HELD` have one energy; losses follow from `pushed`.
 """
 
 from __future__ import annotations

@@ -22,6 +22,8 @@ within √(4 r δ) of it the energy of an overlap δ doubles, which resists slid
 Gauss points on both lines needs many points if r is much smaller than an element.
 
 An element without length has no direction; then I is 0, which is its limit.
+
+`line_line_penalty` reads the slopes of `first` in this order, and its closed form has the same energy.
 """
 
 from __future__ import annotations

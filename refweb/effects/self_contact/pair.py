@@ -2,6 +2,8 @@
 
 Cells of a term are pairs, of the nodes of one element and of another, or elements of which any two may touch: then
 `refweb.effects.self_contact.search` makes pairs of them.
+
+`table` and `search.paired` write these fields by name; an element with the ``scale`` 0 is broken.
 """
 
 from __future__ import annotations

@@ -10,6 +10,9 @@ are checked as well: the first two that fold flat onto each other, or meet, are 
 because of them are found by their own pairs.
 
 An overlap above r is refused: from there on the push falls.
+
+`HELD` and `POWER` follow from the energy of `line_line_penalty`, texts of `status` and keys of `plain` stand in
+``run.json``, and `runner` reads the stiffness of `PenetrationError`.
 """
 
 from __future__ import annotations
@@ -127,7 +130,7 @@ class Passage:
         return {**values, "chosen": self._chosen}
 
     def status(self):
-        """True if nothing can have passed, as ``run.json`` has it."""
+        """Status as in ``run.json``: "certified", "certified but for ..." or the reason for doubt."""
         if self._unfollowed is not None:
             return f"not certified: {self._unfollowed}"
         net, ((time, *nodes), (folded, *beside)) = self._system.net, self._crossings
@@ -168,7 +171,7 @@ class Passage:
 
         Raises
         ------
-        TooSoft
+        PenetrationError
             Where refweb chose the stiffness.
         SolverError
             Where the scene gives the stiffness.

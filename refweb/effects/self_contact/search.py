@@ -3,6 +3,8 @@
 A cell of the grid is as wide as the longest element plus the distance of the search. Therefore all elements near an
 element have their middles in the same cell or in a neighbouring cell, and the time is proportional to the number of
 elements. Elements that share a node make no pair, nor do those that are listed as near along the net.
+
+No change may miss a pair within reach, and the order of pairs decides the bits of results.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Contact of lines with lines: its table and its terms."""
+"""Contact of lines with lines: its table and its terms.
+
+`scene` calls `with_stiffness`; with more than `LISTED` pairs explicit steps alone take a web.
+"""
 
 from __future__ import annotations
 
