@@ -2,6 +2,9 @@
 
 The accuracy parameter of an integrator, ``safety`` or ``rtol``, trades accuracy for time; the code calls it the knob.
 Each run has a value of it.
+
+Runs fill ``reduced``, ``findings``, ``throw`` and ``twin_end`` of the solution; names in `arrays` are keys of
+``checkpoint.npz``, and codes of findings stand in `findings.CODES`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""± of the times of breaks, and the time until which their order is known."""
+"""± of the times of breaks, and the time until which their order is known.
+
+Keys of a break stand in ``run.json``, see `Watch.breaks`; ± ends at the time that is returned to `twin_error`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Cost of the breakpoints of tables: steps end at each, and more breakpoints than steps set the step."""
+"""Cost of the breakpoints of tables: steps end at each, and more breakpoints than steps set the step.
+
+Integrators whose steps have a bound give `steps_in`; `TOLD` and the text are free.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 Errors of time steps grow with a low power of time. In a chaotic motion any difference grows by the same factor in equal
 times, until no digit is left. The run and its step-refinement run are two such motions.
+
+Rows are those of `Watch.compared`: time first, the balance of energy last; constants are free.
 """
 
 from __future__ import annotations

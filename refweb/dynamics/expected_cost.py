@@ -1,4 +1,7 @@
-"""Expected cost of an explicit run: its step, the cause of that step, and the CPU time."""
+"""Expected cost of an explicit run: its step, the cause of that step, and the CPU time.
+
+`ruling` follows `integrators.step_bound` with the same kernels, and both change together; texts are free.
+"""
 
 from __future__ import annotations
 

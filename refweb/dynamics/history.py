@@ -2,6 +2,8 @@
 
 Observables of a state are probes. Those of energies, work and step size are weighted sums of the integrator's balances.
 After the probes of observables follow those for warnings, and those for events without an observable.
+
+Probes stand in the order of observables, warnings and events; `rupture` takes the last event for that of breaks.
 """
 
 from __future__ import annotations

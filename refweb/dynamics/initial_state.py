@@ -1,4 +1,8 @@
-"""Initial states of dynamics: the initial web, its equilibrium, or the last state of another run."""
+"""Initial states of dynamics: the initial web, its equilibrium, or the last state of another run.
+
+Fields of `Start` are keys ``begin_…`` of ``checkpoint.npz``; `_STATE` and ``body_…`` are keys that `results.folder`
+writes, so that a renamed one breaks folders of users.
+"""
 
 from __future__ import annotations
 

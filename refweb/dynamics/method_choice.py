@@ -15,6 +15,8 @@ steel cable that swings                    0.01 s               over 1 s   over 
 taut steel net, loaded over 8 s            1.3 s                0.11 s     over 5 s     0.14 s
 web that settles, damped by its material   3.2 s                1.0 s      0.67 s       1.2 s
 =========================================  ===================  =========  ===========  ========
+
+Constants are measured; `method_fallback` and `studies.trials` use this file, and reasons stand in ``run.json``.
 """
 
 from __future__ import annotations

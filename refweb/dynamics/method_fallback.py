@@ -1,4 +1,7 @@
-"""Fallback of ``method = "auto"``: other methods, if the chosen one cannot finish."""
+"""Fallback of ``method = "auto"``: other methods, if the chosen one cannot finish.
+
+Names in `arrays` are keys of ``checkpoint.npz``, and `record` stands in ``run.json``; the order of `OTHERS` is free.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Times of a run: its history rows, the rows with frames, and blocks of rows."""
+"""Times of a run: its history rows, the rows with frames, and blocks of rows.
+
+A resumed run finds its row by number: times of rows and frames of a scene stay; `BLOCK` and costs are free.
+"""
 
 from __future__ import annotations
 
@@ -142,7 +145,7 @@ def blocks(integrator, course, schedule, first=0):
 
     Raises
     ------
-    OpenBook
+    refweb.errors.EnergyDriftError
         At the end, if the energy drift of the run exceeds its limit.
     """
     times, size = schedule.times, 1

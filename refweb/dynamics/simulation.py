@@ -1,4 +1,8 @@
-"""Dynamic run of a scene: from its start through rows and frames to results, with checkpoints."""
+"""Dynamic run of a scene: from its start through rows and frames to results, with checkpoints.
+
+Keys of a checkpoint are a file format, which `runner._before` checks; `accuracy_loop`, `twin_error` and
+`studies.predictability` use attributes of `Simulation` by name.
+"""
 
 from __future__ import annotations
 
@@ -198,7 +202,7 @@ class Simulation:
             passage.overlaps.refuse()
 
     def run(self, folder, tell):
-        """Run once from start to end and return an `RunResult`.
+        """Run once from start to end and return a `RunResult`.
 
         ``tell`` is called with what the run has come to, in words, and the share that is done.
         """

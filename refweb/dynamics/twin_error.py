@@ -2,6 +2,8 @@
 
 The error of results and of the times of events is the difference of both runs, times a factor by the order of the
 method, times `SPREAD`. The second run takes place beside the first or after it.
+
+`sweeps.case` sets `THREADS`, rows are those of `Watch.compared`, and a changed factor changes ± of all results.
 """
 
 from __future__ import annotations

@@ -58,3 +58,6 @@ An implicit method finds K = −∂f/∂x and C = −∂f/∂v by ``self.system.
 by ``restarts`` that it is to begin anew at corners. `refweb.dynamics.integrators.integrator.Integrator` describes all
 attributes of an integrator, also of one that chooses steps by another key than rtol.
 """
+
+# This docstring is a page of the site, and tests/how_to/test_integrator.py runs its example; test_architecture.py
+# compares the first sentence.

@@ -12,6 +12,8 @@ are those of full windows alone. They are searched at the ends of cells and at r
 q(t − w))/w, changes its sign between two of these, the cubic through means and rates is searched as well. Its
 difference from the parabola through the rates is stored as correction, and ± is at least this. It shows the error by
 many steps in a cell.
+
+Fields of `Averages` go into checkpoints; `measurements` and `dense_output` give values at `PARTS` + 1 places of a step.
 """
 
 from __future__ import annotations

@@ -15,6 +15,9 @@ known without a search over all velocities. Lines that have moved further in tha
 A step of higher order has several drifts, and cannot be rejected after the first. It is checked in advance as a step of
 order 2, and cut in the same way. Lines that pass in one of its drifts nevertheless are reported. The bound of explicit
 steps limits the approach of two bodies, see `refweb.effects.contact.pair_overlap`.
+
+`features` gives the names in ``apart``, `records` the fields of ``model`` and ``running``; `line_body_ccd` sets
+``met[3]``, and `central_difference` reads ``met[4]``. No change may miss a meeting.
 """
 
 from __future__ import annotations

@@ -9,6 +9,9 @@ taut stiffness of all lines, and the contact stiffness of the lines that a body 
 With smaller steps a slack chain in contact can still gain energy by many orders, and look plausible afterwards.
 Therefore the energy balance is checked at every row: the run ends if ``|ΔE − work|`` is above `DRIFT` of the largest
 energy.
+
+`splitting` derives from it and sets `kicks`, `drifts`, `stretch` and `_keys`; `Scheme` and `Running` get fields by
+position, and `SHARED` is the first part of `CLOCK`.
 """
 
 from __future__ import annotations

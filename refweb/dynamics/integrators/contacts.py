@@ -1,4 +1,7 @@
-"""Contact forces on bodies in the compiled loop: the sum over the cells that are near in a step."""
+"""Contact forces on bodies in the compiled loop: the sum over the cells that are near in a step.
+
+``chosen`` is a place in ``cells`` of `records.ForceTerms`; `system.contact_forces` has the dtype and the sum.
+"""
 
 from __future__ import annotations
 

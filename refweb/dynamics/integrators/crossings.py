@@ -2,6 +2,9 @@
 
 Rows move in straight lines: in a drift of an explicit step, see `refweb.dynamics.integrators.ccd`, or between times at
 which the dense output of a step is known, see `refweb.dynamics.integrators.passages`.
+
+Numbers of kinds are rows of ``crossings``, which checkpoints keep and `simulation`, `history`, `passages` and `ccd`
+index; a new kind needs a row in `none_met`.
 """
 
 from __future__ import annotations

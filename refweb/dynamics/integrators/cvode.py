@@ -9,6 +9,8 @@ An implicit step solves (I − γJ) z = r with J = [[0, I], [−M⁻¹K, −M⁻
     (M + γC + γ²K) z_v = M r_v − γK r_x,    z_x = r_x + γ z_v,
 
 a matrix of half the size. It is symmetric unless an effect is not, and definite without the negative part of K.
+
+`set_up` and the other callbacks have the signatures of sksundae; factors are those of the last `set_up`.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 The motion in a step of higher order is the polynomial of degree 5 through position, velocity and acceleration at its
 ends. Of a kick, a drift and a kick the state before is that of the step taken back, which costs an evaluation of
 forces: nothing is kept for it in all the steps that have no peak.
+
+A look inside of a step overwrites lengths and what terms show: it ends with `show_again`.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 A kick, a drift and a kick change the kinetic energy by ½ (f₀ + f₁)·Δx of all forces at both ends of the drift, up to a
 part that two successive steps cancel. Therefore the drift of a cell in a step is ΔE + ½ (f₀ + f₁)·Δx with its forces f
 = −∂E/∂x. A cell that gains energy by the work of others has no drift.
+
+`central_difference` alone calls it, for the text of an error: all of it is free.
 """
 
 from __future__ import annotations

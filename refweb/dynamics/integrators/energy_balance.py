@@ -1,6 +1,8 @@
 """Energy balance: work must equal the change of energy, or the run is refused.
 
 It is independent of the method: at every history row ``|ΔE − work|`` is compared with the largest energy of the run.
+
+``total`` ends with kinetic energy, work and step size, ``work`` with motion: `rows` and `History` count on that.
 """
 
 from __future__ import annotations

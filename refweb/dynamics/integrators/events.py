@@ -2,6 +2,8 @@
 
 A compiled step is looked at once, at its end: a moment is known to its size. Bisection finds a moment to rounding where
 values are known anywhere within a step. An event of rest: a value has stayed below a share of its largest for a time.
+
+Fields of `EVENT` go into checkpoints, `rupture` reads and sets them by name, and fields of `Event` are among them.
 """
 
 from __future__ import annotations

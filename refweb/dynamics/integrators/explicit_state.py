@@ -1,4 +1,7 @@
-"""State of an explicit run."""
+"""State of an explicit run.
+
+Fields go into checkpoints unless their metadata says ``saved=False``; `CentralDifference` passes them by position.
+"""
 
 from __future__ import annotations
 

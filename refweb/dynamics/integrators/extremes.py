@@ -11,6 +11,8 @@ searched again from the third value on.
 Over 30 phases, the largest error of a peak of an oscillator in central differences at ωh = 1/4 is 7.80e-3. It is
 7.81e-3 with the maximum of the parabola, and the error of the amplitude at steps is 7.82e-3 itself. But the parabola
 exceeds a kink by an eighth of a second difference, so that it gives negative tensions, or slack fractions above 1.
+
+Fields of `Extremes` go into checkpoints; ``looked`` and ``recent`` have the last three looks, the oldest first.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Features of a run: kernels for features that it has not are neither compiled nor loaded."""
+"""Features of a run: kernels for features that it has not are neither compiled nor loaded.
+
+Names stand in ``apart`` of kernels; a run ends where it calls a kernel whose feature is missing here or counts 0.
+"""
 
 from __future__ import annotations
 

@@ -19,6 +19,8 @@ A step solves J z = r with J = ∂F/∂y + c ∂F/∂y'. Eliminating displacemen
 
 for every node alike, with r_x = 0 for one without mass.
 
+Unknowns stand in the order x, v, λ, μ, also for `system.links`; callbacks have the signatures of sksundae.
+
 References
 ----------
 .. [1] C. W. Gear, B. Leimkuhler, G. K. Gupta, "Automatic integration of Euler-Lagrange equations with constraints",

@@ -1,6 +1,8 @@
 """Force terms whose kicks an explicit step solves for: their record, and the detection of their contacts.
 
 Losses act only where the push acts, which is evaluated before: only lines with a depth in a body are detected.
+
+Parts of contact n begin at ``parts`` × n; `detect` kernels count contacts for which there is no space as well.
 """
 
 from __future__ import annotations

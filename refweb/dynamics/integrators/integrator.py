@@ -8,7 +8,10 @@ made of a system and of what is to be looked at:
 * `Sum`, the same of energies, work and step size;
 * `refweb.dynamics.integrators.events.Event`, a moment at which one of these passes a level.
 
-``start`` makes a `IntegratorState`, the whole state of a run; ``advance`` takes it on and returns a `History` of rows.
+``start`` makes an `IntegratorState`, the whole state of a run; ``advance`` takes it on and returns a `History` of rows.
+
+Fields of `IntegratorState` are keys of checkpoints, `rows` and `step_observer` write `History` by position, and
+plug-ins have this interface.
 """
 
 from __future__ import annotations
@@ -39,7 +42,7 @@ SAME = 1e-12
 MAX_STEPS_PER_ROW = 1e8
 """Largest number of steps that a history row may take."""
 GROUPS = {"extremes": Extremes, "ledger": MomentumBalance, "averages": Averages}
-"""Fields of a `IntegratorState` that are records of arrays."""
+"""Fields of an `IntegratorState` that are records of arrays."""
 
 
 class Sum(NamedTuple):
@@ -91,10 +94,11 @@ class IntegratorState:
         Largest |ΔE − work| of the rows [J].
     share : float
         |ΔE − work| at the last row over ``largest`` there [1], infinite before the first.
-    crossings : ndarray, shape (3, 5)
+    crossings : ndarray, shape (4, 5)
         Where lines may touch lines, the first two that may have passed through each other, and the first two neighbours
         along the net: time [s], infinite where there are none, and the four nodes of both; the first line that may have
-        passed through a body: time, its two nodes, the row of the body and a number.
+        passed through a body: time, its two nodes, the row of the body and a number; the first two bodies of which one
+        may have come to the middle of the other: time, the rows of both and twice −1.
     breaks : refweb.system.broken_lines.Breaks, optional
         Broken elements, if elements may break.
     """
@@ -325,7 +329,7 @@ class Integrator(Protocol):
 
         Raises
         ------
-        OpenBook
+        EnergyDriftError
             Where the energy drift exceeds `refweb.dynamics.integrators.energy_balance.DRIFT` and does not fall.
         SolverError
             Where no step is to be had, or a number is not finite.

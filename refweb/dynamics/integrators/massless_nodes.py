@@ -2,6 +2,8 @@
 
 They have one where the tangent among them, K_mm, is positive definite, that is where tension holds them; that follows
 all else without delay, K_mm v_m = −K_mo v_o − ∂f_m/∂t.
+
+`ida` alone uses it; constants and rounds of Newton's method are free.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ Only the times of evaluation differ from those of the loop. The loop evaluates a
 parabola through the last three values, and an integral has one part for each evaluation. Dense output is as accurate
 within a step as at its ends. Therefore peaks are searched by several parabolas, and steps are halved if the error of a
 mean is too large.
+
+Arguments are those of the kernels of `extremes`, `averages` and `rows`, in their order; `ROUNDS` is free.
 """
 
 from __future__ import annotations

@@ -21,6 +21,8 @@ impulse of supports is that of Simpson's rule: they close the balance within `al
 
 The book does not see what gives no impulse to all of the web, though it moves parts of it: natural lengths that reels
 and temperature change, pressure inside of a closed line. Nor does it see [[motion]], whose impulse is that of supports.
+
+Fields of `MomentumBalance` go into checkpoints, effects bring `Balance.impulse`, and a test reads the paragraph above.
 """
 
 from __future__ import annotations

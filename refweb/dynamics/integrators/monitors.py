@@ -1,4 +1,7 @@
-"""Monitors of a run: probes and sums as a record, and their extremes, means and events where no step has been taken."""
+"""Monitors of a run: probes and sums as a record, and their extremes, means and events where no step has been taken.
+
+Kernels read fields of `Observed` by name; `measurements` puts other arrays into ``data`` for probes that read a term.
+"""
 
 from __future__ import annotations
 

@@ -11,6 +11,9 @@ steps, down to `FEWEST`, if the evaluation of its pairs takes longer than the se
 
 A list is deep enough for the next `LASTS` steps, and for the bound on the steps of the next row if that needs at most
 `LONGEST` steps. Thus a list is made once in several rows, by a search over all lines.
+
+Places behind the terms in `records.ForceTerms` are in the order of `near_of`, for `contacts`, `step_bound` and
+`implicit_contacts` as well; no change may miss a contact.
 """
 
 from __future__ import annotations

@@ -10,6 +10,8 @@ By a rotation, points of a body move at most by twice the difference of its quat
 position. Two bodies approach at most by the approach of their positions plus the motion of points of each by rotation.
 Neither passes through the other if this approach plus their depth at the start is less than the least distance from a
 middle to its surface, or if the approach is less than the distance of the spheres around both.
+
+Bounds of motion may be too large, never too small; checks are those of `crossings.checks_of`.
 """
 
 from __future__ import annotations

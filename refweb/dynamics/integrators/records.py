@@ -3,6 +3,9 @@
 Kernels of one signature, and arrays of one type, are in tables, so that the loop is compiled once for any mixture of
 effects. Features that a scene does not have are empty tables or arrays, and their kernels are not compiled, see
 `refweb.dynamics.integrators.features`.
+
+Kernels read fields by name; `central_difference` passes some by position. Names of `CLOCK` up to ``share`` are those of
+`IntegratorState`, and `neighbour_list` fills the places behind the terms.
 """
 
 from __future__ import annotations
@@ -325,7 +328,7 @@ class Running(Record):
         Power of each term at the last step [W].
     length_force : ndarray, shape (2, changing)
         ∂E/∂L of each length that changes [N], at the last step and at this one.
-    crossings : ndarray, shape (3, 5)
+    crossings : ndarray, shape (4, 5)
         Lines and bodies that have met, see `refweb.dynamics.integrators.integrator.IntegratorState`.
     contacts, parts : table
         One array each, space for contacts that are solved for and for their parts.

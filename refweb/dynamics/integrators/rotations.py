@@ -11,6 +11,8 @@ Positions follow x' = g(x, v): of a quaternion q with the velocity u = L/I of it
     z_x − γX z_x − γV z_v = r_x,        M z_v + γK z_x + γC z_v = M r_v,
 
 so that with P = (1 − γX)⁻¹ eliminating displacements leaves (M + γC + γ²KPV) z_v = M r_v − γKP r_x.
+
+`cvode` and `ida` call `linearize`, then `begin`; ``places`` has the scalar part of a quaternion first.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""History rows of the compiled loop: probes, energies, momentum and impulses at an instant."""
+"""History rows of the compiled loop: probes, energies, momentum and impulses at an instant.
+
+The order of a row is that of `integrator.History`, which `step_observer` writes as well.
+"""
 
 from __future__ import annotations
 

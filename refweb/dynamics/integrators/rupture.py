@@ -5,6 +5,8 @@ CVODE, IDA and other observed methods find its moment on what they know within t
 it has passed: they are taken again from before, to where it does, by Brent's method on the length of the last step or
 two. So nothing has to be taken back from the books, extremes and means, and the error of the moment is that of the
 motion.
+
+Attributes it lacks are those of ``inner``, the event of breaks is the last, and ``broken_…`` go into checkpoints.
 """
 
 from __future__ import annotations

@@ -5,6 +5,9 @@ parabolas through the powers there, through what supports give and what pulls on
 integrated to any time within. Where Simpson's rule and the trapezoidal one differ too much, as where damped lines go
 slack in a long step, a piece is to be halved. Explicit steps book what each kick and drift gives instead, which closes
 to rounding, see `refweb.dynamics.integrators.energy_balance`.
+
+`step_observer` splits integrals by position into work, impulse and pushed, so that the last seven entries of ``flow``
+keep their places.
 """
 
 from __future__ import annotations

@@ -28,6 +28,8 @@ Order 8 is not included, since it needs more evaluations than order 6 for errors
 with the same forces takes 1.9 to 3 times as long as order 4 or 6 for errors of 1e-7 to 1e-11 m, by
 ``validation/methods/work_precision.py``.
 
+`settings.Dynamic` checks the orders, which are the keys of `KICKS`; coefficients stay as published.
+
 References
 ----------
 .. [1] S. Blanes, P. C. Moan, "Practical symplectic partitioned Runge–Kutta and Runge–Kutta–Nyström methods", J. Comput.

@@ -1,4 +1,8 @@
-"""The pieces of an explicit step: kick and drift, forces, and the last kick where forces depend on velocity."""
+"""The pieces of an explicit step: kick and drift, forces, and the last kick where forces depend on velocity.
+
+Names in ``apart`` are keys of `features`, fields of `Model` and `Running` stand in `records`, and another order of sums
+changes the bits of results.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The largest stable step, by Gershgorin's bound on the largest frequency of what can act before the next row."""
+"""The largest stable step, by Gershgorin's bound on the largest frequency of what can act before the next row.
+
+A step may come out too short and never too long; `dynamics.expected_cost` finds the same bound in Python.
+"""
 
 from __future__ import annotations
 

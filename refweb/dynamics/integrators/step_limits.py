@@ -1,4 +1,7 @@
-"""Limits of a step: the next corner of a table, and the distance to a passage through bodies or lines."""
+"""Limits of a step: the next corner of a table, and the distance to a passage through bodies or lines.
+
+A limit may be too near and never too far; `step_observer` asks for one before each step.
+"""
 
 from __future__ import annotations
 

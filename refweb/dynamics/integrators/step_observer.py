@@ -3,6 +3,8 @@
 A method takes steps of its own choice and knows its state anywhere within the last one. Each step, cut at the history
 rows, is looked at in its middle and at its end: for extremes and events, and for the integrals of power and of the
 supports' forces by Simpson's rule. A flag of success is not believed: the book of energies is checked at every row.
+
+Plug-ins derive from `StepObserver` and use its public names; a checkpoint keeps ``stats`` by their order.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 `LINEAR_SOLVERS` says how these are solved. By "block" displacements are eliminated by hand, and what is left, a matrix
 of half the size or less, is factorized as the preconditioner of GMRES. Where that inverts the Jacobian exactly, one
 iteration does, and nothing is multiplied: what is to be inverted is the Jacobian times a vector that is known.
+
+`cvode` and `ida` bring `_made`, `_initial` and `linear_options`; scenes name the keys of `LINEAR_SOLVERS`.
 """
 
 from __future__ import annotations
@@ -146,7 +148,7 @@ class Sundials(StepObserver):
         return dict(linsolver="sparse", sparsity=pattern, jacfn=self.jacobian)
 
     def _write(self, J, values):
-        """Write the values of `_whole` to a dense matrix, or to the values of a sparse one."""
+        """Write values at the places of `_full_matrix` to a dense matrix, or to the values of a sparse one."""
         self.stats["nlu"] += 1
         J[:] = np.bincount(self._places, values, J.size).reshape(J.shape)
 

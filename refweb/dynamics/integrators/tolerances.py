@@ -1,4 +1,7 @@
-"""Scales of the tolerances of displacements and velocities where the state itself is near zero."""
+"""Scales of the tolerances of displacements and velocities where the state itself is near zero.
+
+Default tolerances follow from these scales: another scale changes steps and results of all methods with rtol.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Spread of rows of vectors: no two differ by more."""
+"""Spread of rows of vectors: no two differ by more.
+
+`ccd` and `neighbour_list` rely on these bounds, which may be too large and never too small.
+"""
 
 from __future__ import annotations
 

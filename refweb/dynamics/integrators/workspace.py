@@ -1,4 +1,7 @@
-"""Space that the compiled loop works in: nothing in it stays from step to step."""
+"""Space that the compiled loop works in: nothing in it stays from step to step.
+
+Kernels read fields by name; numbers that must stay belong into `explicit_state`.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,9 @@
 
 Within a step forces follow from the plastic strains at its start, which is exact until a line that yields turns back.
 So a step whose dense output turns back is cut at the first such moment, from which the method begins anew.
+
+``method`` has `state` and `interpolated` of `step_observer`, and names of the follower stand in
+`effects.base.InternalVariables`; `SAMPLES`, `ROUNDS` and `SMALL` are free.
 """
 
 from __future__ import annotations
