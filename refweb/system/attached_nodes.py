@@ -9,6 +9,8 @@ with the body:
     δv = δv_b + δω × a + ω × (δθ × a),        δω = W δu + δθ × ω − W (δθ × u),
 
 with W and u of `refweb.net.rotation`. `refweb.net.rotation.to_quaternion` gives δθ by the change of the quaternion.
+
+`resting_bodies` derives from `Carried` and has a `_state` of its own; the pattern must have all entries of `cells`.
 """
 
 from __future__ import annotations

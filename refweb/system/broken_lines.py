@@ -1,4 +1,7 @@
-"""Systems with broken elements: how a system loses elements, and the record of the breaks."""
+"""Systems with broken elements: how a system loses elements, and the record of the breaks.
+
+Checkpoints keep fields of `Breaks` by name; broken elements have EA 0, and cells end by `CellElements.disable`.
+"""
 
 from __future__ import annotations
 

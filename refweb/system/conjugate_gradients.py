@@ -5,6 +5,8 @@ Between two load steps of a web, whose tensions differ by a factor of two or thr
 iterations. An iteration costs a ninth (rslab) to a thirtieth (SuperLU) of a factorization at 118 803 unknowns. If a few
 iterations are not enough, a factorization of A itself costs less. If A or M shows a direction without stiffness, only a
 factorization can tell more. Both cases end the iteration.
+
+`newton` and `duality_bound` take approximate solutions: rules of stopping change costs.
 """
 
 from __future__ import annotations

@@ -8,6 +8,8 @@ columns, and keeps its ordering. It is used from `LARGE` unknowns on, if it is i
 web from flat take 9.4 s CPU with qdldl and 3.8 s with rslab at 29 403 unknowns, 1.8 and 1.4 s at 10 443; at 4563
 factorizations cost the same. rslab is a young library: if the residual of a solution or the signs of its pivots are
 wrong, qdldl replaces it for the rest of the run, with a finding.
+
+Constants are measured; `registry.FACTORIZATIONS` has the names of `LIBRARIES`, and `Lu` has the interface of `Factor`.
 """
 
 from __future__ import annotations

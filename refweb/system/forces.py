@@ -1,4 +1,7 @@
-"""Result of an evaluation of all forces: their sum on every row, and the values of each term per cell."""
+"""Result of an evaluation of all forces: their sum on every row, and the values of each term per cell.
+
+Arrays stand in the order of `System.terms`, and terms over the lines share one array.
+"""
 
 from __future__ import annotations
 

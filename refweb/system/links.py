@@ -2,6 +2,8 @@
 
 The accelerations satisfy M a + Gᵀλ = f with G = ∂g/∂x, and keep the lengths if G a = −|v₂ − v₁|²/L. A state is moved to
 the nearest velocities with G v = 0 and to the nearest positions with G δx = −g; mass weighs the distance.
+
+`ida` takes `places` and `values`, which have one order; constants are free.
 """
 
 from __future__ import annotations

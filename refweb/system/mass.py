@@ -2,6 +2,8 @@
 
 M is the lumped mass on the diagonal plus, for consistent mass, a block of each element whose rows sum to 0. Both masses
 therefore move a rigid net in the same way.
+
+Values are in the pattern of the tangent, as `cvode`, `ida` and modes take them.
 """
 
 from __future__ import annotations

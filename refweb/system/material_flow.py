@@ -1,4 +1,7 @@
-"""Mass that follows reels, for methods that ask a system for it; the explicit loop has kernels of its own."""
+"""Mass that follows reels, for methods that ask a system for it; the explicit loop has kernels of its own.
+
+`effects.mass_flow` has the same equations for explicit steps; `simpson_balance` counts on the order of `brought`.
+"""
 
 from __future__ import annotations
 

@@ -13,6 +13,9 @@ nᵀ, beside a stiffness across that moves nothing.
 A node at the arm a of a body moves by δ + p × a, so that a block K of lines becomes Lᵀ K L with L = (1, −a ×), and as
 the arm turns f·a 1 − a⊗f of the force f on the node is added, as in `refweb.system.attached_nodes`. Kernels of contact
 have columns for the quaternion q = (w, u); those of p follow by δw = −½ u·p and δu = ½ (w p + p × u).
+
+The first row of rotation is the rotation vector, the second no unknown; `statics` and `studies` call public methods of
+this class through `System.carriers`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Fixed sparsity pattern of the tangent of a net, and the assembly of blocks of cells into its values."""
+"""Fixed sparsity pattern of the tangent of a net, and the assembly of blocks of cells into its values.
+
+Rows increase within a column, since `attached_nodes` searches for them; factorizations read `lower` and `upper`, and
+the order of sums in `_scatter` decides bits.
+"""
 
 from __future__ import annotations
 

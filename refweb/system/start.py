@@ -1,4 +1,7 @@
-"""Displacement and velocity at the start, from the effects and bodies of a system."""
+"""Displacement and velocity at the start, from the effects and bodies of a system.
+
+Effects write first and bodies write their rows after them; `System` keeps what `laid` returns.
+"""
 
 from __future__ import annotations
 

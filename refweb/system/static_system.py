@@ -1,4 +1,7 @@
-"""The system of statics: bodies that wait are fixed, and forces that need velocity are left out."""
+"""The system of statics: bodies that wait are fixed, and forces that need velocity are left out.
+
+`at_rest` drops cached properties of `System` by name; its list needs new ones that depend on supports or terms.
+"""
 
 from __future__ import annotations
 

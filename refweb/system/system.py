@@ -8,6 +8,9 @@ force and energy uses the numbers of its time t, and `System.at` returns the sys
 net itself keeps its lengths as built. A loop of kernels cannot call Python, and keeps its own array of lengths.
 
 Values are written to arrays of the caller, by default new ones, so that threads may share a system.
+
+Solvers and plug-ins use all public names; `at`, `with_line_data`, `static_system` and `broken_lines` drop cached
+properties by name, so that a new one may belong into their lists.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Parts of a net without support along an axis, which no force along that axis may act on in statics."""
+"""Parts of a net without support along an axis, which no force along that axis may act on in statics.
+
+Contact is found by the names "contact" and "self_contact" of terms.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 Position x(s) ∈ R³ over natural arc length s, λ = |x'|, t = x'/λ, tension T(λ − 1). The form is the derivative of the
 internal virtual work ∫ T t·δx' ds. No run evaluates it: the compiled kernels of `refweb.effects.elasticity` compute the
 same in 2 % of the time, and a test compares both.
+
+A test alone uses this file, and runs never import it.
 """
 
 from __future__ import annotations
