@@ -1,6 +1,8 @@
 """refweb, a reference solver for space webs: equilibrium and dynamics of cable nets, with the error of every result.
 
 Names are imported when they are used: ``import refweb`` loads nothing that a scene does not need.
+
+Names for editors are those of `refweb.registry.exports`, and nothing is imported at the head of this file.
 """
 
 __version__ = "0.2.0"

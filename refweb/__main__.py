@@ -2,6 +2,8 @@
 
 Exit status: 0 solved, 1 the solver failed, 2 wrong input, 130 interrupted. Nothing heavy is imported before a verb
 needs it.
+
+``pyproject.toml`` names `alone` as the program; a verb brings `add_arguments`, `run` and its help as docstring.
 """
 
 from __future__ import annotations

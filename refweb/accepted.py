@@ -1,4 +1,7 @@
-"""Accepted values of readers, as JSON Schema of draft 4 has them; a reader carries them as ``accepts``."""
+"""Accepted values of readers, as JSON Schema of draft 4 has them; a reader carries them as ``accepts``.
+
+``accepts`` must say the same as the reader that carries it: `refweb.reference` makes schema and help of it.
+"""
 
 from __future__ import annotations
 

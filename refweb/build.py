@@ -1,6 +1,8 @@
 """From the parts of a scene to the `refweb.system.system.System`, and what does not fit together.
 
 Every refusal is an `InputError` whose message begins with the table it stands in.
+
+`Scene` alone calls `build`, by keywords; `_acting` puts bodies and threads first, since others use what they add.
 """
 
 from __future__ import annotations

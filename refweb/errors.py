@@ -1,4 +1,8 @@
-"""Errors: refused input, and failures of solvers."""
+"""Errors: refused input, and failures of solvers.
+
+``code`` is a key of `refweb.findings.CODES`, `runner` reads ``stiffness`` and `accuracy_loop` reads ``drift``; the
+command line shows errors of refweb's classes without their type.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Findings: remarks, warnings and refusals of a run, each with a code that programs can ask for."""
+"""Findings: remarks, warnings and refusals of a run, each with a code that programs can ask for.
+
+Codes, severities and fields of `Finding` stand in ``run.json`` and are read back; tests ask that each code is used.
+"""
 
 from __future__ import annotations
 

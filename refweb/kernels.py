@@ -1,4 +1,4 @@
-"""Compiled kernels: their signatures and where their machine code is kept.
+"""Compiled kernels: their signatures, the records of contacts that some of them fill, and annotations.
 
 Every effect writes its force once, as a kernel of the one signature `FORCE`, so that the explicit loop can call any
 mixture of them without Python, and every other solver calls the same code. ``x`` in a kernel is the *displacement* of
@@ -34,6 +34,8 @@ all its digits, which it loses when positions are the unknowns.
 `STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
 
 `refweb.compiled` says what a kernel is, where its machine code is kept and how records reach it.
+
+A changed signature or dtype here changes every kernel that has it, its callers, and effects of users.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The words of messages: values as one line shows them, and the valid name nearest to one that is not."""
+"""The words of messages: values as one line shows them, and the valid name nearest to one that is not.
+
+`errors` and the package itself import this file, so that it imports nothing of refweb; tests quote messages.
+"""
 
 from __future__ import annotations
 

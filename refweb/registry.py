@@ -7,6 +7,9 @@ Other packages, scripts and notebooks add to the tables of `KINDS` by `register`
 entry point of the groups ``refweb.effects``, ``refweb.shapes``, ``refweb.laws``, ``refweb.observables``,
 ``refweb.integrators`` and ``refweb.verbs``. Entry points are read when a scene, or the command line, names what no
 table has, and for help.
+
+Names in these tables are the format of scenes and of the command line. A class that moves needs its new
+``"module:name"`` here, and `LINE_COLUMNS` has the names that no parameter of a law may take.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""From a scene to a solution: the solver runs, and files, history and progress follow it."""
+"""From a scene to a solution: the solver runs, and files, history and progress follow it.
+
+`_before` asks for keys that `refweb.dynamics.simulation` writes; the simulations of statics and dynamics have the same
+attributes, which `_attempt` reads by name.
+"""
 
 from __future__ import annotations
 

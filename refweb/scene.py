@@ -2,6 +2,9 @@
 
 `Scene` is frozen and one to one with a TOML file. A table that is present is an effect that is present; the module of
 an effect is imported when its table is.
+
+Fields are tables of scene files and arguments in scripts of users; `from_dict` must read the same scene from what
+`to_dict` writes, since result folders keep that as ``scene.toml``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Settings of a scene: solver, supports and output, the tables that are neither web, cable nor effect."""
+"""Settings of a scene: solver, supports and output, the tables that are neither web, cable nor effect.
+
+Names of keys are the format of scenes and, in `Dynamic`, arguments of integrators by `registry.INTEGRATORS`; docstrings
+of classes are the text of `refweb help` and of the schema.
+"""
 
 from __future__ import annotations
 

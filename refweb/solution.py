@@ -1,4 +1,7 @@
-"""Solutions: the results of a run, the fields of its last state as arrays, and its result folder."""
+"""Solutions: the results of a run, the fields of its last state as arrays, and its result folder.
+
+Public names are the interface of users; `load` reads keys that `results.solution.SolutionData.summary` writes.
+"""
 
 from __future__ import annotations
 

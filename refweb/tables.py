@@ -4,6 +4,8 @@ A table is a class with `table` above it, whose fields say what they accept: ``a
 The same class is the Python value, the TOML table and, for effects, the effect itself. Every refusal is an `InputError`
 of one line that names the value, the limit and, for a misspelt name, the nearest valid one. Editors know the keys as
 well: `table` is a ``dataclass_transform`` (PEP 681), which wants defaults by name, ``real(default=1.0)``.
+
+Plug-ins use these readers; ``accepts`` must say what a reader checks, since `refweb.reference` makes the schema of it.
 """
 
 from __future__ import annotations
