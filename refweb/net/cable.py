@@ -1,4 +1,8 @@
-"""The cable a web is made of: material, section, slackness and natural length of every line, by group."""
+"""The cable a web is made of: material, section, slackness and natural length of every line, by group.
+
+Fields of `Group` repeat those of `Cable`, since `_values` reads both by name; docstrings of tables are text of
+`refweb help`; laws, `discretisation` and `studies.form` read `properties` by name.
+"""
 
 from __future__ import annotations
 

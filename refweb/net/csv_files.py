@@ -1,4 +1,7 @@
-"""Reading of webs from two CSV files, one of points and one of lines."""
+"""Reading of webs from two CSV files, one of points and one of lines.
+
+Names in `POINTS` and `LINES` are a file format; `fold`, `boundary.heights` and `law_keys` use `columns_of`.
+"""
 
 from __future__ import annotations
 

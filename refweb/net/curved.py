@@ -1,4 +1,7 @@
-"""Curved line elements on [0, 1]: the quadratic one of scikit-fem, and a nodal cubic, which scikit-fem lacks."""
+"""Curved line elements on [0, 1]: the quadratic one of scikit-fem, and a nodal cubic, which scikit-fem lacks.
+
+Both ends come first among the nodes, as columns of `Net.cells` have them and `results.vtu` expects.
+"""
 
 from __future__ import annotations
 

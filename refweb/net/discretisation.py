@@ -18,6 +18,8 @@ p = 1, 2 and 3 while all of it is taut, and with 2.0, 1.1 and 1.0 once its middl
 on by themselves, with velocities that several points going slack one after another leave wrong by ~ h. With 160 nodes
 the errors of p = 2 and 3 are still an eighth of that of p = 1, with 1000 nodes all three are alike. The strain jumps
 where a slack part is pulled taut, and no order exceeds 1.
+
+Rows of the web's nodes come first, then those inside lines, line by line; `_line_data` has the order of `FIELDS`.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 The functions of a straight element are 1 − ξ and ξ and its nodes are the ends of the line. Explicit steps need nothing
 else, and therefore avoid scikit-fem: its import and that of scipy take as long as that of numba. Elements of higher
 order are in `refweb.net.curved`.
+
+Nodes have the order of columns of `Net.cells`, both ends first; `effects.reel` uses `lumped_shares` as well.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Edges of the faces of a mesh file as the lines of a web, each once."""
+"""Edges of the faces of a mesh file as the lines of a web, each once.
+
+`mesh_file` finds the edges in the last block of the mesh, and takes kinds in `CORNERS` for faces.
+"""
 
 from __future__ import annotations
 

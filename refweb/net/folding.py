@@ -7,6 +7,8 @@ R the largest r. With κ = r ω' ≤ 2π n, no distance grows by more than
 
 the larger singular value of s [[1, 0], [κ, 1]]; along the axis it is s. Where natural lengths are at least σ times the
 distance, all lines are slack.
+
+`effects.fold` draws webs by `turns_of` and `wound`, which change together with σ.
 """
 
 from __future__ import annotations

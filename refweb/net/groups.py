@@ -9,6 +9,8 @@ Every web has groups by its own supports, the nodes of its rim, unless the user 
 ========== ==========================================================================
 
 Each line is in one of these three. A group without lines is none.
+
+Names in `PLACES` are the scene format, in the order of ends in the rim; `givers` gives −1 where no table gives a key.
 """
 
 from __future__ import annotations

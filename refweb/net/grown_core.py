@@ -23,6 +23,8 @@ The depth with kinks, and the normal of the nearest face, gives worse results wi
 cables bent over the edge of a box Newton's method then refuses 48, here none; nets that fall on a box then keep their
 energy to 0.1, here to 1e-5 with order 2. A `WIDENING` of 1, with a constant edge radius, gives the same results except
 for a rounding of 1e-4 of the size, at which the order is 1. A `WIDENING` of 2 gives less depth in the middle.
+
+Contact relies on a concave depth with a gradient of at most 1; value, gradient and Hessian change together.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Webs given node by node and line by line in the scene."""
+"""Webs given node by node and line by line in the scene.
+
+`registry.WEBS` and `studies.form` name the class; its docstring is text of `refweb help` and of the schema.
+"""
 
 from __future__ import annotations
 

@@ -23,6 +23,8 @@ rim, and hexagons have ``rows`` only there. Supports are at the ends of links: w
 the links are their ``anchors``. In a web of layers the nodes of the outline are supported, and the outline is the
 ``rim``. A line that cuts off a corner of a triangle has both nodes on the outline and belongs to ``rim`` too;
 ``ring-N`` is only the outline.
+
+Scenes name nodes, lines and groups by number and name: their order stays, and class docstrings are help text.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Keys of ``[cable]`` and its groups that some laws alone have: points of a curve, and parameters of other packages."""
+"""Keys of ``[cable]`` and its groups that some laws alone have: points of a curve, and parameters of other packages.
+
+Keys of `CURVES` are fields of `Cable`, `Group` and `Thread` and heads of CSV files, and names of parameters are columns
+that compiled laws read.
+"""
 
 from __future__ import annotations
 

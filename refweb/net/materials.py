@@ -3,6 +3,8 @@
 Values of fibres are those of the yarn along its axis. A braided or twisted rope is softer and weaker than its yarn, by
 its construction; knots and edges take more. So a material fills in what a first calculation needs, and the keys
 ``modulus``, ``density`` and ``strength`` of a scene go before it.
+
+`FILLED` are keys of `Cable` and `Group`; a changed value changes results of all scenes that name the material.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Webs from files: meshes of VTK and Gmsh, result frames, and CSV of points and lines."""
+"""Webs from files: meshes of VTK and Gmsh, result frames, and CSV of points and lines.
+
+Names of data are those of frames by `results.vtu`; a new one stands in `BY_VTK` of `mesh_readers` as well.
+"""
 
 from __future__ import annotations
 

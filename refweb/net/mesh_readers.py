@@ -2,6 +2,8 @@
 
 meshio skips polylines of .vtu files without a message, and reads neither polygonal data nor texts. VTK reads such
 files, in a separate process, since a damaged file may end the process.
+
+`BY_VTK` passes on only data that it names; `boundary.surface_file` calls `by_meshio` and `by_vtk` as well.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 `refweb.net.discretisation` makes a net from a web. A net is never changed: effects return copies with more rows, mass
 and numbers of elements.
+
+Effects, solvers and plug-ins read fields by name; a new one has a default, so that `discretisation` may omit it.
 """
 
 from __future__ import annotations

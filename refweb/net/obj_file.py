@@ -2,6 +2,8 @@
 
 A corner of a face has numbers for position, texture and normal, ``f 1/4/2 ...``; only the first is used. A negative
 number counts backwards from the last point above it.
+
+`mesh_readers` and `boundary.surface_file` unpack the five parts of `read_obj` by position.
 """
 
 from __future__ import annotations

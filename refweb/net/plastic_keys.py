@@ -1,4 +1,7 @@
-"""Keys of lines that yield: yield stress, and hardening, a number or a curve of stress over plastic strain."""
+"""Keys of lines that yield: yield stress, and hardening, a number or a curve of stress over plastic strain.
+
+`effects.plastic` needs equally many points in all curves; `LAW` is a name in `registry.LAWS`.
+"""
 
 from __future__ import annotations
 

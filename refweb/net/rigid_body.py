@@ -46,6 +46,8 @@ refuses a shape without one. An entry point of your package makes it known to sc
     wall = "my_webs.wall:Wall"
 """
 
+# This docstring is a page of the site, `test_body_shape` runs its code, and kernels read `Grown` by name.
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace

@@ -19,6 +19,8 @@ body. A body on an axle of direction n has W = n⊗n, and I about the axle: mome
 centre of mass is off the axle, a fixed row of the axle carries the row of the body as a node, and the kinetic energy
 counts its part of I once. The second component of the second row of rotation is the angle about the axle.
 
+Names in `apart` are keys of `dynamics.integrators.features`; the order of sums decides bits of bodies that turn.
+
 References
 ----------
 .. [1] R. van Zon, J. Schofield, "Numerical implementation of the exact dynamics of free rigid bodies", J. Comput. Phys.

@@ -1,6 +1,8 @@
 """Bounds of the velocity of bodies that turn, and of the stiffness by attached nodes, for steps of explicit methods.
 
 See `refweb.net.rotation`.
+
+Names in `apart` are keys of `dynamics.integrators.features`; no bound may fall below the exact value.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Single cables, straight or hanging on an arc."""
+"""Single cables, straight or hanging on an arc.
+
+`registry.WEBS` names this class, `net.groups` makes the groups, and the class docstring is text of `refweb help`.
+"""
 
 from __future__ import annotations
 

@@ -7,6 +7,8 @@ it would count several times.
 
 A rim consists of two rows of arcs, shifted by half an arc. Each arc has one contact with the weight sin²(π ξ). The
 weights of both rows add up to 1 at the deepest point of the rim, so that a rolling rim has a constant force.
+
+`effects.contact` reads `PART` by name and width; other parts, or another order, change the bits of contact.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 By Steiner's formula, a grown box consists of the box, its faces times a length, its edges times a disc and its corners
 times a ball. The moments of each part follow from those of the ball of that dimension.
+
+`Shape.volume` and `Shape.inertia` use these: a change moves mass and inertia of bodies that a density gives.
 """
 
 from __future__ import annotations

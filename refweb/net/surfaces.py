@@ -1,4 +1,7 @@
-"""Surfaces of a sphere and a tube as points and triangles, outward, for drawing."""
+"""Surfaces of a sphere and a tube as points and triangles, outward, for drawing.
+
+Pictures, frames and `commands.doubts` alone use surfaces: their resolution is free.
+"""
 
 from __future__ import annotations
 

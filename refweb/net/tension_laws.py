@@ -1,6 +1,8 @@
 """Tension laws by name: stress, tangent and energy density of a cable against its engineering strain.
 
 Each law is a class of `refweb.net.laws`; `Law` evaluates one of them over arrays, without a net.
+
+`refweb` exports `Law`; `cable`, `law_keys` and `effects.thread` find laws by `law_of`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Threads of a net: lines through several nodes, with one tension."""
+"""Threads of a net: lines through several nodes, with one tension.
+
+`effects.thread` makes the `ThreadLine`; results and statics read its properties by name.
+"""
 
 from __future__ import annotations
 

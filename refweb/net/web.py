@@ -1,4 +1,7 @@
-"""Webs: nodes, lines between them and their natural lengths, and the selection of nodes and lines by name."""
+"""Webs: nodes, lines between them and their natural lengths, and the selection of nodes and lines by name.
+
+`refweb` exports `Web`, whose arrays are read-only; words in `SELECTIONS` are the scene format.
+"""
 
 from __future__ import annotations
 

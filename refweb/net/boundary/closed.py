@@ -5,6 +5,8 @@ The moments are those of tetrahedra from one point to each triangle [1]_: with t
 + c⊗c)/20. The point is the middle of the box around the surface. The library trimesh 5.2 takes the origin, and the
 inertia of a box at a distance of 1 km then has an error of 1e-5; here it is 3e-13.
 
+`shapes.mesh` repairs a surface that raises `NotClosedError`; any other `InputError` refuses the file.
+
 References
 ----------
 .. [1] F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates",

@@ -2,6 +2,8 @@
 
 Two triangles cross if an edge of one passes through the other. Each edge is compared with the triangles in the cells of
 a grid that the edge crosses, except triangles with a common corner.
+
+`winding` reads the lists of `triangles_by_cell`, in which cell (i, j, k) has the number (i n₁ + j) n₂ + k.
 """
 
 from __future__ import annotations

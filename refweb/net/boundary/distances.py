@@ -6,6 +6,8 @@ intersections of the surface with a straight line along the third axis decides i
 normals, so that triangles without area do no harm. Signs of products decide which of two triangles with a common edge a
 line meets. The products of both are exact negatives of each other: no line passes between the triangles.
 
+`winding` calls `meets`, too; without ``fastmath=False`` there and in `_side` products are no exact negatives.
+
 References
 ----------
 .. [1] H. Zhao, "A fast sweeping method for Eikonal equations", Math. Comp. 74 (2005) 603–627,

@@ -11,6 +11,8 @@ which reproduces cubic polynomials [1]_: the field misses a smooth surface by O(
 waves beside edges are smaller than those of splines that interpolate δ: on the surface of a box gradients reach 1.09,
 not 1.19.
 
+Shapes keep their `Field`, since kernels read `numbers` at its address, in the order of `ORIGIN` to `HEAD`.
+
 References
 ----------
 .. [1] C. de Boor, G. J. Fix, "Spline approximation by quasiinterpolants", J. Approx. Theory 8 (1973) 19–45,

@@ -1,4 +1,7 @@
-"""Terrain from heights: triangles between given points, and the solid block of ground below them."""
+"""Terrain from heights: triangles between given points, and the solid block of ground below them.
+
+`shapes.terrain` relies on triangles that face up; its `FORMATS` names the suffixes that `places_of` reads.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 An ear is a corner that does not point inward and whose triangle holds no other corner. A polygon whose sides do not
 cross has at least two ears [1]_; the ear with the largest least angle is cut off first.
 
+None for sides that cross is a contract: `repair` then takes a cone, and `surface_file` refuses the file.
+
 References
 ----------
 .. [1] G. H. Meisters, "Polygons have ears", Amer. Math. Monthly 82 (1975) 648–651, doi:10.2307/2319703.

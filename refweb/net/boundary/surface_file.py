@@ -2,6 +2,8 @@
 
 meshio reads STL. VTK reads VTP, in a separate process. `refweb.net.obj_file` reads corners and faces of OBJ: meshio
 does not accept the lists of textured files, and VTK rounds to 7 digits.
+
+A suffix in `READERS` stands in `FORMATS` of `shapes.terrain` and in docstrings of `file` and `heights`, too.
 """
 
 from __future__ import annotations

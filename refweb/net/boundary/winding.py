@@ -5,6 +5,8 @@ it is an integer: the number of times that a straight line from the point leaves
 that it enters. Winding numbers of parts add up: the union of overlapping parts is the set with a number above 1/2.
 Lines run along the third axis, and are compared with the triangles in their cell of a grid across that axis.
 
+`repair` unpacks `sums` in this order; `LINES` changes the mass of some repaired solids.
+
 References
 ----------
 .. [1] A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding

@@ -7,6 +7,8 @@ beyond the last one the last slope goes on. The energy is the exact integral.
 
 Kernels read the pieces of a curve from an array at an address that stands among the numbers of a line. The net keeps
 these arrays, `refweb.net.net.Net.kept`.
+
+Kernels here read `pieces` in the order of `WIDTH`; `Net` and `results.state` read ``last_strain`` by name.
 """
 
 from __future__ import annotations

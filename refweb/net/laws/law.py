@@ -3,6 +3,8 @@
 A law is a class of scalar kernels that take a strain and the numbers of a line by name: those of
 `refweb.net.laws.line_data.FIELDS` and the columns of the law. In place of stress and modulus kernels have the tension
 and EA of the line, ``line.ea``.
+
+A new kernel of laws needs a default here and an entry in `Mixed`; `Net.law_is` reads attributes by name.
 """
 
 from __future__ import annotations

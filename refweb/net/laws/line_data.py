@@ -1,4 +1,7 @@
-"""Numbers of the elements of lines, by name, over the matrix that kernels read."""
+"""Numbers of the elements of lines, by name, over the matrix that kernels read.
+
+`discretisation` fills `FIELDS` in this order; effects add columns behind them, and find them by name.
+"""
 
 from __future__ import annotations
 

@@ -6,6 +6,8 @@ compression. With g = (s + r)/2 (for s < 0: 2η²/(r − s)) and g0, r0 its valu
     σ = E ε (g + g0)/(r + r0),        dσ/dε = E g/r,        α = g0,
 
 which has a relative error of a few units of round-off everywhere. Under compression the stress tends to the floor −αE.
+
+All formulas here are of one law and change together; `statics.lowest` repeats its inverse and uses its energy.
 """
 
 # Kernels in classes are no methods:

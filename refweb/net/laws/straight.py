@@ -2,6 +2,8 @@
 
 Tension of the laws of form finding does not depend on natural length: T = q l of a force density q, and a constant
 force. In place of EA they have q L, L the natural length, and the force, so that T = EA (1 + ε) and T = EA.
+
+`registry.LAWS` has the names; proofs of statics rest on `convex`, `cone`, `bar` and `forming`.
 """
 
 # Kernels in classes are no methods:

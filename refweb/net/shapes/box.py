@@ -1,4 +1,7 @@
-"""Boxes with rounded edges."""
+"""Boxes with rounded edges.
+
+`registry.SHAPES` names the class, and its docstring is text of `refweb help` and of the schema.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Capsules: straight lines grown by a radius."""
+"""Capsules: straight lines grown by a radius.
+
+`registry.SHAPES` names the class, and its docstring is text of `refweb help` and of the schema.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Cylinders with rounded edges."""
+"""Cylinders with rounded edges.
+
+`registry.SHAPES` names the class, and its docstring is text of `refweb help` and of the schema.
+"""
 
 from __future__ import annotations
 

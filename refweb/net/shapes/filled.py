@@ -1,4 +1,7 @@
-"""Bodies with depth on a grid: solids inside a surface of triangles."""
+"""Bodies with depth on a grid: solids inside a surface of triangles.
+
+Subclasses give `solid` and `axes`, and keep `solid` as long as kernels read its field by address.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Solids from files of a surface of triangles."""
+"""Solids from files of a surface of triangles.
+
+`registry.FILES` names the key `file`, and the docstring of the class is text of `refweb help` and of the schema.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Planes: half spaces of ground."""
+"""Planes: half spaces of ground.
+
+`grown` makes extent and thickness infinite, on which checks of contact rely; the class docstring is help text.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Rings: rigid circles; a web in the plane of a ring touches it as a disc."""
+"""Rings: rigid circles; a web in the plane of a ring touches it as a disc.
+
+`planar` decides rows of rotation in `rigid_body`; the docstring of the class is text of `refweb help`.
+"""
 
 from __future__ import annotations
 

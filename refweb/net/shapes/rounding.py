@@ -1,4 +1,7 @@
-"""Rounded edges of boxes and cylinders."""
+"""Rounded edges of boxes and cylinders.
+
+`ROUNDING` stands in docstrings of `Box` and `Cylinder`, and changes results of all scenes without the key.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Spheres: points grown by a radius."""
+"""Spheres: points grown by a radius.
+
+With `once`, contact acts once a line, not once an element; the class docstring is text of `refweb help`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Terrain: ground with heights from a file."""
+"""Terrain: ground with heights from a file.
+
+`registry.FILES` names the key `heights`; the docstring of the class is text of `refweb help` and of the schema.
+"""
 
 from __future__ import annotations
 
