@@ -7,6 +7,8 @@ the result may lie. ``NAME mean`` and ``NAME deviation`` are those of its ensemb
 `refweb.results.error_budget`. An empty cell means that the value is not known. Numbers read back to the same floats.
 
 Rows are in the order in which cases end while a study runs, and in the order of the cases when it has ended.
+
+`sweeps`, `pages.study` and `pictures.studies` read columns by these names and endings.
 """
 
 from __future__ import annotations

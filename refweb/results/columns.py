@@ -1,6 +1,8 @@
 """Columns of ``history.csv`` beside the observables, by the effects of a system.
 
 Statics and dynamics write these columns. No observable, event, body or group may have the name of one.
+
+`dynamics.history`, `state` and `pictures.balances` repeat some names of this file format; vectors stay last.
 """
 
 from __future__ import annotations

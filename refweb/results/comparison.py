@@ -1,4 +1,7 @@
-"""Comparison of result folders: agreement of their results within ±, and differences of their scenes."""
+"""Comparison of result folders: agreement of their results within ±, and differences of their scenes.
+
+Keys of the result are those of `refweb compare --json`; `commands.console` prints it as a table.
+"""
 
 from __future__ import annotations
 

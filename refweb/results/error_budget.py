@@ -15,6 +15,8 @@ Every verdict follows from ± and the parts alone:
 =====================  =================================================================================
 
 A result has n digits if ± is at most 10^−n of its value. There is no verdict if ± is small and a part is not estimated.
+
+Parts and verdicts stand in `run.json` and `results.csv`; a new part needs words, and a colour of `pictures.sheet`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Files that are whole or do not exist: they are written under another name and then moved. Numbers as text."""
+"""Files that are whole or do not exist: they are written under another name and then moved. Numbers as text.
+
+The order of tables in `as_toml` decides the order of sums, and so the bits of a run that starts from the file.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 ``history.csv`` grows by whole rows. Every other file is written under another name and then moved. The row of a frame
 is written first, then the frame and the checkpoint of its state, and then its entry in ``web.pvd``.
+
+A new file belongs in `RESULT_FILES`; `dynamics` and `pictures.frames` read keys of the checkpoint.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Display of a scene and of a solution in a notebook, as HTML."""
+"""Display of a scene and of a solution in a notebook, as HTML.
+
+`Scene` and `Solution` show these parts; all texts of users are escaped here.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,9 @@ displacement, the velocity and the total force of each row of the unknowns, shap
 strain of each element, shape (cells, 2 or more). ``rows`` and ``data`` are parameters of the probe; ``data`` may also
 be the output of a force term for its cells. If ``where[1]`` is `PLACE`, the probe writes the row or element of its
 value to ``where[0]``.
+
+A change of `PROBE` changes all kernels here, in `observables` and in plug-ins; `extremes` has loops of its own for what
+`plain_of` knows.
 """
 
 from __future__ import annotations

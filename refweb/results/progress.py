@@ -1,4 +1,7 @@
-"""Progress of a run: a bar in a terminal, a line in a notebook, and a line now and then where there is neither."""
+"""Progress of a run: a bar in a terminal, a line in a notebook, and a line now and then where there is neither.
+
+`runner` and verbs pass ``tell(text, share)`` on; a phase is known by its text without numbers, else texts are free.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Provenance of a result: sizes of the web, versions of the libraries that solved it."""
+"""Provenance of a result: sizes of the web, versions of the libraries that solved it.
+
+Keys stand in `run.json`; a file without ``refweb`` in ``versions`` is foreign to `folder.read_summary`.
+"""
 
 from __future__ import annotations
 

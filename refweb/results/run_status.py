@@ -1,4 +1,7 @@
-"""End of a run and its cost: status, message and time, also after an error."""
+"""End of a run and its cost: status, message and time, also after an error.
+
+Status words and keys of `cost` stand in `run.json`; pictures, pages and studies read them by name.
+"""
 
 from __future__ import annotations
 

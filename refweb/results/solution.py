@@ -1,4 +1,7 @@
-"""The data of a solution: attributes that a run fills in, and their form in ``run.json``."""
+"""The data of a solution: attributes that a run fills in, and their form in ``run.json``.
+
+Keys of `summary` and `plain` are the format of `run.json`; statics, dynamics and studies fill fields by name.
+"""
 
 from __future__ import annotations
 

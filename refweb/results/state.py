@@ -1,4 +1,7 @@
-"""State of a net at an instant, and the quantities that follow from it."""
+"""State of a net at an instant, and the quantities that follow from it.
+
+Observables, frames and remarks read properties by name; codes of findings stand in `findings.CODES`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Largest stress over strength of a run, its ±, and findings on it."""
+"""Largest stress over strength of a run, its ±, and findings on it.
+
+`plain` is the format of `run.json`, which `read_utilisation` reads; `UTILISATION` stays a tuple.
+"""
 
 from __future__ import annotations
 

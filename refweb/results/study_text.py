@@ -1,4 +1,7 @@
-"""Results of a study as text: rows for each result, condition and index, for the console and the page."""
+"""Results of a study as text: rows for each result, condition and index, for the console and the page.
+
+Keys are those of `sweeps.study_result` and `sweeps.chances`; texts are for readers and free.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """Summary of a run as text: rows of results, load steps and modes, and sentences on the rest.
 
 A summary is the content of ``run.json``. The console and the page of a run show the same.
+
+`pages.sections` takes "t = " and "at " off cells of `rows_of_results`; other texts are for readers, and free.
 """
 
 from __future__ import annotations

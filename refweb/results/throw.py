@@ -1,4 +1,7 @@
-"""Numbers of a throw: opening of the mouth of a net over time and distance, and its cover of a target at the end."""
+"""Numbers of a throw: opening of the mouth of a net over time and distance, and its cover of a target at the end.
+
+Names of numbers stand in `run.json` and in conditions of studies; the class docstring is text of `refweb help`.
+"""
 
 from __future__ import annotations
 

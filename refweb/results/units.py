@@ -1,4 +1,7 @@
-"""Numbers as text for readers: values with their ± in readable units, in one notation."""
+"""Numbers as text for readers: values with their ± in readable units, in one notation.
+
+No program reads these texts, but tests pin their notation; `run.json` has plain numbers.
+"""
 
 import math
 

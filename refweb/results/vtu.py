@@ -1,4 +1,7 @@
-"""A state as meshes of its web and its bodies: points, cells and data of both; and their VTU files."""
+"""A state as meshes of its web and its bodies: points, cells and data of both; and their VTU files.
+
+Names of data are a file format: `net.mesh_file`, `pictures.frames` and ParaView read them.
+"""
 
 from __future__ import annotations
 

@@ -57,3 +57,5 @@ have. A sum of energies has weights in place of a probe, as in ``balances.py``. 
 `refweb.registry.OBSERVABLES`; ``tests/results/test_observable_contract.py`` holds the two faces of each against each
 other.
 """
+
+# This docstring is a page of the site, and `tests/how_to/test_observable.py` runs the code in it.

@@ -1,4 +1,7 @@
-"""Angular momentum of web and free bodies about their centre of mass, or the part of nodes or of a body."""
+"""Angular momentum of web and free bodies about their centre of mass, or the part of nodes or of a body.
+
+`of` and the kernel compute the same and change together; the class docstring is text of `refweb help`.
+"""
 
 from __future__ import annotations
 

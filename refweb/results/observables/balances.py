@@ -1,4 +1,7 @@
-"""Observables of the energy balance: energies, work and step size, sums that need no probe."""
+"""Observables of the energy balance: energies, work and step size, sums that need no probe.
+
+Quantities are columns of `results.columns`, `dynamics.history` uses `weights`, and docstrings are help text.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Observables between nodes: their distance, and perimeter and area of the mouth of a net."""
+"""Observables between nodes: their distance, and perimeter and area of the mouth of a net.
+
+Kernels serve `of` as well; `commands.doubts` uses `MouthArea`; class docstrings are text of `refweb help`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Tension, stress and strain of elements of lines, of which one counts, see ``select`` of `refweb.Observe`."""
+"""Tension, stress and strain of elements of lines, of which one counts, see ``select`` of `refweb.Observe`.
+
+`values` and the probe give the same; `statics.simulation` uses `StressShare`; class docstrings are help text.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Displacement, position and velocity: of several nodes or bodies one counts, see ``select`` of `refweb.Observe`."""
+"""Displacement, position and velocity: of several nodes or bodies one counts, see ``select`` of `refweb.Observe`.
+
+`reaction` and `angular_momentum` build on `Nodal`; `numbers` has the form of `probes.largest_of`.
+"""
 
 from __future__ import annotations
 

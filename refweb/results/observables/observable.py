@@ -1,4 +1,7 @@
-"""Observables: a value at an instant, and the probe that follows it through the steps of a run."""
+"""Observables: a value at an instant, and the probe that follows it through the steps of a run.
+
+Statics, dynamics, plots and plug-ins use these names; kernels of `probes` read the numbers of `SELECTIONS`.
+"""
 
 from __future__ import annotations
 

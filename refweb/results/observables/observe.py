@@ -1,4 +1,7 @@
-"""``[[observe]]``: a quantity with a name, and its reduction over time."""
+"""``[[observe]]``: a quantity with a name, and its reduction over time.
+
+Keys and defaults are the scene format, and docstrings are text of `refweb help` and of the schema.
+"""
 
 from __future__ import annotations
 

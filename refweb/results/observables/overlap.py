@@ -1,4 +1,7 @@
-"""Depth of lines in bodies."""
+"""Depth of lines in bodies.
+
+`dynamics.history` follows contact by the probes here, whose rows are those of `system.contact_forces`.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 A kernel gets the total force f on each row; the force of a support is −f. The contact force on a body is the sum over
 its contacts, see `refweb.system.contact_forces`: it is zero without contact, whatever else acts.
+
+`of` adds up forces as the kernels of `probes` do; the class docstring is text of `refweb help`.
 """
 
 from __future__ import annotations

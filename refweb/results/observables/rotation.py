@@ -1,6 +1,8 @@
 """Rotation of a body: its orientation, its angular velocity and its angular momentum about its centre.
 
 All components are along the axes x, y and z of the scene.
+
+`support` builds on `Turning`; `of` and kernels change together; class docstrings are text of `refweb help`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The share of elements that are slack."""
+"""The share of elements that are slack.
+
+`probes.slack_fraction` is the kernel of dynamics; the class docstring is text of `refweb help`.
+"""
 
 from __future__ import annotations
 

@@ -7,6 +7,8 @@ negative, and what the centre of mass takes to go round an axle:
 
 with the arm r from the axle to the centre of mass, the moment M of all that acts and I about the axle. An axle bears
 the moment across it, J α n + ω² n × J n − M with the tensor of inertia J about the same point.
+
+Kernels have these formulas, and serve `of` as well; class docstrings are text of `refweb help`.
 """
 
 from __future__ import annotations

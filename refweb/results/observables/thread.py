@@ -1,4 +1,7 @@
-"""Tension, stress, strain and length of a thread."""
+"""Tension, stress, strain and length of a thread.
+
+`column` counts what `effects.thread` writes; `Observe` finds classes by the capitalised name of a quantity.
+"""
 
 from __future__ import annotations
 
