@@ -1,4 +1,7 @@
-"""Balances of energy and momentum of a run as panels of a plot, with their errors."""
+"""Balances of energy and momentum of a run as panels of a plot, with their errors.
+
+Names are those of `results.columns` and, of drifts, those of `run.json`; the drawing is free.
+"""
 
 from __future__ import annotations
 

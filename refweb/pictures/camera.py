@@ -1,4 +1,7 @@
-"""Cameras: projection of points to a page, and the choice of views that show the deformation of a web."""
+"""Cameras: projection of points to a page, and the choice of views that show the deformation of a web.
+
+`pages.space` takes its first view from here; names in `VIEWS` are values of ``--view``.
+"""
 
 from __future__ import annotations
 

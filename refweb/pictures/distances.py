@@ -1,4 +1,7 @@
-"""Panel of stress, tension or strain of lines over their distance from the point of impact or load."""
+"""Panel of stress, tension or strain of lines over their distance from the point of impact or load.
+
+`FIELDS` are fields of frames, and `plots.kinds` makes names of plots of them; the drawing is free.
+"""
 
 from __future__ import annotations
 

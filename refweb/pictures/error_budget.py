@@ -1,4 +1,7 @@
-"""Picture of an error budget: the parts of ± of each result as a stacked bar, relative to its value."""
+"""Picture of an error budget: the parts of ± of each result as a stacked bar, relative to its value.
+
+`PARTS` has at most as many entries as `sheet.COLOURS`: a part without a colour is left out silently.
+"""
 
 from __future__ import annotations
 

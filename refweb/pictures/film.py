@@ -2,6 +2,8 @@
 
 One renderer draws all frames. Title, axes and legend are drawn once, and for each frame only the web and its time.
 Frames are read, drawn and written one after the other, so that memory holds one of them.
+
+`commands.picture` gives its options as keywords to `animate`; sizes, colours and durations are free.
 """
 
 from __future__ import annotations

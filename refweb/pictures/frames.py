@@ -1,6 +1,8 @@
 """Frames, the data of one instant for drawing: lines with values, supports, masses and bodies.
 
 `read` reads a frame of a result folder, `frame_of` makes one from meshes in memory.
+
+`results.vtu` gives names of data, `results.folder` keys of the checkpoint; pictures and pages read `Frame` by name.
 """
 
 from __future__ import annotations

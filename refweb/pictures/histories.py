@@ -1,4 +1,7 @@
-"""Panels of histories over time, of results over load steps and of frequencies of modes, with known ±."""
+"""Panels of histories over time, of results over load steps and of frequencies of modes, with known ±.
+
+`plots` calls a function for each kind of plot, and each gives panels of `sheet`; the drawing is free.
+"""
 
 from __future__ import annotations
 

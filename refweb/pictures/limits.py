@@ -1,4 +1,7 @@
-"""Limits of axes, from values without ±; a bar of ± beyond a limit is cut and marked by an arrow and its ±."""
+"""Limits of axes, from values without ±; a bar of ± beyond a limit is cut and marked by an arrow and its ±.
+
+Plots of runs and of studies set most of their axes here; margins and marks are free.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Numbers of lines on a picture: lines with the largest values first, without overlaps."""
+"""Numbers of lines on a picture: lines with the largest values first, without overlaps.
+
+`pictures` writes the text that `number_lines` gives below the picture; all else is free.
+"""
 
 from __future__ import annotations
 

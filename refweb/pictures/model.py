@@ -1,4 +1,7 @@
-"""Elements of a model, the list of all that is drawn of a frame: tubes, balls and surfaces."""
+"""Elements of a model, the list of all that is drawn of a frame: tubes, balls and surfaces.
+
+`opengl` and `polygons` draw each class; a new one needs a function in both.
+"""
 
 from __future__ import annotations
 

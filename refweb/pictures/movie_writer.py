@@ -3,6 +3,8 @@
 The ``open_gif`` of pyvista records one window of pyvista, but a page here has two views, axes and texts. One palette
 for each image, the default of imageio and pillow, makes a file of 2.7 MB for the film of ``capture-stage``, with
 colours that change from image to image; one palette for all images makes 1.5 MB.
+
+A new ending needs a branch in `write` and stands in `ENDINGS`; `film` gives images of one size, each with its duration.
 """
 
 from __future__ import annotations

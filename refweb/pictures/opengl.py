@@ -1,4 +1,7 @@
-"""Drawing of models by pyvista, in a window or off screen as an image of each view."""
+"""Drawing of models by pyvista, in a window or off screen as an image of each view.
+
+`render` calls `images` in a child process, which finds its window in `_off_screen`; lights and matter are free.
+"""
 
 from __future__ import annotations
 

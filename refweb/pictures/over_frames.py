@@ -1,4 +1,7 @@
-"""Fields over all frames of a run: the largest value of each line, and peaks of the run between frames."""
+"""Fields over all frames of a run: the largest value of each line, and peaks of the run between frames.
+
+Fields have names of `LARGEST` and another field, which `stage` and `line_numbers` take apart.
+"""
 
 from __future__ import annotations
 

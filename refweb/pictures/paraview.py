@@ -1,4 +1,7 @@
-"""Script that shows a run in ParaView: tubes, one range of colours, grey slack lines, bodies, time, camera."""
+"""Script that shows a run in ParaView: tubes, one range of colours, grey slack lines, bodies, time, camera.
+
+Keys of `given` are names in `for_paraview.template`, whose line `GIVEN = {}  # what is shown` stays letter by letter.
+"""
 
 from __future__ import annotations
 

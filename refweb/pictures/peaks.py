@@ -1,4 +1,7 @@
-"""The largest value of a quantity over a run, in particular of tension, from ``run.json`` and ``scene.toml``."""
+"""The largest value of a quantity over a run, in particular of tension, from ``run.json`` and ``scene.toml``.
+
+Keys are those of `run.json` and `scene.toml`; `pages.sheet_text` reads fields of `Largest` by name.
+"""
 
 from __future__ import annotations
 

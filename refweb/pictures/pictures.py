@@ -4,6 +4,8 @@ A picture has two views: in perspective, and from the side with metres along the
 cable, has one view along the normal of the plane. Colours have one range in all frames of a run, so that two pictures
 of it can be compared. Slack lines are grey if the field is a tension, stress or strain. No display is needed:
 `refweb.pictures.render` renders by OpenGL off screen, and `refweb.pictures.polygons` where it cannot.
+
+`refweb` exports `picture`, and `commands.picture` gives its options as keywords: their names stay.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Data of a record for plots: history with units, results with ±, and the style among several records."""
+"""Data of a record for plots: history with units, results with ±, and the style among several records.
+
+Names and units come from heads of tables, ``NAME [unit]``; panels read properties of `Shown` by name.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """Plots of one or several runs: histories with ±, balances, spectra, stress over distance, load steps, frequencies.
 
 `kinds` lists the plots of a record, `draw` makes a figure of records, and `plot` writes a figure of result folders.
+
+Names of plots are values of ``refweb plot --quantity``; `LETTERS_STAY` and `BESIDE` make equal plots equal files.
 """
 
 from __future__ import annotations

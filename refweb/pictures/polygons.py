@@ -1,4 +1,7 @@
-"""Tubes, balls and surfaces as depth-sorted polygons of matplotlib, for machines without OpenGL."""
+"""Tubes, balls and surfaces as depth-sorted polygons of matplotlib, for machines without OpenGL.
+
+`film` and `pictures` draw by this where `render` gives None; the drawing is free.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Records: summary, history and frames of a run, from a folder or memory, for pictures, plots and pages."""
+"""Records: summary, history and frames of a run, from a folder or memory, for pictures, plots and pages.
+
+Plots, pages and pictures know a run by `Record` alone; `studies.modes` gives the name ``frequency_N``.
+"""
 
 from __future__ import annotations
 

@@ -4,6 +4,8 @@ VTK 9.7, the library below pyvista, needs libEGL, libOSMesa or a display. On a s
 process with a segmentation fault. A `Renderer` therefore renders in a child process, see `refweb.pictures.opengl`,
 which it keeps for all frames of a film. It tries each kind of off-screen window in turn and returns None if none works.
 `refweb.pictures.polygons` then draws the same model with the same `refweb.pictures.camera.View`.
+
+None as an answer is a contract: `pictures` and `film` then draw by `polygons`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Sheets: layout of the panels of a plot one below the other, styles, labels and fonts, readable on a phone."""
+"""Sheets: layout of the panels of a plot one below the other, styles, labels and fonts, readable on a phone.
+
+All plots take styles from here; `COLOURS` has one for each part of `results.error_budget` at least.
+"""
 
 from __future__ import annotations
 

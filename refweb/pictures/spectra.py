@@ -1,4 +1,7 @@
-"""Spectra of histories with equal intervals: amplitude over frequency."""
+"""Spectra of histories with equal intervals: amplitude over frequency.
+
+`plots` offers a spectrum from `FEWEST` rows on; other constants change only the drawing and its texts.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The stage of a picture: the common parts of all pages of a film, and the drawing and labels of a frame."""
+"""The stage of a picture: the common parts of all pages of a film, and the drawing and labels of a frame.
+
+`pages.space` and `paraview` take colours and `UNITS` from here, so that all show a field alike.
+"""
 
 from __future__ import annotations
 

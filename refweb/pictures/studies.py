@@ -1,4 +1,7 @@
-"""Plots of a study: one figure for each result, over the varying parameters, with ± and probabilities."""
+"""Plots of a study: one figure for each result, over the varying parameters, with ± and probabilities.
+
+Columns are those of `results.case_rows`; `pages.study` uses `draw` and `of_folder`; the drawing is free.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Window of pyvista for a run: lines as tubes, slack lines grey, bodies, supports, and a slider over frames."""
+"""Window of pyvista for a run: lines as tubes, slack lines grey, bodies, supports, and a slider over frames.
+
+`commands.view` calls `window`, and a test calls `prepared` off screen; all else is free.
+"""
 
 from __future__ import annotations
 
