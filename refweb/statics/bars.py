@@ -1,4 +1,7 @@
-"""The lines of a net as bars: a straight line is one bar, a curved line has a bar at each quadrature point."""
+"""The lines of a net as bars: a straight line is one bar, a curved line has a bar at each quadrature point.
+
+`duality_bound` proves errors by these arrays, and `newton` and `floating` use them: names and meaning stay.
+"""
 
 from __future__ import annotations
 

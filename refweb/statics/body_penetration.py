@@ -3,6 +3,9 @@
 Statics has no motion between two equilibria, so each point is taken to move in a straight line. A line that moves
 through the core of a body in this way has passed through the body or has slid around it. The load steps do not tell
 which; smaller ones would.
+
+`statics.simulation` and, for a start at an equilibrium, `dynamics.simulation` use `Passage`, and `record` takes
+equilibria in their order.
 """
 
 from __future__ import annotations

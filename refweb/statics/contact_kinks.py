@@ -3,6 +3,8 @@
 Contact with a sphere acts once a line, at the line's point nearest the centre. Where a line of several elements bends
 around the sphere, two of them may be as near: the energy ½ k (R − d)² of the nearer one has a kink there, which draws
 an equilibrium into it.
+
+`equilibrium` puts the text of `kink_remark` into a message; both limits are free.
 """
 
 from __future__ import annotations

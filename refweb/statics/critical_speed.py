@@ -14,6 +14,8 @@ slope, and the limit is sharp only where that is the last one.
 Counts of negative pivots (Sylvester's law of inertia) compare A with Ω²C. Translations of a part that no support holds
 across the axis are an exception, since A does not resist them. In the inertial frame such a part moves in a straight
 line; it rotates steadily if its centre of mass is on the axis.
+
+`newton` and `stability` allow as many negative pivots as `drifting` counts; `ANCHOR` and `HELD` may change no count.
 """
 
 from __future__ import annotations

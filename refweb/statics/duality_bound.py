@@ -25,6 +25,8 @@ least gap to second order. Newton's method leaves a factorization of this tangen
 correction does not reach rounding, another one does: D = k on taut lines and nearly zero on slack lines, with a new
 factorization. Any solution p proves a bound, and the smaller bound is taken. The correction is kept in extended
 precision where the platform has it, because the remaining unbalanced force enters the gap times a displacement.
+
+No term may fall below 0, else nothing is proven; `observables` read fields of `DualityBound` by name.
 """
 
 from __future__ import annotations

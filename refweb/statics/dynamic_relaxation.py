@@ -7,6 +7,8 @@ A free body that turns has a fictitious moment of inertia, the same about every 
 step, a rotation vector. A node that it carries at the arm a moves by δ + θ × a, of which the square is at most
 2 |δ|² + 2 |a|² |θ|²: so the bounds of rows there are twice those of the node, and twice those times |a|² with the
 moment of the force on it, |f| |a|.
+
+`registry.STATICS` names `solve`, `studies.trials` gives it ``tolerance``, and `stats` has the keys of Newton's method.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 Differences of the energy become smaller than rounding near the end. Then the slope, force times step, is compared
 instead.
+
+`newton` calls `along` as it calls that of `residual_search`; constants decide how many steps it takes.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 An equilibrium exists unless the net can be carried off, a part of it without support in a direction in which the forces
 on it do not balance, or turns too fast, see `refweb.statics.critical_speed`. `check_supported` looks before anything is
 solved.
+
+Keys of `stats` are those of `results.solution.SOLVER` in `run.json`; `TOLERANCE` changes digits of all statics.
 """
 
 from __future__ import annotations

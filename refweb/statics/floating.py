@@ -5,6 +5,8 @@ are unique under dead loads. Two equilibria then differ by translations of *part
 tension is proven to be above 0. A part that no support holds along an axis floats along it, as far as its slack lines
 allow, |d| ≤ L. For other laws or forces, the null space of the tangent is open. Tensions, reactions and energies do not
 change as parts float.
+
+`observables` and `interval` read `Floating` and `Parts` by name; a range holds the values of all equilibria.
 """
 
 from __future__ import annotations

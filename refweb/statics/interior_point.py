@@ -18,6 +18,8 @@ takes 17 where all lines are alike. It does not converge where stiffnesses are 1
 
 Lines with a curve count as straight ones of its largest slope here: they go slack in nearly the same places, and from
 there Newton's method finds the equilibrium.
+
+Its points only start Newton's method: constants change numbers of factorizations, and results by the residual alone.
 """
 
 from __future__ import annotations

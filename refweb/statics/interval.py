@@ -9,6 +9,8 @@ of a line's vector, the largest t of one part along an axis e satisfies
 which a primal–dual interior-point method solves through λ c = μ. Its matrix keeps the multipliers as unknowns, so that
 lines at their limit do no harm. By weak duality e·t + Σ λ c is never below the largest t where the first equation
 holds. This sum is returned.
+
+`floating.Parts` calls `limits`; the iteration is free, as weak duality holds for all that is returned.
 """
 
 from __future__ import annotations

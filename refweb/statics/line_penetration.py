@@ -3,6 +3,8 @@
 Statics has no motion between two equilibria, so each point is taken to move in a straight line. Two lines that meet in
 this way have passed through each other or have slid around each other. The load steps do not tell which; smaller ones
 may.
+
+`statics.simulation` writes `why` to `run.json` and to a finding; `record` takes equilibria in their order.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ class LinePassage:
 
         Raises
         ------
-        TooSoft
+        PenetrationError
             For an overlap above the limit, where refweb chose the stiffness.
         SolverError
             For an overlap above the limit, where the scene gives the stiffness.

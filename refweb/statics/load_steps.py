@@ -4,6 +4,8 @@ Where Newton's method fails and all loads are dead, `refweb.statics.interior_poi
 Newton's method does not converge from there either, a series of softer nets follows for the tension-only law without
 rotation. Otherwise Newton's method gets many more iterations. With bars, or with loads that are not dead, only Newton's
 method is used.
+
+`registry.STATICS` names `solve`, which `dynamics.initial_state`, `studies` and `rupture` call as well.
 """
 
 from __future__ import annotations

@@ -10,6 +10,8 @@ s balance the loads. As in `refweb.statics.duality_bound`, they bound the energy
 
 a sum of terms that are never negative, with T(ε_s) = |s| and the vector d of a line. Nearly all of this bound is the
 energy of the lines that push.
+
+`remarks` reads ``starts`` and ``unsure``, and `run.json` has ``above_lowest``, which stays an upper bound.
 """
 
 from __future__ import annotations

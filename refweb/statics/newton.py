@@ -32,6 +32,8 @@ A factorization that is near enough is used again, by conjugate gradients with t
 factorizations by rslab (squares, 118 803 unknowns), 13 (triangles) and 22 (hexagons), by SuperLU, whose solutions cost
 less beside them, 10, 13 and 20. Forces without a potential have an
 unsymmetric tangent, its LU and a search of their own, see `refweb.statics.residual_search`.
+
+Constants change numbers of factorizations, not results; `load_steps`, `lowest` and `interior_point` read attributes.
 """
 
 from __future__ import annotations

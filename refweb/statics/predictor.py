@@ -4,6 +4,9 @@ The displacement of a flat web under a load F is proportional to F^(1/3): its te
 displacement, and the load with the product of both. The displacement of a prestressed web is proportional to F. Both
 powers are tried with the last two equilibria and, where the loads are 0 at load step 0, with the last one alone. The
 candidate of least energy is taken; the last equilibrium itself is one of them.
+
+`load_steps` calls this under dead loads where no line pushes; candidates are free, but the last `x`, the same array,
+stays among them.
 """
 
 from __future__ import annotations

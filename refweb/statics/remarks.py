@@ -1,4 +1,7 @@
-"""Findings of load steps: each kind once, with the load steps at which it was found."""
+"""Findings of load steps: each kind once, with the load steps at which it was found.
+
+Codes stand in `findings.CODES`; `dynamics.simulation` and `studies` use some of these remarks as well.
+"""
 
 from __future__ import annotations
 

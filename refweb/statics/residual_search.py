@@ -4,6 +4,8 @@ Follower loads have no energy that a line search could lower. A part a of the st
 prestress, is taken if |J⁻¹r(x + ap)| < |p|. This is the natural monotonicity test [1]_: a residual in units of
 displacement, which depends neither on the scale of forces nor on that of stiffnesses.
 
+`newton` calls `along` as it calls that of `energy_search`: arguments and answer stay alike.
+
 References
 ----------
 .. [1] P. Deuflhard, "Newton Methods for Nonlinear Problems", Springer 2011, section 2.1, doi:10.1007/978-3-642-23899-4.

@@ -2,6 +2,8 @@
 
 The state after a break depends on the motion of the web; that is dynamics. Brent's method finds the load step of the
 break. It searches equilibria between the last load step without a break and the first with one.
+
+`statics.simulation` calls `refuse_break` after each load step; `FINE` and `TRIALS` change digits of a message alone.
 """
 
 from __future__ import annotations

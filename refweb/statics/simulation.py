@@ -1,6 +1,8 @@
 """The load steps of a static scene, one after another: results, history row, remarks and frames of each.
 
 `Simulation` has the interface of `refweb.dynamics.simulation`, and the runner follows either.
+
+`runner` uses attributes and methods of both by name; a row has the order of `columns`.
 """
 
 from __future__ import annotations

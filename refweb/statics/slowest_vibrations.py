@@ -7,6 +7,8 @@ With φ the shape of a vibration, all s of (s² M + s C + K) φ = 0 are those of
 with any ω. Without C they are those of μ φ = K⁻¹ M φ, s² = −1/μ. Arnoldi iteration finds the largest μ, with one
 solution of K in each step. Where a vibration may grow, the μ are found again to all digits. Then left eigenvectors, by
 solutions with Kᵀ, show how far rounding changes the μ.
+
+`stability` reads fields of `Slowest`; the fixed seeds let a run give the same answer again.
 """
 
 from __future__ import annotations

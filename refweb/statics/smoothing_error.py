@@ -2,6 +2,8 @@
 
 With the smooth law, results differ from those of η → 0 in proportion to η. An equilibrium with a tenth of η, found from
 the same state, shows nine tenths of this difference.
+
+Values come in the order of observables, then of ``more``, as `statics.simulation` gives them.
 """
 
 from __future__ import annotations

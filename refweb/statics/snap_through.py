@@ -5,6 +5,8 @@ state it is: bars that push on the near side pull on the far side. Therefore the
 unit tensions balance between the supports, Σ (y_i − y_j)/L = 0 at each node. It depends on no load and on no side. If
 no bar there is shorter than its natural length, the supports keep the bars stretched, and the web is taken to have no
 other equilibrium. If a bar is shorter, it may have one.
+
+`stability` asks this; the answer makes a finding and changes no number.
 """
 
 from __future__ import annotations

@@ -29,6 +29,8 @@ get the same mass, and flutter is not checked: the parity of the number of diver
 errors of eigenvalues follow from their condition numbers; parts within these errors count as zero. Lines between slack
 and taut count as taut. If the web would be unstable with these lines slack, its stability is not decided.
 
+Signs stand in `run.json` as ``smallest_pivot``, reasons in texts of `remarks`; a sign of 1 is given only if certain.
+
 References
 ----------
 .. [1] V. V. Bolotin, "Nonconservative Problems of the Theory of Elastic Stability", Pergamon 1963, chapter 1.
