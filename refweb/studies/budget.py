@@ -3,6 +3,8 @@
 The clock of `refweb.studies.trials` measures the time. The more runs a method has had, the later its next run comes. A
 run may take a third of the remaining budget. A run that is expected to take more is left out, and a run that takes more
 is ended. The coarsest run of a method may always take a twentieth of the budget.
+
+`cost`, `diagram` and `console` read the statuses that are set here by name; all constants are free.
 """
 
 from __future__ import annotations

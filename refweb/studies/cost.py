@@ -1,4 +1,7 @@
-"""Cost of correct digits: all runs, their references, the cost in words, and the result folder."""
+"""Cost of correct digits: all runs, their references, the cost in words, and the result folder.
+
+`COLUMNS` are those of `cost.csv`; keys of `summary` are those of `run.json`, which `commands.console` prints.
+"""
 
 from __future__ import annotations
 

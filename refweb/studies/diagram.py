@@ -1,4 +1,7 @@
-"""The work–precision diagram: errors against CPU time, one curve per method, with failures and unknown errors."""
+"""The work–precision diagram: errors against CPU time, one curve per method, with failures and unknown errors.
+
+Statuses and fields are those of `trials.Trial`; the drawing is free.
+"""
 
 from __future__ import annotations
 

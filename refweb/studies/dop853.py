@@ -1,4 +1,7 @@
-"""An independent method for `refweb.studies.work_precision`: scipy's DOP853 with the same forces."""
+"""An independent method for `refweb.studies.work_precision`: scipy's DOP853 with the same forces.
+
+It shares forces with the methods of refweb and no integrator, so that it stays an independent reference.
+"""
 
 from __future__ import annotations
 

@@ -4,6 +4,8 @@ Lines with a force density, T = q l, or a constant force find a shape whatever t
 have these tensions in that shape where their natural lengths are L = l/(1 + ε(T)). The mass of a line follows its
 natural length: where weight acts, shape and natural lengths are found in turn.
 
+`refweb` exports `form`; a new key of a table that selects nodes belongs in `SELECTED`.
+
 References
 ----------
 H.-J. Schek, "The force density method for form finding and computation of general networks", Comput. Methods Appl.

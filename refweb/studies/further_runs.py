@@ -14,6 +14,8 @@ steps. ± contains the true value of 99.8 % of 628 results of 100 random impacts
 small nets that are thrown at a sphere. Its median is 2.4 and 3.9 times the true error. No result with the verdict
 "determined" has an error that its digits do not allow. The four results of captures outside ± are forces of contact:
 three peaks and a mean.
+
+Texts of variants are keys in `TELLING`; keys of `report` are those of `trust.json`, which `commands.console` prints.
 """
 
 from __future__ import annotations

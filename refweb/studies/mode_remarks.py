@@ -1,4 +1,7 @@
-"""Findings on natural frequencies: on each equilibrium, and on effects that the modes leave out."""
+"""Findings on natural frequencies: on each equilibrium, and on effects that the modes leave out.
+
+Codes stand in `findings.CODES`; texts are free.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Natural frequencies and mode shapes of a scene: an equilibrium, and the small vibrations about it."""
+"""Natural frequencies and mode shapes of a scene: an equilibrium, and the small vibrations about it.
+
+`_rows` has the order of `COLUMNS`; `summary_text` reads names of `_described`, and `pictures.record` `frequency_N`.
+"""
 
 from __future__ import annotations
 

@@ -4,6 +4,8 @@ The number follows from counts of negative pivots (Sylvester's law of inertia). 
 on (K − σM)⁻¹ with σ just below the wanted ω², so that a thousand slack nodes cost nothing. One more count proves that
 none is missed, which matters where symmetry makes frequencies double. Nodes without mass have no frequency and follow
 the others.
+
+`spectrum` and `turning` call these methods; without the count of pivots after a search modes may be missed.
 """
 
 from __future__ import annotations

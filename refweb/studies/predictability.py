@@ -5,6 +5,8 @@ every free unknown moved at random by up to `PERTURBATION` of the shortest eleme
 separation of the two motions shows how errors of this size grow, rounding included, for any integrator. After the time
 at which less than one digit is left, results are statistical: several runs have a mean and a spread, and no run has
 more.
+
+Keys of `horizon` and `ensemble` stand in `run.json`; `further_runs` and `sweeps.case` read them by name.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 No method alone can be a reference. All runs are compared with one of the two, and smaller errors than the difference of
 the two mean nothing. If all finest runs differ by about as much, as in chaotic motions, the best agreement may be luck,
 and the median difference counts. If all runs are of one kind, the references are the two finest of one method.
+
+`cost` and `diagram` read the attributes that `compare` sets.
 """
 
 from __future__ import annotations

@@ -8,6 +8,8 @@ and the error of the equilibrium are added to this bound. For the latter, K is a
 step.
 
 In a rotating frame K includes the centrifugal force, and `refweb.studies.turning` finds the modes with Coriolis forces.
+
+`modes` writes fields of `Spectrum` by name to `modes.csv` and `run.json`.
 """
 
 from __future__ import annotations

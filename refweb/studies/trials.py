@@ -3,6 +3,8 @@
 A `Trial` is a method at one setting. The methods of dynamics are those of `refweb.registry.INTEGRATORS`, in all their
 `refweb.dynamics.integrators.integrator.Variant` s, and scipy's DOP853. They run with one probe, the observable, and
 without peaks, files or step refinement.
+
+`budget` sets statuses and catches `OverBudget`; fields of `Trial` and keys of `work` are columns of `cost.csv`.
 """
 
 from __future__ import annotations

@@ -14,6 +14,8 @@ straight line, which is a double frequency ω = Ω with one shape. For such nets
 of the first order system are computed. Here ω is a root of κ + ωγ − ω²μ = 0. A change of κ = φ*Kφ by e changes ω by at
 most the root δ of μδ² + √(γ² + 4κμ) δ = e. This is an estimate, which takes the shapes as exact.
 
+`spectrum` unpacks `Pairs` by position; the seed lets a run give the same result again.
+
 References
 ----------
 .. [1] F. Tisseur, K. Meerbergen, "The quadratic eigenvalue problem", SIAM Review 43 (2001) 235–286, section 4,

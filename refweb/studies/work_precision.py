@@ -3,6 +3,8 @@
 Trials of all methods, from coarse to fine, run within a budget, see `refweb.studies.budget`. Errors are differences
 from one of two references of different kinds, see `refweb.studies.references`. A message says if all runs are of one
 kind.
+
+`refweb` exports `cost`, and `commands.cost` gives its options as keywords: their names stay.
 """
 
 from __future__ import annotations
