@@ -2,6 +2,8 @@
 
 The worker may be a process on another machine. The job contains the files that it needs. The outcome contains the cells
 of a row, and on demand ``run.json`` or an archive of the result folder.
+
+Jobs and outcomes travel by pickle as plain values and bytes; `cells_of` gives columns of `results.case_rows`.
 """
 
 from __future__ import annotations

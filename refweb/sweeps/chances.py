@@ -11,6 +11,8 @@ has no meaning. If they have an ensemble, its mean and spread are used. In a stu
 run, as a trial of Clopper and Pearson does: the difference between runs of one case is one more random variable. In a
 study without samples a condition is evaluated for each case: with an ensemble within `LIKELY` standard deviations,
 without one by the value and its ±, and as undecided if there is no ±.
+
+Keys of entries stand in `run.json`, and `results.study_text` reads them by name.
 """
 
 from __future__ import annotations

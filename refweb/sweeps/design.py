@@ -1,4 +1,7 @@
-"""The cases of a study: the values of each case, and its scene, made of the base scene."""
+"""The cases of a study: the values of each case, and its scene, made of the base scene.
+
+Another digest by `key_of`, or another order of samples, runs all cases of stored studies again.
+"""
 
 from __future__ import annotations
 

@@ -11,6 +11,8 @@ The library simpleeval 1.0, with functions of intervals, evaluates ``and`` by Py
 and x = 2 it leaves ``y > 2 and x > 3`` undecided, though it is false. Its methods for ``and``, ``or`` and comparisons
 are private, and it checks an expression only during evaluation. The library asteval gives a condition access to 387
 names.
+
+Operators and `FUNCTIONS` are the language of `skip` and `conditions` in study files of users: none is removed.
 """
 
 from __future__ import annotations

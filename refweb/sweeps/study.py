@@ -1,4 +1,7 @@
-"""Studies: the table of a study file, with a scene, its varying values, their sampling and conditions on results."""
+"""Studies: the table of a study file, with a scene, its varying values, their sampling and conditions on results.
+
+Keys are the format of study files, and the docstring of `Study` is text of `refweb help`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Results of a study in memory: its rows, their statistics, and the content of its ``run.json``."""
+"""Results of a study in memory: its rows, their statistics, and the content of its ``run.json``.
+
+`refweb` exports `Sweep`; keys of `summary` are those of `run.json`, which `study_text` and pictures read.
+"""
 
 from __future__ import annotations
 

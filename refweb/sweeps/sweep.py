@@ -3,6 +3,8 @@
 A study can continue from the state of its folder at any time. The files of a case are written before its row, and a row
 is appended as a whole. Therefore a study that is killed loses only the cases that its workers were running. The key of
 a row is a digest of its scene: another study with the same case finds it.
+
+`_check_folder` knows a message of `results.folder.check_folder` by its words "is not empty", which stay.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 `through` submits jobs and yields the outcome of each once. If a worker dies, its jobs are tried again one at a time, to
 find the job that kills its worker among those that ran at the same time. A job that has killed `TRIES` workers is given
 up.
+
+Of an executor of a user only `submit`, standard futures and, where it exists, ``_max_workers`` are used.
 """
 
 from __future__ import annotations
