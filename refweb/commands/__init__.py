@@ -41,3 +41,5 @@ The entry point of your package, whose verbs stand behind those of refweb, which
     [project.entry-points."refweb.verbs"]
     weigh = "my_webs.weigh"
 """
+
+# This docstring is a page of the site, and `tests/how_to/test_verb.py` runs the code in it.

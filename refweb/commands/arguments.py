@@ -1,5 +1,7 @@
 """Arguments that several verbs have, and what they print as JSON."""
 
+# Help texts here are those of verbs, which read `scene`, `values`, `json` and `force` of the parsed arguments.
+
 import contextlib
 import json
 

@@ -1,5 +1,7 @@
 """Check a scene without solving it; writes nothing."""
 
+# This docstring is the help of the verb; a new check belongs in the scene, `runner.notices` or `doubts`.
+
 from ..errors import InputError
 from .arguments import add_scene, add_values, print_study, scene_of
 

@@ -1,5 +1,7 @@
 """Compare results of two runs or more side by side: do they agree within ±?"""
 
+# This docstring is the help of the verb; exit status 1 for results that differ is for scripts.
+
 from .arguments import add_json, print_json
 
 

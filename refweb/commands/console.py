@@ -1,5 +1,7 @@
 """Output at a terminal: one box before a run and one after."""
 
+# Programs read `run.json` and `--json`, so that texts are free; keys are those of `run.json` and `trust.json`.
+
 from __future__ import annotations
 
 import contextlib

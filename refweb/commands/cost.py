@@ -1,5 +1,7 @@
 """Compute the cost of digits: errors and CPU times of every method on a scene."""
 
+# This docstring is the help of the verb; options are keywords of `work_precision.cost`, and `refweb info` calls `show`.
+
 import pathlib
 
 from .arguments import add_force, add_scene, add_values, scene_of

@@ -4,6 +4,8 @@ A scene is refused where it cannot be, and a run warns of what limits its result
 in MPa, an area in mm², a body that never meets the web. Nothing is solved for it.
 """
 
+# `commands.check` alone prints these findings, whose codes stand in `findings.CODES`; all limits are free.
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Print what a table of a scene file may hold, what a term means, or a guide."""
 
+# This docstring is the help of the verb; `--markdown` writes `validation/REFERENCE.md`, which a test compares.
+
 import sys
 import textwrap
 

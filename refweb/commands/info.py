@@ -1,5 +1,7 @@
 """Print the content of a scene, a study or a result folder."""
 
+# A verb named by `kind` in `run.json` has `show(summary)`; this docstring is help; keys of `--json` are for programs.
+
 import json
 import pathlib
 

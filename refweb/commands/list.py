@@ -1,5 +1,7 @@
 """List the scenes and studies that are shipped with refweb."""
 
+# This docstring is the help of the verb; the first comment of a shipped file is its line here.
+
 import tomllib
 
 

@@ -1,5 +1,7 @@
 """Compute natural frequencies and mode shapes about the equilibrium of a scene."""
 
+# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` of this kind.
+
 import pathlib
 
 from .arguments import add_force, add_scene, add_values, scene_of

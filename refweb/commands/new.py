@@ -1,5 +1,7 @@
 """Write a commented scene file to start from."""
 
+# This docstring is the help of the verb; `KEYS` has all keys with paths, and a test uncomments all of `START`.
+
 import json
 import os
 import pathlib

@@ -1,5 +1,7 @@
 """Draw a result folder: one instant, or all of them as a film."""
 
+# This docstring is the help of the verb; options are keywords of `pictures.picture` and `film.animate`.
+
 import argparse
 import pathlib
 

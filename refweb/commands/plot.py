@@ -1,5 +1,7 @@
 """Plot result folders: histories with ±, books, spectra; several over each other."""
 
+# This docstring is the help of the verb; options are keywords of `pictures.plots.plot`.
+
 import sys
 
 

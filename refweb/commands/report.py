@@ -1,5 +1,7 @@
 """Write one page of a result folder: results, plots, pictures, and the web in space to turn and play."""
 
+# This docstring is the help of the verb; `pages` checks values, and this file which options exclude each other.
+
 import pathlib
 
 from ..errors import InputError

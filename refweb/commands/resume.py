@@ -1,5 +1,7 @@
 """Continue a dynamic run that was killed, interrupted or failed."""
 
+# This docstring is the help of the verb, which messages of `results.folder.remedy` name.
+
 from .arguments import resumable
 
 

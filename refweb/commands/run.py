@@ -1,5 +1,7 @@
 """Solve a scene and write its result folder."""
 
+# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` without a kind.
+
 import pathlib
 
 from ..errors import InputError

@@ -1,5 +1,7 @@
 """Print the JSON Schema of scene files, by which editors check and complete them."""
 
+# This docstring is the help of the verb; `reference.schema` makes all that is printed.
+
 import sys
 
 from .arguments import print_json

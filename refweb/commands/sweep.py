@@ -1,5 +1,7 @@
 """Run a study: one scene with many values, spread and ± apart, chances of conditions."""
 
+# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` of this kind.
+
 import contextlib
 import pathlib
 

@@ -1,5 +1,7 @@
 """Find all parts of the error of each result, and say what the numbers are worth."""
 
+# This docstring is the help of the verb; `show` takes the content of `trust.json`, not that of `run.json`.
+
 import pathlib
 
 from .arguments import add_force, add_scene, add_values, resumable, scene_of

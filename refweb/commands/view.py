@@ -1,5 +1,7 @@
 """Look at a result folder: its page in a browser, a window, or a script for ParaView."""
 
+# This docstring is the help of the verb; a page that is older than `run.json` is written anew.
+
 import pathlib
 import sys
 

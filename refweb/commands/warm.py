@@ -5,6 +5,8 @@ Two processes compile where there are two cores; REFWEB_COMPILERS=1 leaves it to
 all usual processors of this kind run is written into the package itself, for a wheel.
 """
 
+# This docstring is the help of the verb; kernels that no run here needs are compiled at their first use by users.
+
 import contextlib
 import os
 
