@@ -1,4 +1,7 @@
-"""Drawn sections of a page: pictures, plots, and the three-dimensional view with its controls, as HTML."""
+"""Drawn sections of a page: pictures, plots, and the three-dimensional view with its controls, as HTML.
+
+Scripts of the page find elements by ids in `_view` and read keys that `space` adds; `page.css` knows the classes.
+"""
 
 from __future__ import annotations
 

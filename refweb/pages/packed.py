@@ -2,6 +2,8 @@
 
 Positions become integers of 16 bits, values for colours integers of 8 bits, see `levels`. The page unpacks them with
 the ``DecompressionStream`` of the browser; `unpack` does the same in Python.
+
+`model.js` unpacks the same bytes, and repeats the levels of `VALUES` and `UNKNOWN` as numbers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The page of a run: one HTML file without other files, from a result folder or a solution."""
+"""The page of a run: one HTML file without other files, from a result folder or a solution.
+
+`page.html` has the names that `filled` gives; contents are found by the form of `markup.section`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Sections of text and tables of a page: results, warnings, model, cost, scene and versions, as HTML."""
+"""Sections of text and tables of a page: results, warnings, model, cost, scene and versions, as HTML.
+
+Keys are those of `run.json` and `scene.toml`, classes those of `page.css`; sentences belong in `results.summary_text`.
+"""
 
 from __future__ import annotations
 

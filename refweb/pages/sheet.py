@@ -1,4 +1,7 @@
-"""The sheet of a run as HTML: sizes, largest tension, margin of safety, and verdicts on the results."""
+"""The sheet of a run as HTML: sizes, largest tension, margin of safety, and verdicts on the results.
+
+`page` puts this first, or alone on a page; sentences belong in `sheet_text`.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """Texts of the sheet of a run: sizes of the web, largest tension, margin of safety, and verdicts on results.
 
 The input is the content of ``run.json`` and of ``scene.toml``.
+
+Keys are those of ``web``, ``margin`` and ``utilisation`` in `run.json`; sentences are free.
 """
 
 from __future__ import annotations

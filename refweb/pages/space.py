@@ -7,6 +7,8 @@ translation and rotation in each frame.
 
 pyvista's ``export_html`` puts 1.0 MB of vtk.js, by trame-vtk 2.11, into each page, and shows one instant without a
 colour bar.
+
+Scripts of the page read keys of `head` and names and types of arrays, and `drawings.space` adds keys.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The page of a study: statistics of its rows, a plot of each result, and the rows, as one HTML file."""
+"""The page of a study: statistics of its rows, a plot of each result, and the rows, as one HTML file.
+
+Sentences belong in `results.study_text`, classes in `page.css`; the order of sections is free.
+"""
 
 from __future__ import annotations
 
