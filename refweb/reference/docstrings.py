@@ -1,4 +1,7 @@
-"""Parts of a docstring in the style of numpydoc."""
+"""Parts of a docstring in the style of numpydoc.
+
+Docstrings of tables have sections of numpydoc for this; a change here changes `validation/REFERENCE.md`.
+"""
 
 from __future__ import annotations
 

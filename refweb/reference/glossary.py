@@ -2,6 +2,8 @@
 
 A new word stands here before it stands anywhere else. Each entry is a term of structural mechanics, contact mechanics,
 numerical analysis or orbital mechanics, with the meaning that it has in this package.
+
+After a change ``python -m refweb help --markdown > validation/REFERENCE.md`` writes the reference anew.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """The pages of the reference: for each table what it is, its keys and what they take, what is refused, and an example.
 
 All of it is read off the classes that check scenes: fields say what keys take, docstrings what they mean.
+
+A new key of a table needs no change here; `words` reads fields of `Page` and `Listing`.
 """
 
 from __future__ import annotations

@@ -5,6 +5,8 @@ A path is what TOML calls a dotted key, from the head of the scene file to the v
 where they belong before anything is checked, so that they are refused, or not, as if they stood in the file. The
 table of an effect, or the list of its tables, is left out where it is ``false``: ``self_contact = false`` is the scene
 whose lines do not touch each other.
+
+Users write these paths in ``--set`` and in study files, so that their form stays.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The JSON Schema of scene files, made of the tables that check them; of draft 4, which editors of TOML read."""
+"""The JSON Schema of scene files, made of the tables that check them; of draft 4, which editors of TOML read.
+
+A new key of a table needs no change here, `reference.pages` uses `accepted`, and no file of the schema is stored.
+"""
 
 from __future__ import annotations
 

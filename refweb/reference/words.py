@@ -1,4 +1,7 @@
-"""Pages of the reference as text for a terminal and as Markdown."""
+"""Pages of the reference as text for a terminal and as Markdown.
+
+`as_markdown` makes `validation/REFERENCE.md`, which a test compares with it; `as_text` is free.
+"""
 
 from __future__ import annotations
 

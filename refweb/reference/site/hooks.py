@@ -2,6 +2,8 @@
 
 A page of ``pages/`` is written by hand and is also what ``refweb help`` prints. All others come from `PAGES`, so that
 nothing is said in a second place.
+
+`mkdocs.yml` names pages of `PAGES`, and titles of sections of the README stand there letter by letter.
 """
 
 from __future__ import annotations
