@@ -34,6 +34,8 @@ LONG = (
     "drag_and_link",
     "cable_law",
     "winches",
+    "materials",
+    "threads",
     "free_net",
     "price_of_modelling",
 )

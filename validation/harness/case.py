@@ -77,6 +77,8 @@ CASES = {
         "free_net",
         "tumbling",
         "winches",
+        "materials",
+        "threads",
         "drag_and_link",
     ),
     "missions": (
