@@ -124,6 +124,7 @@ def test_many_runs_near_the_limit():
 # Reproducibility
 
 
+@pytest.mark.slow
 def test_threads_change_nothing(tmp_path):
     """The same bytes with one thread of numerical libraries and with four."""
     import os

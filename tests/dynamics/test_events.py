@@ -253,6 +253,7 @@ def test_an_oscillator_passes_values(solve):
     assert [event["name"] for event in solution.events] == list(asked)
 
 
+@pytest.mark.slow
 def test_time_of_an_event_converges_with_the_tolerance():
     """As the motion itself does: by the power 2/3 with steps of order 2."""
     off, tolerances = [], (1e-4, 1e-5, 1e-6, 1e-7)

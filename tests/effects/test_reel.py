@@ -209,6 +209,7 @@ def test_order_two_and_the_book(law):
     assert abs(slope(error, 1.0 / nsteps) - 2.0) < 0.15 and abs(slope(drift, 1.0 / nsteps) - 2.0) < 0.15
 
 
+@pytest.mark.slow
 def test_the_book_of_sundials_closes():
     """With lengths that are products of two linear factors; the drift falls with rtol."""
     system, drifts = taut_net("linear", *BOTH), []

@@ -334,6 +334,7 @@ def whirl(**changes):
     return given | changes
 
 
+@pytest.mark.slow
 def test_methods_agree():
     """Within the sum of their ±, which are small."""
     found = []

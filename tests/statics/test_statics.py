@@ -102,6 +102,7 @@ def test_paper_webs_from_flat(mesh, smoothing):
         assert [f.stats["smallest_pivot"] for f in found] == [1] * 5
 
 
+@pytest.mark.ordinary("*-0.0")
 @pytest.mark.parametrize("smoothing", EACH)
 @pytest.mark.parametrize("step", range(5))
 def test_paper_webs_compared(smoothing, step):

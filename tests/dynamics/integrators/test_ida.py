@@ -316,6 +316,7 @@ def test_a_chain_of_links_keeps_its_lengths():
     assert 0.0 < run.constraint_drift[0] < 1e-4 and solver.spent(run)["constraint_drift"][0] == run.constraint_drift[0]
 
 
+@pytest.mark.slow
 def test_links_are_the_limit_of_stiff_lines():
     """20 lines whose stiffness rises to 1e5 N, by CVODE: the difference falls like 1/EA."""
     links, _ = ran(Ida(chain(20, True), rtol=1e-7, max_order=5), 0.25, rows=2)
