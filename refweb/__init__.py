@@ -9,6 +9,7 @@ __version__ = "0.2.0"
 
 TYPE_CHECKING = False  # as of `typing`, which is not imported for it
 if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same names
+    from .dynamics.stepped_run import start as start
     from .effects.attach import Attach as Attach
     from .effects.bending import Bending as Bending
     from .effects.body import Body as Body

@@ -208,6 +208,7 @@ COMMANDS = {
 EXPORTS = (
     "refweb.runner:run",
     "refweb.runner:resume",
+    "refweb.dynamics.stepped_run:start",
     "refweb.solution:load",
     "refweb.pictures.pictures:picture",
     "refweb.studies.modes:modes",

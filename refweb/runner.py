@@ -28,7 +28,7 @@ from .scene import Scene
 from .solution import Solution, scene_of, summary_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from os import PathLike
 
     from .system.system import System
@@ -46,6 +46,7 @@ def run(
     progress: bool | Callable[..., Any] | None = True,
     announce: Callable[[Scene, System], object] | None = None,
     checkpoint: tuple[Any, Any] = (None, None),
+    commands: Sequence[Any] = (),
 ) -> Solution:
     """Solve a scene.
 
@@ -64,6 +65,9 @@ def run(
         Called with the scene and its system when the input has been accepted.
     checkpoint : tuple, optional
         Checkpoint and ``run.json`` of a run that goes on, see `resume`.
+    commands : sequence of (float, str, object), optional
+        Values that change during a dynamic run: time of a history row [s], path such as ``load.0.force``, and the value
+        from then on, see `refweb.start`. The step-refinement run has the same.
 
     Returns
     -------
@@ -79,11 +83,13 @@ def run(
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     if out is not None:
         check_folder(out, force)
+    if commands:
+        scene = _commanded(scene)
     clock, (scene, system), repeats = Clock(), scene.settle(), []
     with followed(progress) as tell:
         while True:
             try:
-                return _attempt(scene, system, out, tell, announce, clock, repeats, *checkpoint)
+                return _attempt(scene, system, out, tell, announce, clock, repeats, *checkpoint, commands)
             except PenetrationError as soft:  # repeated with a stiffer contact as often as the chosen one is too soft
                 table = "self_contact" if "self_contact" in soft.stiffness else "contact"
                 repeats.append(Finding("repeated", str(soft), table, NOTE))
@@ -178,6 +184,8 @@ def resume(
         raise InputError(f"{name} holds a solved run: there is nothing to continue")
     if is_alive(folder):
         raise InputError(f"{name} is being written by a run that is alive: wait for its end, or stop it")
+    if summary.get("commands"):
+        raise InputError(f"{name} holds a run with commands, which cannot be continued: start it again")
     scene = scene_of(folder, summary)
     if "kind" in summary or scene.solve.kind == "static":
         raise InputError(f"{name} holds no dynamic run, and only dynamic runs have checkpoints: use refweb run --force")
@@ -192,7 +200,7 @@ def resume(
     return run(scene, folder, True, progress, announce, (kept, summary))
 
 
-def _attempt(scene, system, out, tell, announce, clock, repeats, kept=None, summary=None):
+def _attempt(scene, system, out, tell, announce, clock, repeats, kept=None, summary=None, commands=()):
     """Solve a scene as it stands, with its system.
 
     ``repeats`` are the findings of attempts before; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run
@@ -207,7 +215,8 @@ def _attempt(scene, system, out, tell, announce, clock, repeats, kept=None, summ
         solution.findings += [*repeats, *notices(scene, system)]
     else:
         solution.findings += _before(kept, summary, system, solution.versions)
-    simulation = simulation_of(scene, system, solution, kept)
+    simulation = simulation_of(scene, system, solution, kept, commands)
+    solution.commands = [list(command) for command in commands]
     solution.columns = simulation.columns
     row = None if kept is None else int(kept["row"])
     folder = Folder(out, scene, solution.columns, solution.summary(), row=row) if out is not None else None
@@ -241,6 +250,21 @@ def _attempt(scene, system, out, tell, announce, clock, repeats, kept=None, summ
             folder.close()
             folder.summary(solution.summary())
     return solution
+
+
+def _commanded(scene):
+    """The scene of a run with commands, `widened`; refuses one whose further runs would not have them."""
+    from .dynamics.commands import widened
+
+    if scene.solve.kind == "static":
+        raise InputError('commands need [solve] kind = "dynamic": statics has load steps')
+    accuracy = scene.accuracy
+    for key, stands in (("refine", accuracy.refine), ("horizon", accuracy.horizon)):
+        if stands:
+            raise InputError(f"[accuracy] {key} = true cannot stand beside commands: its further runs have none")
+    if accuracy.level == "full":
+        raise InputError('[accuracy] level = "full" cannot stand beside commands: its further runs have none')
+    return widened(scene)
 
 
 def _check_frames(scene, system):
@@ -280,7 +304,9 @@ def _before(kept, summary, system, versions):
         yield Finding("resumed", f"resumed with {changes}: what follows may differ in its last digits", "", NOTE)
 
 
-def simulation_of(scene: Scene, system: System, solution: Solution, kept: Any = None) -> Any:
+def simulation_of(
+    scene: Scene, system: System, solution: Solution, kept: Any = None, commands: Sequence[Any] = ()
+) -> Any:
     """Make the simulation of a scene; refuse with an `InputError` a scene that its solver cannot take."""
     with in_file(scene.file):
         if scene.solve.kind == "static":
@@ -289,7 +315,7 @@ def simulation_of(scene: Scene, system: System, solution: Solution, kept: Any = 
             return Simulation(scene, system, solution)
         from .dynamics.simulation import Simulation
 
-        return Simulation(scene, system, solution, kept)
+        return Simulation(scene, system, solution, kept, commands)
 
 
 def notices(scene: Scene, system: System) -> Iterator[Finding]:

@@ -317,7 +317,7 @@ def load(folder: str | PathLike[str]) -> Solution:
         solution.pairs, solution.lines, solution.passage = (
             summary.get(key, {}) for key in ("pairs", "lines", "passage")
         )
-        solution.broken_before = summary.get("broken_before", [])
+        solution.broken_before, solution.commands = summary.get("broken_before", []), summary.get("commands", [])
         solution.breaks, solution.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
             solution.utilisation = read_utilisation(used)
@@ -326,7 +326,7 @@ def load(folder: str | PathLike[str]) -> Solution:
         solution.reduced = {} if solution.steps else read_results(summary["results"])
     except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(f"{short(str(folder))}/run.json: is not what a run of refweb writes") from None
-    solution.columns, solution.state = _columns(folder), _last_state(folder, scene)
+    solution.columns, solution.state = _columns(folder), _last_state(folder, scene, solution.commands)
     return solution
 
 
@@ -356,13 +356,17 @@ def _columns(folder):
         raise InputError(f"{short(str(folder))}/history.csv: cannot be read: {error}") from None
 
 
-def _last_state(folder, scene):
+def _last_state(folder, scene, commands):
     """The state of the last frame, None where there is none."""
     from .results.state import State
 
     path = folder / "checkpoint.npz"
     if not path.exists():
         return None
+    if commands:
+        from .dynamics.commands import widened
+
+        scene = widened(scene)
     system = scene.build()
     try:
         with np.load(path) as kept:
@@ -372,6 +376,10 @@ def _last_state(folder, scene):
         raise InputError(f"{short(str(path))}: cannot be read: {error}") from None
     if x.shape != (system.rows, 3):
         raise InputError(f"{short(str(path))}: is not that of a run that scene.toml leads to")
+    if commands:
+        from .dynamics.commands import Command, Inputs
+
+        Inputs(scene, system).replay([command for command in map(Command._make, commands) if command.time < time])
     if broken and len(broken[0]):
         from .system.broken_lines import torn
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
+    from .commands import Commands
     from .integrators.integrator import History
 
 BLOCK = 0.1
@@ -41,11 +42,19 @@ class Schedule(NamedTuple):
     between : ndarray
         Times between rows at which a run is compared with its step refinement [s]; empty if there are many rows. Steps
         end there in any case, so that the comparison does not change the run.
+    commands : refweb.dynamics.commands.Commands, optional
+        Commands of the run.
     """
 
     times: np.ndarray
     frames: np.ndarray
     between: np.ndarray = np.zeros(0)
+    commands: Commands | None = None
+
+    def reset(self):
+        """Give what commands set the values of the scene, before a run starts."""
+        if self.commands is not None:
+            self.commands.inputs.reset()
 
     @classmethod
     def of(cls, scene):
@@ -124,6 +133,18 @@ class Block(NamedTuple):
     compared: History
 
 
+def block_of(integrator, course, schedule, first, stop):
+    """Advance a course through the rows from ``first`` to ``stop`` − 1, and return their `Block`."""
+    rows = schedule.times[first:stop]
+    between = schedule.between[(schedule.between > course.time) & (schedule.between < rows[-1])]
+    history = compared = integrator.advance(course, np.sort(np.concatenate([rows, between])))
+    if len(between):
+        selected = np.isin(compared.time, rows)
+        selected[-1] = True  # where an event ends the run, its row is that of the event
+        history = compared[selected]
+    return Block(first, history, compared)
+
+
 def blocks(integrator, course, schedule, first=0):
     """Advance through the times of a schedule in blocks of about `BLOCK` seconds, which end at each frame.
 
@@ -148,19 +169,16 @@ def blocks(integrator, course, schedule, first=0):
     refweb.errors.EnergyDriftError
         At the end, if the energy drift of the run exceeds its limit.
     """
-    times, size = schedule.times, 1
+    times, size, commands = schedule.times, 1, schedule.commands
     while first < len(times):
         stop = schedule.frames[np.searchsorted(schedule.frames, first)]
-        count = min(size, stop + 1 - first)
-        began, rows = time.perf_counter(), times[first : first + count]
-        between = schedule.between[(schedule.between > course.time) & (schedule.between < rows[-1])]
-        history = compared = integrator.advance(course, np.sort(np.concatenate([rows, between])))
-        if len(between):
-            selected = np.isin(compared.time, rows)
-            selected[-1] = True  # where an event ends the run, its row is that of the event
-            history = compared[selected]
-        yield Block(first, history, compared)
+        if commands is not None:
+            stop = min(stop, commands.until(first))
+        count, began = min(size, stop + 1 - first), time.perf_counter()
+        yield block_of(integrator, course, schedule, first, first + count)
         first += count
+        if commands is not None:
+            commands.act(first - 1, integrator, course)
         spent = time.perf_counter() - began
         size = max(1, min(2 * size if spent < 0.5 * BLOCK else int(size * BLOCK / spent), MOST_ROWS))
         if course.stopped:

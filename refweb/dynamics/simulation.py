@@ -57,6 +57,8 @@ class Simulation:
         Solution that is filled in.
     kept : dict of str to ndarray, optional
         Checkpoint of a run that continues.
+    commands : sequence of refweb.dynamics.commands.Command
+        Values that change during the run.
 
     Attributes
     ----------
@@ -81,7 +83,7 @@ class Simulation:
         If the method cannot solve the scene.
     """
 
-    def __init__(self, scene, system, solution, kept=None):
+    def __init__(self, scene, system, solution, kept=None, commands=()):
         self._ways = None
         if scene.solve.method == "auto":
             from .method_fallback import MethodFallback
@@ -101,6 +103,11 @@ class Simulation:
         solution.broken_before = np.unique(system.net.line[system.net.broken]).tolist()
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
+        if commands:
+            from .commands import Commands, Inputs
+
+            acting = Commands(Inputs(scene, system), self.schedule.times, commands)
+            self.schedule = self.schedule._replace(commands=acting)
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
         self._lines, self._through = None, _through_of(system)
         self._tables, self._compared, self._share_rows, self._kept = [], [], [], kept
@@ -149,8 +156,7 @@ class Simulation:
         tell : callable
             Called with a text and the finished share.
         """
-        if self.scene.solve.start == "equilibrium" and self._kept is None:
-            self._settle(tell)
+        self.settle(tell)
         while True:
             try:
                 run_within_drift(self, folder, tell)
@@ -176,8 +182,10 @@ class Simulation:
         self._stand()
         self.again(folder)
 
-    def _settle(self, tell):
-        """Set the equilibrium as initial state."""
+    def settle(self, tell):
+        """Set the equilibrium as initial state where the scene asks for it."""
+        if self.scene.solve.start != "equilibrium" or self._kept is not None:
+            return
         from ..statics.remarks import on_stability, remark_on_open
         from ..system.static_system import waiting
 
@@ -218,15 +226,13 @@ class Simulation:
         report(course.time)
         integrator.on_progress = report
         try:
-            for first, history, compared in blocks(integrator, course, self.schedule, ahead):
-                table = self.watch.table(history)
+            for block in blocks(integrator, course, self.schedule, ahead):
+                table = self.watch.table(block.history)
                 if len(self.schedule.between):
-                    self._compared += self.watch.compared(self.watch.table(compared)).tolist()
-                self._share_rows.append(self.watch.shares_of(compared))
-                self._refuse_overlap(course)
-                if self._silent is not None:
-                    self._silent.inspect(course.time, course.x)
-                last = first + len(table) - 1
+                    self._compared += self.watch.compared(self.watch.table(block.compared)).tolist()
+                self._share_rows.append(self.watch.shares_of(block.compared))
+                self.inspect(course)
+                last = block.first + len(table) - 1
                 if folder is None:
                     self._tables.append(table)
                 else:
@@ -245,6 +251,12 @@ class Simulation:
         corrections = self.watch.corrections(course, relative, getattr(integrator, "tolerances", {}))
         shares = self.watch.shares(course), self.watch.share_corrections(course, relative)
         return RunResult(self.watch.results(course, self._tables[-1][-1]), corrections, course, *shares)
+
+    def inspect(self, course):
+        """Refuse a course whose lines are too deep in bodies, and note what is warned of."""
+        self._refuse_overlap(course)
+        if self._silent is not None:
+            self._silent.inspect(course.time, course.x)
 
     def compared(self, folder):
         """Rows for the comparison with a step refinement, see `refweb.dynamics.history.Watch.compared`."""
@@ -270,6 +282,7 @@ class Simulation:
 
     def _set_off(self, folder):
         """The course at its start, or at its checkpoint, and the number of the next row."""
+        self.schedule.reset()
         if self._kept is None:
             return self.integrator.start(*self.begin.motion), 0
         course, row = self.integrator.load(fields_of(self._kept["run"])), int(self._kept["row"])
@@ -343,7 +356,8 @@ class Simulation:
     def _state(self, course):
         """The state of a course, as a copy."""
         state = self.watch.state(course)
-        return State(state.system, state.time, state.x.copy(), state.v.copy())
+        system = state.system if self.schedule.commands is None else state.system.snapshot(state.time)
+        return State(system, state.time, state.x.copy(), state.v.copy())
 
     def _frame(self, number, folder, course):
         """Keep a state; in a folder, with a checkpoint."""

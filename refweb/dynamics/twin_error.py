@@ -81,8 +81,9 @@ class Twin:
 
     def __enter__(self):
         integrator = self._simulation.integrator
-        if integrator.beside and THREADS:  # made here, so that one thread finds what the system finds once
-            twin = integrator.refined()
+        alone = self._simulation.schedule.commands is None  # two runs with commands would write to the same arrays
+        if integrator.beside and THREADS and alone:
+            twin = integrator.refined()  # made here, so that one thread finds what the system finds once
             self._thread = threading.Thread(target=self._run, args=(lambda: twin,), daemon=True)
             self._thread.start()
         return self
@@ -108,6 +109,7 @@ class Twin:
     def _run(self, made):
         simulation, rows, share_rows = self._simulation, [], []
         try:
+            simulation.schedule.reset()
             integrator = made()
             integrator.on_progress = self._on_progress
             begin = simulation.begin if simulation.begin_of_twin is None else simulation.begin_of_twin

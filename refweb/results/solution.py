@@ -175,6 +175,8 @@ class SolutionData:
         ``error``, ``place`` of its middle [m] and its stored ``energy`` [J]; None if no line can break.
     broken_before : list of int
         Lines that were broken at the start of the run.
+    commands : list of (time, path, value)
+        Values that changed during the run.
     twin_end : (ndarray, ndarray), optional
         Displacement [m] and velocity [m/s] at the end of the step-refinement run, each of shape (rows, 3); None without
         such a run.
@@ -201,6 +203,7 @@ class SolutionData:
     events: list[dict[str, Any]] = field(default_factory=list)
     throw: dict[str, Any] = field(default_factory=dict)
     breaks: list[dict[str, Any]] | None = None
+    commands: list[Any] = field(default_factory=list)
     broken_before: list[int] = field(default_factory=list)
     twin_end: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     frames: list[tuple[int, Any]] = field(default_factory=list)
@@ -254,6 +257,7 @@ class SolutionData:
             "events": self.events,
             **({} if self.breaks is None else {"breaks": self.breaks}),
             **({"broken_before": self.broken_before} if self.broken_before else {}),
+            **({"commands": self.commands} if self.commands else {}),
             "solver": self.solver,
             "cost": self.cost,
             "versions": self.versions,

@@ -73,6 +73,8 @@ class System:
     ----------
     terms : list of refweb.effects.base.ForceTerm
         One per effect that adds forces.
+    acting : list of (effect, list)
+        Effects, and what each gives.
     drives : list of refweb.effects.base.Drive
         One per effect that prescribes motion; its rows are supported as well.
     constraints : list of refweb.effects.base.Constraint
@@ -103,7 +105,8 @@ class System:
         self.net: Net = net
         self.effects: Sequence[Any] = effects
         self.rows: int = len(net.points)
-        acting = parts_of(effects, net)
+        self.acting: list[Any] = [(effect, parts_of([effect], net)) for effect in effects]
+        acting = [part for _, parts in self.acting for part in parts]
         if any(body.axle and body.axle.torque for body in net.bodies):
             from ..effects.axle import torques
 
@@ -364,6 +367,10 @@ class System:
             self._at_time = known = t, numbers
         return known[1]
 
+    def forget_lengths(self) -> None:
+        """Forget the lengths of the last time, where their tables have changed."""
+        self._at_time = None
+
     def natural_length(self, t: float) -> NDArray[np.float64]:
         """Natural length of each element at time t [m], shape (elements,)."""
         return self.line_data(t).natural_length
@@ -377,6 +384,13 @@ class System:
         if self.net.flows:
             view.net = replace(view.net, flows=(), mass=self.material_flow.masses(t))
             view.__dict__.pop("mass", None)
+        return view
+
+    def snapshot(self, t: float) -> System:
+        """The system as it stands at time t, with a copy of all numbers that commands may change."""
+        view = copy.copy(self.at(t))
+        view.terms = [term if term.data is None else replace(term, data=term.data.copy()) for term in self.terms]
+        view.drives = [replace(drive, data=drive.data.copy()) for drive in self.drives]
         return view
 
     def with_line_data(self, numbers: LineData) -> System:

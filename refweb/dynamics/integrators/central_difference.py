@@ -202,6 +202,10 @@ class CentralDifference(Integrator):
         self.system.forces(course.time, course.x, course.v, self._outs)
         return course
 
+    def renew(self, course, change):
+        """Go on with forces that have changed, see `refweb.dynamics.integrators.integrator.Integrator.renew`."""
+        course.force += change
+
     @property
     def _keys(self) -> dict:
         return dict(safety=self.safety, step_size=self.step_size)

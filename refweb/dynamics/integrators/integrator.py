@@ -359,6 +359,18 @@ class Integrator(Protocol):
         """The course of a checkpoint, for an integrator made of the same arguments."""
         ...
 
+    def renew(self, course: IntegratorState, change: NDArray[np.float64]) -> None:
+        """Go on from the state of a course with forces that have changed at once.
+
+        Parameters
+        ----------
+        course : IntegratorState
+            Its state, at a history row.
+        change : ndarray, shape (rows, 3)
+            Change of the force on each row [N].
+        """
+        ...
+
     def refined(self, by: float | None = None) -> Integrator:
         """The method on the same system, with the same probes, sums and events and a smaller error.
 

@@ -309,6 +309,11 @@ class StepObserver(Integrator):
         self._enter(course)
         return course
 
+    def renew(self, course: ObservedState, change: NDArray[np.float64]) -> None:
+        """Begin anew at the state of a course, where forces have changed."""
+        course.reached = course.time
+        self._enter(course)
+
     def refined(self, by: float | None = None) -> Self:
         """The method with tolerances that are ``by`` times as small, by default `TWIN_TOLERANCES`."""
         (observed, keys), share = self._made_of, 1.0 / (TWIN_TOLERANCES if by is None else by)

@@ -1,0 +1,332 @@
+"""Commands: values of effects that change during a run, and what they do to a system and to a run.
+
+A command changes one number or vector at a history row, where steps end, and the value stays until the next command. It
+writes to the numbers of cells in place: kernels, cells and sizes of tables stay, so that the compiled loop goes on. A
+rate goes on from the value of its table: a reel and a motion have no jump.
+
+Balances stay closed. A command changes the energy of gravity at once, which counts as work, and formulas of impulses,
+whose values at the start change by as much as those of the time.
+
+`INPUTS` and `RATES` are paths that users write; to add one needs an entry there and nothing else where the numbers of
+its term follow from the new table of the effect.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..effects.base import ForceTerm
+from ..effects.time_tables import flattened
+from ..errors import InputError, refused_at
+from ..messages import nearest, quote, short
+from ..registry import EFFECTS, name_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from ..scene import Scene
+    from ..system.system import System
+    from .integrators.integrator import Integrator, IntegratorState
+
+INPUTS = {"load": "force", "thrust": "force", "pressure": "value", "gravity": "acceleration"}
+"""Key of each effect that a command may set."""
+RATES = {
+    "reel": {"rate": ("factor", 1)},
+    "motion": {"velocity": ("displacement", 3), "angular_velocity": ("rotation", 3)},
+}
+"""Rates of each effect, with the table over time that they continue and its number of columns."""
+TORQUE = "axle.torque"
+"""Key of the torque about the axle of a body."""
+SHORTEST = 0.01
+"""Share of its length down to which a rate reels in a line."""
+NEAR = 1e-9
+"""Share of the time between rows within which a command is at a row."""
+
+
+class Command(NamedTuple):
+    """A value that changes.
+
+    Attributes
+    ----------
+    time : float
+        Time of a history row [s].
+    path : str
+        Path of the value, ``load.0.force``; names of effects and keys are those of `INPUTS` and `RATES`.
+    value : float or sequence of float
+        The value from then on.
+    """
+
+    time: float
+    path: str
+    value: Any
+
+
+def widened(scene: Scene) -> Scene:
+    """The scene with tables of reels and motions of two rows or more, which begin at 0: values are the same."""
+    end, effects = scene.solve.duration, []
+    for effect in scene.effects:
+        tables = {table: columns for table, columns in RATES.get(str(name_of(EFFECTS, effect)), {}).values()}
+        changed = {}
+        for name, columns in tables.items():
+            rows = getattr(effect, name)
+            if rows is None and getattr(effect, "body", None) is not None and name == "displacement":
+                rows = ((0.0, *(0.0,) * columns),)
+            if rows is None:
+                continue
+            rows = [tuple(row) for row in rows]
+            rows = [(0.0, *rows[0][1:]), *rows] if rows[0][0] > 0.0 else rows
+            changed[name] = rows if len(rows) > 1 else [*rows, (max(end, rows[0][0]) + 1.0, *rows[0][1:])]
+        effects.append(replace(effect, **changed) if changed else effect)
+    return scene.replace(effects=tuple(effects))
+
+
+class Inputs:
+    """Values of the effects of a system that commands may set.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        Scene, `widened`.
+    system : refweb.system.system.System
+        Its system, whose arrays are written.
+
+    Attributes
+    ----------
+    present : dict
+        Effects that differ from those of the scene, by name and number.
+
+    Raises
+    ------
+    InputError
+        Beside ``[rupture]``.
+    """
+
+    def __init__(self, scene: Scene, system: System) -> None:
+        if system.weakness is not None:
+            raise InputError("commands cannot stand beside [rupture]: leave out one of them")
+        self._system, self._first = system, {}
+        self._given: dict[str, list[Any]] = {}
+        for effect in scene.effects:
+            self._given.setdefault(str(name_of(EFFECTS, effect)), []).append(effect)
+        self.present: dict[tuple[str, int], Any] = {}
+
+    def reset(self) -> None:
+        """Give all numbers the values of the scene."""
+        for array, values in self._first.values():
+            array[...] = values
+        self.present.clear()
+        self._system.forget_lengths()
+
+    def restore(self, present: dict[tuple[str, int], Any]) -> None:
+        """Take the values of another `Inputs` of the same scene."""
+        for (name, number), effect in present.items():
+            self._write(self._writes(name, self._given[name][number], effect))
+        self.present = dict(present)
+
+    def replay(self, commands: Iterable[Command]) -> None:
+        """Take the values that commands have given one after another, without a run."""
+        for command in commands:
+            name, number, effect = self._changed(command, command.time)
+            self.present[name, number] = effect
+        self.restore(self.present)
+
+    def checked(self, command: Command) -> list[Any]:
+        """Check a command, and return what `apply` writes.
+
+        Raises
+        ------
+        InputError
+            For a path or a value that a command cannot have.
+        """
+        with refused_at(f"{short(command.path)} = {quote(command.value)}:"):
+            name, number, effect = self._changed(command, command.time)
+            writes = self._writes(name, self._given[name][number], effect)
+        self.present[name, number] = effect
+        return writes
+
+    def apply(self, writes: list[Any], integrator: Integrator, course: IntegratorState) -> None:
+        """Write the numbers of checked commands in a run, and keep the balances of the run closed."""
+        system, t, x, v = self._system, course.time, course.x, course.v
+        terms = [term for term in system.terms if any(term.data is array for array, _ in writes)]
+        before = system.forces(t, x, v).force, *self._booked(terms, t, x)
+        self._write(writes)
+        force, energy, impulse = system.forces(t, x, v).force, *self._booked(terms, t, x)
+        course.work[-1] += energy - before[1]
+        course.ledger.given[:] += impulse - before[2]
+        integrator.renew(course, force - before[0])
+
+    def _booked(self, terms, t, x):
+        """Energy of terms that are booked by it [J], and the values of their formulas of impulses [N s]."""
+        energy, impulse = 0.0, np.zeros(3)
+        for term in terms:
+            if term.balance.power is None:
+                energy += float(self._system.energy_of(term, t, x).sum())
+            if term.balance.impulse is not None and not term.balance.internal:
+                term.balance.impulse(t, x, term.cells, term.data, impulse)
+        return energy, impulse
+
+    def _write(self, writes):
+        for array, numbers in writes:
+            self._first.setdefault(id(array), (array, array.copy()))
+            array[...] = numbers
+        self._system.forget_lengths()
+
+    def _changed(self, command, t):
+        """(Name, number, new effect) that a command asks for at time t."""
+        name, _, rest = command.path.partition(".")
+        known = [*INPUTS, *RATES, "body"]
+        if name not in known:
+            raise InputError(f"{quote(name)} has nothing that a command may set, {nearest(name, known)}")
+        effects = self._given.get(name, [])
+        if not effects:
+            raise InputError(f"the scene has no [{name}]")
+        number, key = 0, rest
+        if effects[0].several:
+            word, _, key = rest.partition(".")
+            number = self._number(name, word, effects)
+        effect = self.present.get((name, number), effects[number])
+        if name == "body":
+            return name, number, self._with_torque(effect, key, command.value)
+        if key in RATES.get(name, {}):
+            return name, number, self._with_rate(name, effect, key, command.value, t)
+        keys = [INPUTS[name]] if name in INPUTS else list(RATES[name])
+        if key not in keys:
+            raise InputError(f"{quote(key)} is not a key of [{name}] that a command may set, {nearest(key, keys)}")
+        return name, number, replace(effect, **{key: command.value})
+
+    @staticmethod
+    def _number(name, word, effects):
+        named = {getattr(effect, "name", None): i for i, effect in enumerate(effects)}
+        if word in named:
+            return named[word]
+        if not word.isdecimal() or int(word) >= len(effects):
+            names = [*map(str, range(len(effects))), *filter(None, named)]
+            raise InputError(f"{quote(word)} is not the number or name of a [[{name}]], {nearest(word, names)}")
+        return int(word)
+
+    @staticmethod
+    def _with_torque(body, key, value):
+        if key != TORQUE:
+            raise InputError(f"{quote(key)} is not a key of [[body]] that a command may set, only {TORQUE}")
+        if body.axle is None or body.axle.torque is None:
+            raise InputError(f"body {quote(body.name)} has no {TORQUE}: give it in the scene, such as 0.0")
+        axle = replace(body.axle, torque=_finite(value, 1)[0])
+        if isinstance(body.axle.torque, tuple):
+            axle = replace(axle, torque=[(row[0], axle.torque) for row in body.axle.torque])
+        return replace(body, axle=axle)
+
+    def _with_rate(self, name, effect, key, value, t):
+        """The effect whose table goes on with a rate from time t."""
+        table, columns = RATES[name][key]
+        rows, rate = getattr(effect, table), _finite(value, columns)
+        if rows is None:
+            raise InputError(f"there is no {table} that it could continue: give one in the scene")
+        if name == "reel" and effect.mass == "follows":
+            raise InputError('a reel with mass = "follows" has its factor from the scene alone')
+        if name == "reel" and any(term.contact.crossing is not None for term in self._system.terms):
+            raise InputError("[self_contact] needs to know natural lengths ahead: give the factor in the scene")
+        if table == "rotation":
+            self._refuse_without_axle(effect)
+        rows = np.array(rows)
+        now = np.array([np.interp(t, rows[:, 0], column) for column in rows[:, 1:].T])
+        end = max(self._system.net.end, t) + 1.0
+        if name == "reel" and rate[0] < 0.0:
+            end = min(end, t + (1.0 - SHORTEST) * now[0] / -rate[0])
+        last = now + rate * (end - t)
+        later = [(end + 1.0 + i, *last) for i in range(len(rows) - 2)]
+        return replace(effect, **{table: [(t, *now), (end, *last), *later]})
+
+    def _refuse_without_axle(self, motion):
+        body = next((body for body in self._system.net.bodies if body.name == motion.body), None)
+        if body is None or body.axle is None:
+            raise InputError(f"body = {quote(motion.body)} turns about no axle: angular velocities need one")
+
+    def _writes(self, name, given, effect):
+        """[(array, numbers)] of what an effect writes in place of that of the scene."""
+        system = self._system
+        if name == "body":
+            return self._writes_of_torque(given, effect)
+        if name == "reel":
+            at = next(i for i, (_, table) in enumerate(system.net.factors) if table is given.factor)
+            return [(system.lengths.tables[at], np.array(flattened(effect.factor)))]
+        old = next(parts for acting, parts in system.acting if getattr(acting, "effect", None) is given)
+        new = effect.on(system.net)
+        writes = []
+        for part, changed in zip(old, new if isinstance(new, list) else [new], strict=True):
+            same = np.array_equal(part.cells, changed.cells) and part.data.shape == changed.data.shape
+            if not same or isinstance(part, ForceTerm) and part.force is not changed.force:
+                raise InputError("it would change more than numbers, which a command cannot")
+            writes.append((part.data, changed.data))
+        return writes
+
+    def _writes_of_torque(self, given, body):
+        rigid = next(rigid for rigid in self._system.net.bodies if rigid.name == given.name)
+        for term in self._system.terms:
+            if term.name == "axle" and term.cells[0, 0] == rigid.spin:
+                table = body.axle.at(body.position).torque
+                return [(term.data, np.array([[*rigid.axle.direction, *flattened(table)]]))]
+        raise InputError(f"body {quote(given.name)} does not turn freely")
+
+
+def _finite(value, count):
+    """A value as an array of so many finite numbers."""
+    try:
+        numbers = np.array(value, dtype=float).reshape(-1)
+    except (TypeError, ValueError):
+        numbers = np.zeros(0)
+    if len(numbers) != count or not np.isfinite(numbers).all():
+        raise InputError(f"must be {'a finite number' if count == 1 else f'{count} finite numbers'}")
+    return numbers
+
+
+class Commands:
+    """Commands of a run at the numbers of its rows.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        Values that they set.
+    times : ndarray
+        Times of the history rows [s].
+    given : iterable of Command
+        The commands.
+
+    Raises
+    ------
+    InputError
+        For a time that is not that of a row.
+    """
+
+    def __init__(self, inputs: Inputs, times: NDArray[np.float64], given: Iterable[Sequence[Any]]) -> None:
+        self.inputs: Inputs = inputs
+        self._by_row: dict[int, list[Command]] = {}
+        for entry in given:
+            command = Command(*entry)
+            self._by_row.setdefault(row_at(times, command.time), []).append(command)
+
+    def until(self, first: int) -> float:
+        """Number of the first row from ``first`` on that has commands; infinite without one."""
+        return min((row for row in self._by_row if row >= first), default=np.inf)
+
+    def act(self, row: int, integrator: Integrator, course: IntegratorState) -> None:
+        """Apply the commands of a row."""
+        if commands := self._by_row.get(row):
+            writes = [write for command in commands for write in self.inputs.checked(command)]
+            self.inputs.apply(writes, integrator, course)
+
+
+def row_at(times: NDArray[np.float64], time: float) -> int:
+    """Number of the history row at a time [s]; `InputError` for a time between rows."""
+    row = int(np.argmin(np.abs(times - time)))
+    interval = times[1] - times[0]
+    if not abs(times[row] - time) <= NEAR * interval:
+        raise InputError(
+            f"t = {time:.9g} s is not the time of a history row: rows are each {interval:.6g} s, "
+            "which [output] interval decides"
+        )
+    return row

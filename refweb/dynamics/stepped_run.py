@@ -1,0 +1,262 @@
+"""A run that is taken ahead step by step, for feedback: it is asked for results, and values of effects are set.
+
+The loop, its records and tables are those of `refweb.run`, and are kept between calls: a run to which nothing is set
+has its bits. `SteppedRun` is public; `refweb.dynamics.commands` has what may be set.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from ..errors import InputError
+from ..messages import nearest, quote
+from ..registry import load
+from ..results.provenance import versions, web_of
+from ..results.solution import as_history
+from ..scene import Scene
+from .commands import NEAR, Command, Inputs, row_at, widened
+from .schedule import Schedule, block_of
+from .simulation import Simulation
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from numpy.typing import NDArray
+
+    from ..results.state import State
+    from ..solution import Solution
+
+
+class SteppedRun:
+    """A dynamic run that goes ahead when it is told, and whose loads and rates may be set meanwhile.
+
+    Parameters
+    ----------
+    scene : Scene, path-like or str
+        A dynamic scene, a scene file or the name of a scene shipped with refweb.
+
+    Attributes
+    ----------
+    scene : refweb.Scene
+        The scene.
+    commands : list of (float, str, object)
+        Time [s], path and value of all that has been set.
+
+    Raises
+    ------
+    InputError
+        For wrong input, a scene of statics, and one with ``[rupture]``.
+    SolverError
+        Where the equilibrium that the scene starts from is not found.
+
+    See Also
+    --------
+    refweb.start : makes one.
+    """
+
+    def __init__(self, scene: Scene | str | PathLike[str]) -> None:
+        scene = scene if isinstance(scene, Scene) else Scene.load(scene)
+        if scene.solve.kind == "static":
+            raise InputError('start needs [solve] kind = "dynamic": statics has load steps')
+        self.scene: Scene = scene
+        self.commands: list[Command] = []
+        self._make(None)
+        self._course = self._simulation.integrator.start(*self._simulation.begin.motion)
+        self._go_to_row(1)
+
+    def _make(self, begin):
+        """Make the simulation, at the start of another one or at its own."""
+        settled, system = widened(self.scene).settle()
+        solution = load("refweb.solution:Solution")(settled, web=web_of(system), versions=versions())
+        self._simulation = Simulation(settled, system, solution)
+        if begin is None:
+            self._simulation.settle(lambda text, share: None)
+        else:
+            self._simulation.begin = begin
+        self._inputs, self._pending, self._tables, self._row = Inputs(settled, system), [], [], 0
+        prepare = getattr(self._simulation.integrator, "prepare", None)
+        if prepare is not None:
+            prepare()
+
+    def _go_to_row(self, stop):
+        """Go on to the row before ``stop``."""
+        simulation = self._simulation
+        while self._row < stop and not self._course.stopped:
+            block = block_of(simulation.integrator, self._course, self._schedule, self._row, stop)
+            table = simulation.watch.table(block.history)
+            simulation.inspect(self._course)
+            self._tables.append(table)
+            self._row += len(table)
+
+    @property
+    def _schedule(self) -> Schedule:
+        return self._simulation.schedule
+
+    @property
+    def time(self) -> float:
+        """Time that the run has reached [s]."""
+        return float(self._course.time)
+
+    @property
+    def stopped(self) -> bool:
+        """True at the end of the duration, and where an event has ended the run."""
+        return self._course.stopped or self._row == len(self._schedule.times)
+
+    @property
+    def state(self) -> State:
+        """The present `refweb.results.state.State`; it shares its arrays with the run, and holds until it goes on."""
+        return self._simulation.watch.state(self._course)
+
+    @property
+    def history(self) -> dict[str, NDArray[np.float64]]:
+        """Columns of ``history.csv`` until now by name, arrays of shape (rows,)."""
+        return as_history(self._simulation.columns, np.concatenate(self._tables))
+
+    def observe(self, name: str) -> float:
+        """The present value of an observable of the scene.
+
+        Parameters
+        ----------
+        name : str
+            Name of an ``[[observe]]``.
+
+        Raises
+        ------
+        InputError
+            For a name that the scene does not have.
+        """
+        names = [o.name for o in self._simulation.watch.observables]
+        if name not in names:
+            raise InputError(f"{quote(name)} is not an observable of the scene, {nearest(name, names)}")
+        return float(self._tables[-1][-1, 1 + names.index(name)])
+
+    def set(self, path: str, value: Any) -> None:
+        """Set a value from now on; it takes effect when the run goes ahead.
+
+        Parameters
+        ----------
+        path : str
+            ``load.N.force`` [N], ``thrust.N.force`` [N], ``pressure.N.value`` [Pa], ``gravity.acceleration`` [m/s²],
+            ``body.NAME.axle.torque`` [N m]; or a rate, ``reel.N.rate`` [1/s] of the factor, ``motion.N.velocity``
+            [m/s], ``motion.N.angular_velocity`` [rad/s] of a body on an axle. N counts from 0.
+        value : float or sequence of 3 float
+            The value; a rate continues the present value of the table.
+
+        Raises
+        ------
+        InputError
+            For what cannot be set.
+        """
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
+        command = Command(self.time, path, value)
+        self._pending += self._inputs.checked(command)
+        self.commands.append(command)
+
+    def advance(self, dt: float | None = None) -> float:
+        """Go ahead by a time, to a history row.
+
+        Parameters
+        ----------
+        dt : float, optional
+            Time [s], a multiple of ``[output] interval``; by default the time to the next row. Where the duration ends
+            before, the run goes to its end.
+
+        Returns
+        -------
+        float
+            Time reached [s].
+
+        Raises
+        ------
+        InputError
+            For a time that does not end at a row, and for a run that has ended.
+        SolverError
+            As `refweb.run`.
+        """
+        times = self._schedule.times
+        if self.stopped:
+            raise InputError(f"the run has ended at t = {self.time:.6g} s: start it again, or give a longer duration")
+        if dt is None:
+            stop = self._row + 1
+        else:
+            if not dt > 0.0:
+                raise InputError(f"dt = {dt!r} must be > 0 [s]")
+            end = self.time + dt
+            past = end > times[-1] * (1.0 - NEAR)
+            stop = len(times) if past else row_at(times, end) + 1
+        self._apply_pending()
+        self._go_to_row(stop)
+        return self.time
+
+    def _apply_pending(self):
+        """Give the run what has been set."""
+        if self._pending:
+            self._inputs.apply(self._pending, self._simulation.integrator, self._course)
+            self._pending = []
+
+    def finish(self, out: str | PathLike[str] | None = None, force: bool = False, progress: bool = False) -> Solution:
+        """Go on to the end, with the values that are set, and return all that `refweb.run` returns.
+
+        The run is repeated from its start with the same commands, bit for bit, for the extremes, the errors by a
+        step-refinement run with the same commands, and the files.
+
+        Parameters
+        ----------
+        out, force, progress
+            See `refweb.run`.
+
+        Returns
+        -------
+        Solution
+
+        Raises
+        ------
+        InputError, SolverError
+            See `refweb.run`.
+        """
+        return load("refweb.runner:run")(self.scene, out, force, progress, commands=self.commands)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """A run of its own from the present state; CVODE and IDA begin anew there, within their tolerance."""
+        self._apply_pending()
+        copy = object.__new__(type(self))
+        copy.scene, copy.commands = self.scene, list(self.commands)
+        copy._make(self._simulation.begin)
+        arrays = self._simulation.integrator.save(self._course)
+        copy._inputs.restore(self._inputs.present)
+        copy._course = copy._simulation.integrator.load({name: np.array(value) for name, value in arrays.items()})
+        copy._tables, copy._row, copy._pending = list(self._tables), self._row, []
+        return copy
+
+
+def start(scene: Scene | str | PathLike[str]) -> SteppedRun:
+    """Start a dynamic run that is taken ahead step by step, for feedback control.
+
+    Parameters
+    ----------
+    scene : Scene, path-like or str
+        A dynamic scene, a scene file or the name of a scene shipped with refweb. Its ``[output] interval`` is the
+        shortest time between two commands.
+
+    Returns
+    -------
+    SteppedRun
+        At t = 0.
+
+    Raises
+    ------
+    InputError, SolverError
+        See `SteppedRun`.
+
+    Examples
+    --------
+    >>> run = refweb.start("scene.toml")
+    >>> while not run.stopped:
+    ...     run.set("load.0.force", [0.0, 0.0, -50.0 * run.observe("height")])
+    ...     run.advance(0.02)
+    >>> solution = run.finish()
+    """
+    return SteppedRun(scene)
