@@ -300,9 +300,11 @@ KINDS = {
 LINE_COLUMNS = (
     *("natural_length", "ea", "slackness", "smoothing", "g0", "r0", "reference", "distance"),
     *("law", "damping_time", "rupture_energy", "curve", "modulus", "area", "density", "strength", "safety_factor"),
-    "knot_factor",
+    *("knot_factor", "growth"),
 )
 """Numbers of a line, as which no parameter of a law may be called."""
+OF_EFFECTS = ("arm_", "plastic_")
+"""Beginnings of the names of numbers that effects give lines."""
 SHIPPED = {kind: frozenset(entry.table) for kind, entry in KINDS.items()}
 """Names of what refweb ships, by kind."""
 RESERVED = {"effect": {"schema", "title", "seed", "web", "solve", *PARTS, *LISTS}, "integrator": {"auto"}}
@@ -389,7 +391,7 @@ def _check_law(name, law):
         raise InputError(f"name = {quote(law.name)} of the class must be the same name")
     parameters = [*getattr(law, "__dataclass_fields__", ())]
     for parameter in parameters:
-        if parameter in LINE_COLUMNS:
+        if parameter in LINE_COLUMNS or parameter.startswith(OF_EFFECTS):
             raise InputError(f"the parameter {quote(parameter)} has a name of refweb's own, call it otherwise")
     law.columns = (*law.columns, *(parameter for parameter in parameters if parameter not in law.columns))
 

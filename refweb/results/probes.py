@@ -323,10 +323,10 @@ def selected_element(t, x, v, f, lines, rows, data, where):
 
 @kernel(PROBE)
 def slack_fraction(t, x, v, f, lines, rows, data, where):
-    """Share of elements whose strain is at most data."""
+    """Share of elements with a strain of at most data or, where data is nan, no tension, column rows[0] of lines."""
     count = 0
     for c in range(lines.shape[0]):
-        if lines[c, 1] <= data[c, 0]:
+        if lines[c, 1] <= data[c, 0] or math.isnan(data[c, 0]) and lines[c, rows[0]] <= 0.0:
             count += 1
     return count / lines.shape[0]
 

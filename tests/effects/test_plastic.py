@@ -417,3 +417,19 @@ def test_pretension_is_the_tension_that_is_asked_for():
         InputError, match="pretension: line 0 cannot have a stress of 120000 Pa: it yields at 100000 Pa"
     ):
         between([], LAW | {"pretension": 12.0, "hardening": 0.0}, solve=refweb.Static()).build()
+
+
+def test_a_line_that_has_yielded_and_lost_its_tension_is_slack():
+    """Of two lines the one that is longer by its plastic strain is slack at a strain above zero."""
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 1, 0]], lines=[[0, 1], [2, 3]], supports=[0, 2, 3])
+    table = [(0.0, 0.0, 0.0, 0.0), (1.0, 0.05, 0.0, 0.0), (2.0, 0.02, 0.0, 0.0)]
+    scene = refweb.Scene(
+        web=web, cable=refweb.Cable(**LAW, density=1.0, prestrain=1e-3),
+        effects=[refweb.Motion(node=1, displacement=table)],
+        observe=[refweb.Observe(name="slack", quantity="slack_fraction")],
+        solve=refweb.Dynamic(duration=2.0, step_size=2e-3), output=refweb.Output(interval=1.0),
+        accuracy=refweb.Accuracy(error="none"),
+    )  # fmt: skip
+    run = refweb.run(scene)
+    np.testing.assert_array_equal(run.history["slack"], [0.0, 0.0, 0.5])
+    assert run.state.element_slack.mean() == 0.5

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .observable import Observable, Value
 
 if TYPE_CHECKING:
@@ -28,10 +30,13 @@ class SlackFraction(Observable):
         return 0.0, 1.0
 
     def probe(self, system: System) -> Probe:
-        """Make the probe that counts strains up to the slackness."""
+        """Make the probe that counts strains up to the slackness; lines that yield are slack without tension."""
         from ..probes import Probe, slack_fraction
 
-        return Probe(slack_fraction, [], system.net.slackness[:, None])
+        net = system.net
+        return Probe(
+            slack_fraction, [system.tension_column], np.where(net.law_is("plastic"), np.nan, net.slackness)[:, None]
+        )
 
     def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """None, since the value jumps."""
