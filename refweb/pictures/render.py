@@ -84,7 +84,7 @@ class Renderer:
 
         while self._child is not None or self._kinds:
             if self._child is None:
-                self._child = self._start(*self._kinds.pop(0))
+                self._child = self.start_child(*self._kinds.pop(0))
             try:
                 return self._child.submit(images, model).result(SECONDS_PER_FRAME)
             except (OSError, BrokenExecutor, TimeoutError) as error:
@@ -93,7 +93,7 @@ class Renderer:
                 self._end()
         return None
 
-    def _start(self, window, display):
+    def start_child(self, window, display):
         """Start a child, an executor of one process."""
         from loky import ProcessPoolExecutor
 

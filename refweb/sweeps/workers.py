@@ -53,27 +53,32 @@ class Processes:
     """Processes of this machine, one thread each, by loky: they do not import the user's script, which needs no guard.
 
     loky gives up all jobs when one process dies, and does not say which job killed it; `through` tries them again.
+
+    Attributes
+    ----------
+    pool : loky.ProcessPoolExecutor, optional
+        Its processes, None before the first job and after the end.
     """
 
     local = True
 
     def __init__(self, count=None):
         self.parallel = count or cores()
-        self._pool: Any = None
+        self.pool: Any = None
         self._alive: Any = None
 
     def submit(self, job):
         """Hand out a job; a `concurrent.futures.Future`."""
         import loky
 
-        if self._pool is None:
+        if self.pool is None:
             parent, self._alive = multiprocessing.Pipe(duplex=False)
             options = {"initializer": _watch, "initargs": (parent,), "env": dict.fromkeys(THREADS, "1")}
-            self._pool = loky.ProcessPoolExecutor(self.parallel, **options)
+            self.pool = loky.ProcessPoolExecutor(self.parallel, **options)
         can_block = hasattr(signal, "pthread_sigmask")  # until `_watch` runs
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if can_block else None
         try:
-            return self._pool.submit(solve, job)
+            return self.pool.submit(solve, job)
         except concurrent.futures.BrokenExecutor as error:  # a worker has died since
             future = concurrent.futures.Future()
             future.set_exception(error)
@@ -88,10 +93,10 @@ class Processes:
 
     def stop(self):
         """End all processes at once."""
-        if self._pool is not None:
-            self._pool.shutdown(kill_workers=True)
+        if self.pool is not None:
+            self.pool.shutdown(kill_workers=True)
             self._alive.close()
-            self._pool = self._alive = None
+            self.pool = self._alive = None
 
 
 class Given:

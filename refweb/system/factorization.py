@@ -77,52 +77,59 @@ class Library:
         self.remarks.append(f"rslab {what}: qdldl factorizes instead, and the results are its")
 
 
-class _Qdldl:
+class Qdldl:
     """LDLᵀ by qdldl, column by column, without exchanges of pivots; the ordering is found once.
 
     It is the ordering of minimum degree; among equal degrees the number decides. From `LARGE` unknowns on, the second
     factorization counts the unknowns from the last one on, and the direction with less fill-in is kept. For hexagon
     webs the factor is then an eighth smaller and takes a fifth less time; for triangles it is larger, for squares the
     same.
+
+    Attributes
+    ----------
+    turn : {1, -1}
+        Direction in which the unknowns are counted.
+    solver : qdldl.Solver, optional
+        The factorization, None before the first.
     """
 
     solutions = 10
 
     def __init__(self, pattern):
-        self.pattern, self._turn, self._may_turn = pattern, 1, pattern.size >= LARGE
-        self._solver: Any = None
+        self.pattern, self.turn, self._may_turn = pattern, 1, pattern.size >= LARGE
+        self.solver: Any = None
 
     def factorize(self, values):
         """Factorize; only the solutions show a zero pivot."""
-        if self._solver is None:
+        if self.solver is None:
             self._begin(values)
             return
         if self._may_turn:
-            before, self._turn, self._may_turn = self._solver, -1, False
+            before, self.turn, self._may_turn = self.solver, -1, False
             self._begin(values)
-            if self._solver.factors()[0].nnz < before.factors()[0].nnz:
+            if self.solver.factors()[0].nnz < before.factors()[0].nnz:
                 return
-            self._solver, self._turn = before, 1
-        self._matrix = self.pattern.upper_matrix(values, self._turn)
-        self._solver.update(self._matrix, upper=True)
+            self.solver, self.turn = before, 1
+        self._matrix = self.pattern.upper_matrix(values, self.turn)
+        self.solver.update(self._matrix, upper=True)
 
     def _begin(self, values):
         """Find an ordering, and factorize."""
         import qdldl
 
-        self._matrix = matrix = self.pattern.upper_matrix(values, self._turn)
+        self._matrix = matrix = self.pattern.upper_matrix(values, self.turn)
         try:
-            self._solver = qdldl.Solver(matrix, upper=True)
+            self.solver = qdldl.Solver(matrix, upper=True)
         except RuntimeError:  # a zero pivot, which raises here and not in an update
             definite = matrix.copy()
             definite.data[:] = 0.0
             definite.setdiag(1.0)
-            self._solver = qdldl.Solver(definite, upper=True)
-            self._solver.update(matrix, upper=True)
+            self.solver = qdldl.Solver(definite, upper=True)
+            self.solver.update(matrix, upper=True)
 
     def solve(self, b):
         """Solution of A y = b."""
-        return self._solver.solve(np.ascontiguousarray(b[:: self._turn]))[:: self._turn]
+        return self.solver.solve(np.ascontiguousarray(b[:: self.turn]))[:: self.turn]
 
     def solve_all(self, b):
         """Solutions of A y = b, shape (n, k)."""
@@ -130,12 +137,12 @@ class _Qdldl:
 
     def times(self, y):
         """A y."""
-        upper, y = self._matrix, y[:: self._turn]
-        return (upper @ y + upper.T @ y - upper.diagonal() * y)[:: self._turn]
+        upper, y = self._matrix, y[:: self.turn]
+        return (upper @ y + upper.T @ y - upper.diagonal() * y)[:: self.turn]
 
     def negative_pivots(self):
         """Number of pivots that are not positive."""
-        return _not_positive(self._solver)
+        return _not_positive(self.solver)
 
 
 class _Superlu:
@@ -208,7 +215,7 @@ class _Rslab:
         return negative + zero if complete else None
 
 
-LIBRARIES = {"qdldl": _Qdldl, "superlu": _Superlu, "rslab": _Rslab}
+LIBRARIES = {"qdldl": Qdldl, "superlu": _Superlu, "rslab": _Rslab}
 
 
 class Factor:

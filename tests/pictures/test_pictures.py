@@ -141,13 +141,13 @@ def test_a_window_that_kills_the_child_is_survived(film, monkeypatch, tmp_path, 
 
 def test_one_renderer_is_kept_for_a_film(film, monkeypatch, tmp_path):
     """One child for all frames, which is gone at the end; its images are those of a child of their own."""
-    children, start = [], drawing.Renderer._start
+    children, start = [], drawing.Renderer.start_child
 
     def kept(self, *kind):
         children.append(start(self, *kind))
         return children[-1]
 
-    monkeypatch.setattr(drawing.Renderer, "_start", kept)
+    monkeypatch.setattr(drawing.Renderer, "start_child", kept)
     first = drawing.windows()[:1]
     monkeypatch.setattr(drawing, "windows", lambda: list(first))
     films.animate(film, tmp_path / "web.gif")

@@ -45,13 +45,13 @@ def test_processes_of_which_one_is_killed(tmp_path, whole):
 
         def kill(self):
             Killed.ended += 1
-            if Killed.ended == 3 and self._pool is not None:
-                os.kill(next(iter(self._pool._processes.values())).pid, signal.SIGKILL)
+            if Killed.ended == 3 and self.pool is not None:
+                os.kill(next(iter(self.pool._processes.values())).pid, signal.SIGKILL)
 
     crew = Killed(2)
     found = refweb.sweep(arms(), TWELVE, tmp_path / "s", crew)
     assert rows_of(tmp_path / "s") == whole and found.count == {"solved": 12} and Killed.ended > 12
-    assert crew._pool is None and "OMP_NUM_THREADS" not in os.environ or os.environ["OMP_NUM_THREADS"] == "1"
+    assert crew.pool is None and "OMP_NUM_THREADS" not in os.environ or os.environ["OMP_NUM_THREADS"] == "1"
 
 
 @pytest.mark.slow

@@ -66,8 +66,8 @@ def test_a_singular_matrix_has_no_solution(library):
 @pytest.mark.parametrize("turn", [1, -1])
 def test_unknowns_may_be_counted_from_either_end(turn):
     chain = pattern("qdldl")
-    by = factorization._Qdldl(chain)
-    by._turn = turn
+    by = factorization.Qdldl(chain)
+    by.turn = turn
     for seed, shift in ((0, 0.0), (1, 0.0), (2, -30.0)):
         values, whole = matrix(chain, seed, shift)
         upper = chain.upper_matrix(values, turn).toarray()
@@ -90,10 +90,10 @@ def test_the_way_to_count_that_fills_less_is_kept(mesh, monkeypatch):
     system = refweb.Scene(web=window, cable=net("qdldl").cable, solve=refweb.Static(factorization="qdldl")).build()
     values = system.assemble_lines(system.net.unit_tension / system.net.natural_length[:, None, None])
     fills = [qdldl.Solver(system.pattern.upper_matrix(values, turn), upper=True).factors()[0].nnz for turn in (1, -1)]
-    by = factorization._Qdldl(system.pattern)
+    by = factorization.Qdldl(system.pattern)
     for fill in (fills[0], min(fills), min(fills)):
         by.factorize(values)
-        assert by._solver.factors()[0].nnz == fill
+        assert by.solver.factors()[0].nnz == fill
 
 
 def test_the_choice(monkeypatch):
