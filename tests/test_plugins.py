@@ -97,6 +97,7 @@ def test_a_package_is_known_to_the_command_line(folder):
         assert words in process(folder, "-m", "refweb", "help", name).stdout
 
 
+@pytest.mark.slow
 def test_machine_code_of_a_package_is_kept_and_noticed_when_it_changes(folder, tmp_path):
     """A second process compiles nothing; a changed kernel of the package is compiled again."""
     lines = """

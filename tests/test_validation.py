@@ -33,6 +33,8 @@ LONG = (
     "frequencies",
     "drag_and_link",
     "cable_law",
+    "conic_programming",
+    "hanging_chain",
     "winches",
     "materials",
     "threads",

@@ -43,12 +43,12 @@ def sampled(a, b, c, d):
 def test_distance_of_segments():
     """By minimization of a convex function, and where lines are parallel, cross or have no length."""
     rng = np.random.default_rng(1)
-    ends = rng.standard_normal((60, 2, 3))
+    ends = rng.standard_normal((30, 2, 3))
     ends[:10, :, 2] = 0.0  # in a plane: some cross
     ends[11, 1] = ends[11, 0]
     ends[13] = ends[12] + [0.3, 0.1, 0.0]
     ends[15] = ends[14] + 0.4 * (ends[14, 1] - ends[14, 0])  # on one line, overlapping
-    pairs = np.arange(60).reshape(-1, 2)
+    pairs = np.arange(30).reshape(-1, 2)
     found = distances(ends[:, 0], ends[:, 1], pairs)
     expected = [sampled(*ends[i], *ends[j]) for i, j in pairs]
     np.testing.assert_allclose(found, expected, atol=2e-7)  # of a minimum of 1e-14 in the square

@@ -324,6 +324,7 @@ def test_bound_bounds(files, name, mass):
     assert touched > 20
 
 
+@pytest.mark.slow
 def test_implicit_methods_follow_a_free_mesh(files):
     """CVODE and IDA find the motion of small explicit steps, of a body that is not convex and tumbles into a net."""
 

@@ -230,6 +230,7 @@ def struck(effects=(), rows=4, **parts):
 LOSING = [refweb.Damping(time=1e-5, rate=0.1), refweb.Drag(density=1.2)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", nets.some([([],), (LOSING,)], 2))
 def test_two_methods_tear_a_net_alike(effects):
     """A ball breaks the first lines of a net in the same order, at times that differ by no more than both ±."""

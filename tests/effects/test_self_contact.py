@@ -985,7 +985,8 @@ def wound(turns, share, rolling, method="central-difference", friction=0.2, radi
     return solution.state.v[last] @ way
 
 
-@pytest.mark.parametrize("turns", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("turns", [1, 2])
 def test_a_line_that_is_wound_around_a_line_holds_by_its_turns(turns):
     """It holds if and only if 2π n μ > ln(T₂/T₁), where lines do not roll: below, it creeps, within ten slip velocities
     of 1 mm/s, above it slides. Lines that roll do not hold it at any share: they speed up to metres a second.

@@ -510,6 +510,7 @@ def test_film_has_all_frames(film):
     assert all(image[-1, 0].tolist() == [255, 255, 255] for image in images) and (images[0] != images[2]).any()
 
 
+@pytest.mark.slow
 def test_a_film_by_polygons_shows_the_same(film, monkeypatch, tmp_path):
     """As by OpenGL, where there is some; and its images are those that stand on pictures."""
     films.animate(film, tmp_path / "a.gif")

@@ -234,6 +234,7 @@ def test_massless_nodes_are_for_ida_alone(coarse):
     assert {t.method for t in found.references} == {"ida"}
 
 
+@pytest.mark.slow
 def test_failures_are_listed(monkeypatch):
     """A run whose book of energy is open has failed, and has no error: BDF of a coarse tolerance loses energy."""
     web = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=10, length=1.05)

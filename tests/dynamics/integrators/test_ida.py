@@ -75,6 +75,7 @@ def test_an_impact_is_that_of_the_other_methods():
     assert own < 1e-5 and np.abs(fine[:-1]).max() > 5e-3
 
 
+@pytest.mark.slow
 def test_errors_fall_with_the_tolerance():
     """BDF of order 2 on a smooth motion: errors go with rtol^(2/3), here within the half of that exponent."""
     system = window(thrown(), density=200.0, prestrain=1e-2)
@@ -328,6 +329,7 @@ def test_links_are_the_limit_of_stiff_lines():
     assert (np.abs(slopes + 1.0) < 0.1).all() and off[-1] < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", nets.some(["sparse", "dense"], 2))
 def test_links_and_contact(name):
     """A ball hits a chain that falls: momentum goes over, lengths stay, energy is kept."""
