@@ -38,6 +38,7 @@ LONG = (
     "winches",
     "materials",
     "threads",
+    "feedback",
     "free_net",
     "price_of_modelling",
 )

@@ -79,6 +79,7 @@ CASES = {
         "winches",
         "materials",
         "threads",
+        "feedback",
         "drag_and_link",
     ),
     "missions": (
