@@ -40,7 +40,11 @@ def as_toml(given):
     parts = []
     for key, value in sorted(given.items(), key=lambda item: isinstance(item[1], (dict, list))):
         if isinstance(value, list):
-            parts += [f"[[{key}]]\n{tomli_w.dumps(entry)}" for entry in value]
+            for entry in value:
+                below = {name: inner for name, inner in entry.items() if isinstance(inner, dict)}
+                plain = {name: inner for name, inner in entry.items() if name not in below}
+                parts.append(f"[[{key}]]\n{tomli_w.dumps(plain)}")
+                parts += [tomli_w.dumps({key: {name: inner}}) for name, inner in below.items()]
         else:
             parts.append(tomli_w.dumps({key: value}))
     return "\n".join(parts)
