@@ -54,6 +54,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .runner import trust as trust
     from .scene import Scene as Scene
     from .settings import Accuracy as Accuracy
+    from .settings import Control as Control
     from .settings import Dynamic as Dynamic
     from .settings import Event as Event
     from .settings import Output as Output

@@ -76,6 +76,7 @@ LISTS = {
     "support": "refweb.settings:Supports",
     "observe": "refweb.results.observables.observe:Observe",
     "event": "refweb.settings:Event",
+    "control": "refweb.settings:Control",
 }
 """Those that may stand several times."""
 STUDY = "refweb.sweeps.study:Study"
@@ -227,6 +228,7 @@ EXPORTS = (
     "refweb.settings:Output",
     "refweb.settings:Accuracy",
     "refweb.settings:Event",
+    "refweb.settings:Control",
     "refweb.results.throw:Throw",
     "refweb.results.observables.observe:Observe",
     "refweb.solution:Solution",

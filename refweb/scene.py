@@ -56,6 +56,7 @@ CLASSES_OF_PARTS = {
     "throw": ("Throw", "NoneType"),
     "observe": ("Observe",),
     "event": ("Event",),
+    "control": ("Control",),
 }
 """Classes of the other parts of a scene."""
 SHIPPED_SCENES = pathlib.Path(__file__).parent / "scenes"
@@ -99,6 +100,8 @@ class Scene:
         Numbers to follow; `refweb.results.observables.observe.default` without any.
     event : sequence of Event
         Moments to find, in dynamics.
+    control : sequence of refweb.Control
+        Feedback controls, in dynamics.
     title : str
         Title; for a file without one the file's name.
     seed : int
@@ -123,6 +126,7 @@ class Scene:
     throw: Throw | None = None
     observe: Several = ()
     event: Several = ()
+    control: Several = ()
     title: str = "scene"
     seed: int = 0
     folder: pathlib.Path | None = field(default=None, compare=False)
@@ -133,7 +137,7 @@ class Scene:
         head = Head(title=self.title, seed=self.seed)
         for key in ("title", "seed"):
             object.__setattr__(self, key, getattr(head, key))
-        for key in ("effects", "support", "observe", "event"):
+        for key in ("effects", "support", "observe", "event", "control"):
             if not isinstance(getattr(self, key), (list, tuple)):
                 raise InputError(f"{key} = {quote(getattr(self, key))} must be a list")
             object.__setattr__(self, key, tuple(getattr(self, key)))
@@ -162,9 +166,11 @@ class Scene:
         for key in ("digits", "horizon") if not dynamic and self.accuracy is not None else ():
             if value := getattr(self.accuracy, key):
                 raise InputError(f"[accuracy] {key} = {quote(value)} has no meaning in statics: leave it out")
-        if not dynamic and self.event:
-            raise InputError(f"[[event]] {quote(self.event[0].name)} has no meaning in statics: leave it out")
-        interval = (output.interval or default_interval(solve)) if dynamic else None
+        for key, given in (("event", self.event), ("control", self.control)):
+            if not dynamic and given:
+                raise InputError(f"[[{key}]] {quote(given[0].name)} has no meaning in statics: leave it out")
+        interval = output.interval or min((control.period for control in self.control), default=None)
+        interval = (interval or default_interval(solve)) if dynamic else None
         frames = output.frames or (10 if dynamic else 1)
         object.__setattr__(self, "output", Output(interval=interval, frames=frames))
         object.__setattr__(self, "accuracy", self.accuracy or Accuracy())
@@ -279,7 +285,16 @@ class Scene:
         given["observe"] = [o.to_dict() for o in self.observables]
         if self.event:
             given["event"] = [event.to_dict() for event in self.event]
+        if self.control:
+            given["control"] = [self._placed(control.to_dict()) for control in self.control]
         return given
+
+    def _placed(self, control):
+        """The dict of a control, the file of its law absolute."""
+        file, sign, name = control["law"].rpartition(":")
+        if not sign:
+            return control
+        return {**control, "law": f"{(self.folder or pathlib.Path()).joinpath(file).resolve()}:{name}"}
 
     def _repr_html_(self):
         from .results.notebook import of_scene
@@ -369,11 +384,12 @@ class Scene:
         """The system of a scene that leaves out no stiffness."""
         from .build import build
 
+        scene = load("refweb.dynamics.commands:widened")(self) if self.control else self
         with in_file(self.file):
             system = build(
                 web=self.web,
                 cable=self.cable,
-                effects=self.effects,
+                effects=scene.effects,
                 supports=self.supports,
                 support=self.support,
                 solve=self.solve,
@@ -383,6 +399,8 @@ class Scene:
                 events=self.event,
                 folder=self.folder,
             )
+            if self.control:
+                load("refweb.dynamics.controllers:check")(self, system)
             if self.throw is not None:
                 with refused_at("[throw]"):
                     self.throw.on(self.observables, system, self.solve)

@@ -6,12 +6,31 @@ of classes are the text of `refweb help` and of the schema.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
+from .accepted import accepts, any_of, array
 from .errors import InputError
 from .messages import quote
 from .registry import FACTORIZATIONS, INTEGRATORS, STATICS
-from .tables import Several, Table, boolean, choice, components, integer, nodes, numbers_list, real, table, text
+from .tables import (
+    Several,
+    Table,
+    boolean,
+    checked,
+    choice,
+    components,
+    field,
+    integer,
+    nodes,
+    numbers_by_name,
+    numbers_list,
+    real,
+    rows,
+    table,
+    text,
+    texts,
+    vector,
+)
 
 START_STATES = ("web", "equilibrium")
 """Values of ``start`` besides a result folder."""
@@ -363,3 +382,120 @@ class Accuracy(Table):
             raise InputError(f'digits = {self.digits} needs error = "twin"')
         if self.level == "full" and self.error == "none":
             raise InputError('level = "full" needs error = "twin"')
+
+
+_number, _numbers, _names = real(), numbers_list(), texts()
+_rows = tuple(rows(width, increasing=True) for width in (2, 4))
+_kinds = [kind.metadata["read"].accepts for kind in (_number, _numbers, *_rows)]
+
+
+@accepts(any_of(array({"type": "string"}, 1), *_kinds))
+def _target(name, value):
+    """Read a target: a number, numbers, names of observables, or a table over time."""
+    if not isinstance(value, (list, tuple)):
+        return checked(name, value, _number)
+    if value and isinstance(value[0], str):
+        return checked(name, value, _names)
+    if value and isinstance(value[0], (list, tuple)):
+        return checked(name, value, _rows[len(value[0]) > 2])
+    return checked(name, value, _numbers)
+
+
+@table
+class Control(Table):
+    """Feedback control of a dynamic scene.
+
+    At each multiple of its period a control measures observables of the scene, and its law gives a value to a load, a
+    torque or a rate. The value stays until the next period. The step-refinement run has the same law with its own
+    measurements, so that ± holds its effect as well. A run with controls goes on after it was stopped.
+
+    The control sets what a scene has: ``load.N.force``, ``thrust.N.force``, ``pressure.N.value``,
+    ``gravity.acceleration``, ``body.NAME.axle.torque``, or the rate of a table, ``reel.N.rate`` of the factor [1/s],
+    ``motion.N.velocity``, ``motion.N.angular_velocity``. N counts from 0.
+
+    With the error e = target − measured and its rate e', "pid" gives proportional · e + integral · ∫e dt + derivative
+    · e'; the integral waits while the limit acts. "sliding-mode" gives strength · s/width, at most strength, with the
+    surface s = e' + slope · e. "bang-bang" gives strength with the sign of e + e' abs(e') mass/(2 strength), which
+    brings a mass to its target in least time. "spin-up" gives strength · (1 − measured/target), the torque of a hub.
+    "station-keeping" gives proportional · e + derivative · e' where the size of e is above ``dead_band``, else 0.
+
+    A law of one's own is "FILE.py:CLASS", a class with ``reset()`` and ``act(measurement, time)``, which runs as Python
+    code. ``measurement`` has the arrays ``value``, ``rate``, ``target`` and ``target_rate``, and ``period`` and
+    ``limited``. With ``save()``, a list of numbers, and ``restore(numbers)`` a run of it can be resumed.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    law : str
+        Law, see above.
+    parameters : dict of str to float, optional
+        Parameters of the law, by their names above.
+    period : float
+        Time between two values [s], a multiple of ``[output] interval``, which is by default the shortest period.
+    sets : str
+        Path of the value that it sets.
+    measures : list of str
+        Names of the observables that it measures: one, or three for a vector.
+    rates : list of str, optional
+        Names of the observables of their rates; by default the difference over a period.
+    direction : sequence of 3 float, optional
+        Direction of a vector that is set by one observable, of length 1.
+    target : float, list or table
+        Number, numbers, names of observables, such as those of the place of another body; or a table over time,
+        [[t, ...], ...], linear in between. 0 by default.
+    limit : float, optional
+        Largest size of the value; a larger vector keeps its direction.
+    delay : float
+        Time from a measurement to its effect [s], a multiple of the period.
+    noise : float
+        Standard deviation of what is added to each measurement; it follows from the seed of the scene.
+
+    Raises
+    ------
+    InputError
+        For numbers of measures, rates and targets that differ, and a direction that is zero. From `Scene.build`, for
+        names that the scene does not have, what cannot be set, periods that are no multiples, and parameters that the
+        law does not have.
+
+    Examples
+    --------
+        [[control]]
+        name = "hover"
+        law = "pid"
+        parameters = { proportional = 40.0, derivative = 6.0 }
+        period = 0.05
+        sets = "load.0.force"
+        measures = ["height"]
+        direction = [0.0, 0.0, 1.0]
+    """
+
+    several = True
+
+    name: str = text(limit=80)
+    law: str = text()
+    parameters: dict[str, Any] | None = numbers_by_name()
+    period: float = real(above=0, unit="s")
+    sets: str = text()
+    measures: Several = texts()
+    rates: Several = texts(default=())
+    direction: Several = vector(default=None)
+    target: Several = field(_target, default=0.0)
+    limit: float | None = real(default=None, above=0)
+    delay: float = real(default=0.0, at_least=0, unit="s")
+    noise: float = real(default=0.0, at_least=0)
+
+    def check(self) -> None:
+        """Refuse numbers of measures, rates and targets that do not fit, and a direction beside several measures."""
+        count = len(self.measures)
+        if count not in (1, 3):
+            raise InputError(f"measures = {quote(self.measures)} must be one name, or three of a vector")
+        if self.rates and len(self.rates) != count:
+            raise InputError(f"rates = {quote(self.rates)} must be as many as measures, {count}")
+        target = self.target
+        if isinstance(target, tuple):
+            width = len(target[0]) - 1 if isinstance(target[0], tuple) else len(target)
+            if width != count:
+                raise InputError(f"target = {quote(target)} has {width} values, and measures has {count}")
+        if self.direction is not None and (count > 1 or not any(self.direction)):
+            raise InputError(f"direction = {quote(self.direction)} is for one measure, and must not be zero")

@@ -318,6 +318,7 @@ def load(folder: str | PathLike[str]) -> Solution:
             summary.get(key, {}) for key in ("pairs", "lines", "passage")
         )
         solution.broken_before, solution.commands = summary.get("broken_before", []), summary.get("commands", [])
+        solution.controls = summary.get("controls", [])
         solution.breaks, solution.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
             solution.utilisation = read_utilisation(used)
@@ -371,15 +372,22 @@ def _last_state(folder, scene, commands):
     try:
         with np.load(path) as kept:
             time, x, v = float(kept["time"]), kept["displacements"], kept["velocities"]
+            controls = str(kept["controls"]) if "controls" in kept else None
             broken = [kept[name] for name in ("broken", "broken_energies") if name in kept]
     except Exception as error:  # whatever a spoilt file makes of it
         raise InputError(f"{short(str(path))}: cannot be read: {error}") from None
     if x.shape != (system.rows, 3):
         raise InputError(f"{short(str(path))}: is not that of a run that scene.toml leads to")
+    if controls is not None:
+        import json
+
+        from .dynamics.commands import Inputs
+
+        Inputs(system).restore_arrays(json.loads(controls)["inputs"])
     if commands:
         from .dynamics.commands import Command, Inputs
 
-        Inputs(scene, system).replay([command for command in map(Command._make, commands) if command.time < time])
+        Inputs(system).replay([command for command in map(Command._make, commands) if command.time < time])
     if broken and len(broken[0]):
         from .system.broken_lines import torn
 

@@ -310,6 +310,19 @@ def by_group(kind: type[Table], where: str, *, default_factory: Callable[[], dic
     return field(read, default_factory=default_factory)
 
 
+def numbers_by_name() -> Any:
+    """Numbers by name, a table; None by default."""
+    number = real()
+
+    @accepts(by_name({"type": "number"}))
+    def read(name, value):
+        if not isinstance(value, dict):
+            raise InputError(f"{name} = {quote(value)} must be a table of numbers, {name} = {{NAME = 1.0}}")
+        return {key: checked(f"{name}.{short(key)}", given, number) for key, given in value.items()}
+
+    return field(read, default=None)
+
+
 def part(kind: type[Any]) -> Any:
     """A table of a class below another one, None without it."""
 

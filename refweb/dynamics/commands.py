@@ -13,6 +13,7 @@ its term follow from the new table of the effect.
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,13 +26,15 @@ from ..messages import nearest, quote, short
 from ..registry import EFFECTS, name_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
     from ..scene import Scene
     from ..system.system import System
-    from .integrators.integrator import Integrator, IntegratorState
+    from .controllers import Controller
+    from .integrators.integrator import History, Integrator, IntegratorState
+    from .schedule import Schedule
 
 INPUTS = {"load": "force", "thrust": "force", "pressure": "value", "gravity": "acceleration"}
 """Key of each effect that a command may set."""
@@ -90,10 +93,8 @@ class Inputs:
 
     Parameters
     ----------
-    scene : refweb.Scene
-        Scene, `widened`.
     system : refweb.system.system.System
-        Its system, whose arrays are written.
+        System of a scene that is `widened`; its arrays are written.
 
     Attributes
     ----------
@@ -106,13 +107,15 @@ class Inputs:
         Beside ``[rupture]``.
     """
 
-    def __init__(self, scene: Scene, system: System) -> None:
+    def __init__(self, system: System) -> None:
         if system.weakness is not None:
             raise InputError("commands cannot stand beside [rupture]: leave out one of them")
         self._system, self._first = system, {}
         self._given: dict[str, list[Any]] = {}
-        for effect in scene.effects:
-            self._given.setdefault(str(name_of(EFFECTS, effect)), []).append(effect)
+        for acting, _ in system.acting:
+            effect = getattr(acting, "effect", None)
+            if effect is not None:
+                self._given.setdefault(str(name_of(EFFECTS, effect)), []).append(effect)
         self.present: dict[tuple[str, int], Any] = {}
 
     def reset(self) -> None:
@@ -127,6 +130,14 @@ class Inputs:
         for (name, number), effect in present.items():
             self._write(self._writes(name, self._given[name][number], effect))
         self.present = dict(present)
+
+    def arrays(self) -> list[Any]:
+        """Present values as plain ones, for a checkpoint."""
+        return [[name, number, effect.to_dict()] for (name, number), effect in self.present.items()]
+
+    def restore_arrays(self, values: list[Any]) -> None:
+        """Take the values of a checkpoint."""
+        self.restore({(name, number): type(self._given[name][number]).read(name, v) for name, number, v in values})
 
     def replay(self, commands: Iterable[Command]) -> None:
         """Take the values that commands have given one after another, without a run."""
@@ -285,16 +296,20 @@ def _finite(value, count):
 
 
 class Commands:
-    """Commands of a run at the numbers of its rows.
+    """Commands of a run at the numbers of its rows: those of controls, and given ones.
 
     Parameters
     ----------
     inputs : Inputs
         Values that they set.
-    times : ndarray
-        Times of the history rows [s].
+    schedule : refweb.dynamics.schedule.Schedule
+        Times of the history rows.
     given : iterable of Command
-        The commands.
+        Given commands.
+    controllers : list of refweb.dynamics.controllers.Controller
+        Controls of the scene.
+    table : callable
+        Rows of ``history.csv`` of a `refweb.dynamics.integrators.integrator.History`.
 
     Raises
     ------
@@ -302,22 +317,58 @@ class Commands:
         For a time that is not that of a row.
     """
 
-    def __init__(self, inputs: Inputs, times: NDArray[np.float64], given: Iterable[Sequence[Any]]) -> None:
+    def __init__(
+        self,
+        inputs: Inputs,
+        schedule: Schedule,
+        given: Iterable[Sequence[Any]],
+        controllers: list[Controller],
+        table: Callable[..., NDArray[np.float64]],
+    ) -> None:
         self.inputs: Inputs = inputs
+        self.controllers: list[Controller] = controllers
         self._by_row: dict[int, list[Command]] = {}
+        self._table = table
         for entry in given:
             command = Command(*entry)
-            self._by_row.setdefault(row_at(times, command.time), []).append(command)
+            self._by_row.setdefault(row_at(schedule.times, command.time), []).append(command)
+
+    def reset(self) -> None:
+        """Begin at the values of the scene."""
+        self.inputs.reset()
+        for controller in self.controllers:
+            controller.reset()
 
     def until(self, first: int) -> float:
         """Number of the first row from ``first`` on that has commands; infinite without one."""
-        return min((row for row in self._by_row if row >= first), default=np.inf)
+        rows = [row for row in self._by_row if row >= first]
+        return min([*rows, *(controller.next_row(first) for controller in self.controllers)], default=np.inf)
 
-    def act(self, row: int, integrator: Integrator, course: IntegratorState) -> None:
-        """Apply the commands of a row."""
-        if commands := self._by_row.get(row):
-            writes = [write for command in commands for write in self.inputs.checked(command)]
-            self.inputs.apply(writes, integrator, course)
+    def act(self, row: int, integrator: Integrator, course: IntegratorState, history: History) -> None:
+        """Apply the commands of a row, the last of a history: those of controls first."""
+        values = self._table(history[-1:])[0] if self.controllers and len(history) else None
+        self.act_on(row, integrator, course, values)
+
+    def act_on(self, row: int, integrator: Integrator, course: IntegratorState, values: Any) -> None:
+        """Apply the commands of a row of ``history.csv`` with these values."""
+        due = [] if course.stopped else [controller for controller in self.controllers if controller.due(row)]
+        for commands in ([controller.command(row, values) for controller in due], self._by_row.get(row)):
+            if commands:
+                writes = [write for command in commands for write in self.inputs.checked(command)]
+                self.inputs.apply(writes, integrator, course)
+
+    def save(self) -> str:
+        """State for a checkpoint, as text."""
+        controllers = [controller.arrays() for controller in self.controllers]
+        return json.dumps({"controllers": controllers, "inputs": self.inputs.arrays()})
+
+    def load(self, text: str) -> None:
+        """Take the state of a checkpoint."""
+        saved = json.loads(text)
+        self.reset()
+        self.inputs.restore_arrays(saved["inputs"])
+        for controller, arrays in zip(self.controllers, saved["controllers"], strict=True):
+            controller.restore(arrays)
 
 
 def row_at(times: NDArray[np.float64], time: float) -> int:

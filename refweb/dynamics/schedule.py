@@ -54,7 +54,7 @@ class Schedule(NamedTuple):
     def reset(self):
         """Give what commands set the values of the scene, before a run starts."""
         if self.commands is not None:
-            self.commands.inputs.reset()
+            self.commands.reset()
 
     @classmethod
     def of(cls, scene):
@@ -175,10 +175,11 @@ def blocks(integrator, course, schedule, first=0):
         if commands is not None:
             stop = min(stop, commands.until(first))
         count, began = min(size, stop + 1 - first), time.perf_counter()
-        yield block_of(integrator, course, schedule, first, first + count)
+        block = block_of(integrator, course, schedule, first, first + count)
+        yield block
         first += count
         if commands is not None:
-            commands.act(first - 1, integrator, course)
+            commands.act(first - 1, integrator, course, block.history)
         spent = time.perf_counter() - began
         size = max(1, min(2 * size if spent < 0.5 * BLOCK else int(size * BLOCK / spent), MOST_ROWS))
         if course.stopped:

@@ -103,10 +103,10 @@ class Simulation:
         solution.broken_before = np.unique(system.net.line[system.net.broken]).tolist()
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
-        if commands:
-            from .commands import Commands, Inputs
+        if commands or scene.control:
+            from .controllers import commands_of
 
-            acting = Commands(Inputs(scene, system), self.schedule.times, commands)
+            acting = commands_of(scene, system, self.watch, self.schedule, commands)
             self.schedule = self.schedule._replace(commands=acting)
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
         self._lines, self._through = None, _through_of(system)
@@ -290,10 +290,18 @@ class Simulation:
         self._share_rows = [self._kept["share_rows"]] if "share_rows" in self._kept else []
         if self._silent is not None:
             self._silent.restore(self._kept.get("silent", np.zeros((0, 3))))
+        self._resume_controls(course, row, folder.last_row())
         self._kept, self._tables = None, [np.array([folder.last_row()])]
         times, frames = self.schedule.times, self.schedule.frames
         folder.listed([*((n, times[n]) for n in frames[frames < row]), (row, course.time)], self.system.net.bodies)
         return course, len(times) if course.stopped else row + 1
+
+    def _resume_controls(self, course, row, values):
+        """Let the controls of a checkpoint go on, with what they do at its row."""
+        commands = self.schedule.commands
+        if commands is not None:
+            commands.load(str(self._kept["controls"]))
+            commands.act_on(row, self.integrator, course, np.array(values))
 
     def _refuse_overlap(self, course):
         """Refuse lines that are too deep in bodies, see `refweb.effects.contact.overlap.Deepest`."""
@@ -345,6 +353,8 @@ class Simulation:
             {"name": event.name, "time": float(time) if np.isfinite(time) else None, "error": None}
             for event, time in zip(self.scene.event, course.events["time"][: len(self.scene.event)], strict=True)
         ]
+        if self.schedule.commands is not None:
+            solution.controls = [controller.plain() for controller in self.schedule.commands.controllers]
         spent = dict(nsteps=course.nsteps, **course.drifts, **self.integrator.spent(course))
         outer = (f for f in self.system.terms if not f.balance.internal and f.balance.impulse is None)
         if integrated := sorted({term.name for term in outer}):
@@ -369,6 +379,8 @@ class Simulation:
         kept |= {f"begin_{name}": array for name, array in self.begin._asdict().items() if array is not None}
         if self.begin_of_twin is not None:
             kept |= {f"twin_begin_{name}": array for name, array in zip("xv", self.begin_of_twin.motion, strict=True)}
+        if self.schedule.commands is not None:
+            kept["controls"] = np.array(self.schedule.commands.save())
         kept |= {"row": number} | self.standing.arrays() | ({} if self._ways is None else self._ways.arrays())
         kept |= {} if self._silent is None else {"silent": self._silent.kept()}
         kept |= {"share_rows": self.share_rows} if self._share_rows and self._share_rows[0].size else {}

@@ -75,20 +75,25 @@ class SteppedRun:
             self._simulation.settle(lambda text, share: None)
         else:
             self._simulation.begin = begin
-        self._inputs, self._pending, self._tables, self._row = Inputs(settled, system), [], [], 0
+        commands = self._schedule.commands
+        self._inputs = Inputs(system) if commands is None else commands.inputs
+        self._pending, self._tables, self._row = [], [], 0
         prepare = getattr(self._simulation.integrator, "prepare", None)
         if prepare is not None:
             prepare()
 
     def _go_to_row(self, stop):
         """Go on to the row before ``stop``."""
-        simulation = self._simulation
+        simulation, commands = self._simulation, self._schedule.commands
         while self._row < stop and not self._course.stopped:
-            block = block_of(simulation.integrator, self._course, self._schedule, self._row, stop)
+            end = stop if commands is None else min(stop, commands.until(self._row) + 1)
+            block = block_of(simulation.integrator, self._course, self._schedule, self._row, end)
             table = simulation.watch.table(block.history)
             simulation.inspect(self._course)
             self._tables.append(table)
             self._row += len(table)
+            if commands is not None:
+                commands.act(self._row - 1, simulation.integrator, self._course, block.history)
 
     @property
     def _schedule(self) -> Schedule:
@@ -226,7 +231,10 @@ class SteppedRun:
         copy.scene, copy.commands = self.scene, list(self.commands)
         copy._make(self._simulation.begin)
         arrays = self._simulation.integrator.save(self._course)
-        copy._inputs.restore(self._inputs.present)
+        if (commands := self._schedule.commands) is None:
+            copy._inputs.restore(self._inputs.present)
+        else:
+            copy._schedule.commands.load(commands.save())
         copy._course = copy._simulation.integrator.load({name: np.array(value) for name, value in arrays.items()})
         copy._tables, copy._row, copy._pending = list(self._tables), self._row, []
         return copy

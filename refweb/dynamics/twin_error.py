@@ -48,6 +48,8 @@ class TwinRun(NamedTuple):
         See `refweb.dynamics.history.Watch.shares`.
     share_rows : ndarray, shape (rows, shares)
         See `refweb.dynamics.history.Watch.shares_of`.
+    spent : list of float
+        See `refweb.dynamics.controllers.Controller`.
     """
 
     results: dict[str, Result]
@@ -55,6 +57,7 @@ class TwinRun(NamedTuple):
     rows: np.ndarray
     shares: dict[str, Result]
     share_rows: np.ndarray
+    spent: list[float]
 
 
 class Twin:
@@ -139,7 +142,9 @@ class Twin:
             return None
         watch, course = self._simulation.watch, self._course
         results, shares = watch.results(course, self._last), watch.shares(course)
-        return TwinRun(results, course, self._rows, shares, self._share_rows)
+        commands = self._simulation.schedule.commands
+        spent = [] if commands is None else [controller.spent for controller in commands.controllers]
+        return TwinRun(results, course, self._rows, shares, self._share_rows, spent)
 
 
 def _parts(times, end):
@@ -279,6 +284,9 @@ def add_errors(simulation, run, twin, rows):
             entry["error"] = SPREAD * factor * off + float(width) + 4e-16 * entry["time"]
     if first_run.stopped and len(rows) > 1:
         _add_lateness(solution.reduced, solution.events, rows[-2:])
+    for entry, spent in zip(solution.controls, twin.spent, strict=True):
+        if entry["spent"] is not None:
+            entry["error"] = SPREAD * factor * abs(entry["spent"] - spent) + 4e-16 * entry["spent"]
     known = np.inf
     if solution.breaks is not None:
         from .break_errors import add_errors_of_breaks

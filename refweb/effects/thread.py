@@ -29,11 +29,11 @@ from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..messages import quote
-from ..net.law_keys import numbers_by_name, points
+from ..net.law_keys import points
 from ..net.materials import MATERIALS
 from ..net.threads import ThreadLine
 from ..registry import LAWS
-from ..tables import Several, Table, boolean, choice, nodes, real, table, text
+from ..tables import Several, Table, boolean, choice, nodes, numbers_by_name, real, table, text
 from .base import Balance, ForceTerm, Tangent
 from .line_kernels import line_at
 

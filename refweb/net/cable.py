@@ -14,10 +14,10 @@ import numpy as np
 from ..errors import InputError, refused_at
 from ..messages import quote
 from ..registry import LAWS
-from ..tables import LARGEST, Several, Table, by_group, choice, integer, nodes, part, real, rows, table
+from ..tables import LARGEST, Several, Table, by_group, choice, integer, nodes, numbers_by_name, part, real, rows, table
 from . import law_keys
 from .groups import givers
-from .law_keys import numbers_by_name, points
+from .law_keys import points
 from .materials import FILLED, MATERIALS
 from .plastic_keys import LAW, check_yield, hardening_key, yield_curves
 from .tension_laws import law_of, names_in, strains_of

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..accepted import accepts, any_of, by_name
+from ..accepted import accepts, any_of
 from ..errors import InputError, refused_at
 from ..messages import quote, short
-from ..tables import Table, checked, field, real, rows, text
+from ..tables import Table, field, rows, text
 from .tension_laws import law_of, names_in
 
 CURVES = {"stress": "Pa", "tension": "N"}
@@ -30,19 +30,6 @@ def points(*, unit) -> Any:
         return path(name, value) if isinstance(value, str) else listed(name, value)
 
     return field(read, default=None, unit=unit)
-
-
-def numbers_by_name() -> Any:
-    """Numbers by name, a table; None by default."""
-    number = real()
-
-    @accepts(by_name({"type": "number"}))
-    def read(name, value):
-        if not isinstance(value, dict):
-            raise InputError(f"{name} = {quote(value)} must be a table of numbers, {name} = {{NAME = 1.0}}")
-        return {key: checked(f"{name}.{short(key)}", given, number) for key, given in value.items()}
-
-    return field(read, default=None)
 
 
 def curve_key(table):

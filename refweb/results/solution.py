@@ -177,6 +177,9 @@ class SolutionData:
         Lines that were broken at the start of the run.
     commands : list of (time, path, value)
         Values that changed during the run.
+    controls : list of dict
+        ``name`` of each control, what it ``sets``, and of the size of that the integral over time, ``spent`` with
+        ``error`` and ``unit``, and the ``largest``.
     twin_end : (ndarray, ndarray), optional
         Displacement [m] and velocity [m/s] at the end of the step-refinement run, each of shape (rows, 3); None without
         such a run.
@@ -204,6 +207,7 @@ class SolutionData:
     throw: dict[str, Any] = field(default_factory=dict)
     breaks: list[dict[str, Any]] | None = None
     commands: list[Any] = field(default_factory=list)
+    controls: list[Any] = field(default_factory=list)
     broken_before: list[int] = field(default_factory=list)
     twin_end: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     frames: list[tuple[int, Any]] = field(default_factory=list)
@@ -258,6 +262,7 @@ class SolutionData:
             **({} if self.breaks is None else {"breaks": self.breaks}),
             **({"broken_before": self.broken_before} if self.broken_before else {}),
             **({"commands": self.commands} if self.commands else {}),
+            **({"controls": self.controls} if self.controls else {}),
             "solver": self.solver,
             "cost": self.cost,
             "versions": self.versions,

@@ -129,6 +129,11 @@ def on_run(summary):
     for n, event in enumerate(summary.get("events") or []):
         when = "did not happen" if event["time"] is None else f"at t = {readable(event['time'], event['error'], 's')}"
         yield "events" * (n == 0), f"{event['name']} {when}"
+    for n, control in enumerate(summary.get("controls", [])):
+        text = f"{control['name']} sets {control['sets']} up to {control['largest']:.4g}"
+        if control["spent"] is not None:
+            text += f", in all {readable(control['spent'], control['error'], control['unit'])}"
+        yield "controls" * (n == 0), text
     for n, (name, thrown) in enumerate(summary.get("throw", {}).items()):
         yield "throw" * (n == 0), f"{name.replace('_', ' ')} {_of_throw(thrown)}"
     for name, body in summary.get("bodies", {}).items():

@@ -80,6 +80,8 @@ def cost(
         check_folder(out, force)
         scene.to_dict()  # refuses a web that no file can hold
     scene = scene.replace(event=())
+    if scene.control:
+        raise InputError("[[control]] cannot be compared by all methods: refweb cost runs without it; leave it out")
     system = scene.build()
     with in_file(scene.file):
         observable = _observable(scene, observe)

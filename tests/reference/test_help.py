@@ -49,6 +49,10 @@ AROUND = {
     "motion": {"body": [{"name": "drum", "radius": 0.1, "position": [0, 0, -0.2]}]},
     "bending": {"cable": {**SCENE["cable"], "subdivide": 2}},
     "fold": {"supports": {"nodes": []}},
+    "control": {
+        "load": [{"node": 4, "force": [0, 0, 1]}],
+        "observe": [{"name": "height", "quantity": "position", "node": 4, "component": "z"}],
+    },
     "throw": {
         "observe": [
             {"name": "mouth", "quantity": "mouth_area", "node": [0, 1, 2]},

@@ -1,0 +1,284 @@
+"""Controls of a run: each measures at its period, and gives a command, see `refweb.dynamics.commands`.
+
+A `Controller` reads its measurements from the columns of a history row. Its state, `Controller.arrays`, is part of
+checkpoints: names of its entries are their format.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import pathlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError, SolverError, refused_at
+from ..messages import nearest, one_line, quote, short
+from .commands import INPUTS, NEAR, RATES, Command, Commands, Inputs
+from .control_laws import LAWS, Measurement
+from .schedule import row_times
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ..scene import Scene
+    from ..settings import Control
+    from ..system.system import System
+    from .history import Watch
+    from .schedule import Schedule
+
+UNITS = {"load": "N s", "thrust": "N s", "pressure": "Pa s", "body": "N m s"}
+"""Unit of the integral of the size of what is set."""
+VECTORS = ("load", "gravity", "motion")
+"""Effects whose values that are set are vectors."""
+
+
+class Controller:
+    """A control at work.
+
+    Parameters
+    ----------
+    control : refweb.Control
+        Its table.
+    number : int
+        Its number in the scene, which begins its noise.
+    scene : refweb.Scene
+        The scene.
+    names : sequence of str
+        Names of the observables, in the order of the columns behind time.
+    times : ndarray
+        Times of history rows [s].
+
+    Attributes
+    ----------
+    spent, largest : float
+        Integral over time of the size of what is set, and its largest size.
+
+    Raises
+    ------
+    InputError
+        For names that the scene does not have, parameters that the law does not have, and a period or delay that is no
+        multiple.
+    """
+
+    def __init__(
+        self, control: Control, number: int, scene: Scene, names: Sequence[str], times: NDArray[np.float64]
+    ) -> None:
+        self.control, self._seed, self._times = control, (scene.seed, number), times
+        self._stride = _multiple("period", control.period, "[output] interval", times[1] - times[0])
+        self._lag = _multiple("delay", control.delay, "period", control.period) if control.delay else 0
+        target = control.target if isinstance(control.target, tuple) and isinstance(control.target[0], str) else ()
+        self._columns = [
+            np.array([1 + _index(key, name, names) for name in given], dtype=int)
+            for key, given in (("measures", control.measures), ("rates", control.rates), ("target", target))
+        ]
+        name, known = control.sets.partition(".")[0], [*INPUTS, *RATES, "body"]
+        if name not in known:
+            raise InputError(f"sets = {quote(control.sets)}: {quote(name)} has nothing to set, {nearest(name, known)}")
+        self._vector = name in VECTORS
+        if self._vector and len(control.measures) == 1 and control.direction is None:
+            raise InputError(f"direction is missing: {control.sets} is a vector, and measures has one name")
+        if not self._vector and (len(control.measures) > 1 or control.direction is not None):
+            raise InputError(f"{control.sets} is one number: give one name in measures, and no direction")
+        self._law: Any = _law(control, scene.folder)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin a run."""
+        self._measured: list[Any] = []
+        self._target_before: Any = None
+        self.spent = self.largest = 0.0
+        self.limited = False
+        with _asked(self.control, 0.0):
+            self._law.reset()
+
+    def due(self, row: int) -> bool:
+        """True if it measures at a row, which is not the last."""
+        return row % self._stride == 0 and row < len(self._times) - 1
+
+    def next_row(self, first: int) -> int:
+        """Number of the first row from ``first`` on at which it measures."""
+        return -(-first // self._stride) * self._stride
+
+    def command(self, row: int, values: NDArray[np.float64]) -> Command:
+        """Measure in the columns of a row, and return what is set."""
+        control, time = self.control, float(self._times[row])
+        noise = np.random.default_rng([*self._seed, row]).normal(scale=control.noise or 1.0, size=(2, 3))
+        noise = noise[:, : len(control.measures)] * (control.noise > 0.0)
+        value = values[self._columns[0]] + noise[0]
+        rate = values[self._columns[1]] + noise[1] if len(control.rates) else None
+        self._measured = [*self._measured[-self._lag - 1 :], (value, rate)]
+        value, rate = self._measured[max(len(self._measured) - 1 - self._lag, 0)]
+        if rate is None:
+            at = len(self._measured) - 2 - self._lag
+            rate = (value - self._measured[at][0]) / control.period if at >= 0 else 0.0 * value
+        target = self._target(time, values)
+        before = target if self._target_before is None else self._target_before
+        self._target_before = target
+        measurement = Measurement(value, rate, target, (target - before) / control.period, control.period, self.limited)
+        with _asked(control, time):
+            given = self._law.act(measurement, time)
+        return Command(time, control.sets, self._limited(given, row, time))
+
+    def _target(self, time, values):
+        """The target at a time, shape (measures,)."""
+        target = self.control.target
+        if len(self._columns[2]):
+            return values[self._columns[2]]
+        if isinstance(target, tuple) and isinstance(target[0], tuple):
+            table = np.array(target)
+            return np.array([np.interp(time, table[:, 0], column) for column in table[:, 1:].T])
+        return np.broadcast_to(np.array(target, dtype=float), (len(self.control.measures),)).copy()
+
+    def _limited(self, given, row, time):
+        """The value of a law within the limit, as it is set."""
+        control, size = self.control, len(self.control.measures)
+        try:
+            value = np.array(given, dtype=float).reshape(-1)
+        except (TypeError, ValueError):
+            value = np.full(1, np.nan)
+        if value.shape != (size,) or not np.isfinite(value).all():
+            what = "a finite number" if size == 1 else f"{size} finite numbers"
+            raise SolverError(
+                f"[[control]] {quote(control.name)} at t = {time:.6g} s: act gave {short(repr(given))}, must be {what}"
+            )
+        norm = float(np.linalg.norm(value))
+        self.limited = control.limit is not None and norm > control.limit
+        if self.limited:
+            value, norm = value * (control.limit / norm), control.limit
+        end = self._times[min(row + self._stride, len(self._times) - 1)]
+        self.spent, self.largest = self.spent + norm * float(end - time), max(self.largest, norm)
+        if self._vector and size == 1:
+            direction = np.array(control.direction)
+            value = value[0] * direction / np.linalg.norm(direction)
+        return value.tolist() if self._vector else float(value[0])
+
+    def arrays(self) -> dict[str, Any]:
+        """State for a checkpoint; `InputError` for a law that does not give its own."""
+        if not hasattr(self._law, "save"):
+            return {}
+        measured = [[value.tolist(), None if rate is None else rate.tolist()] for value, rate in self._measured]
+        before = None if self._target_before is None else self._target_before.tolist()
+        state = [self.spent, self.largest, self.limited]
+        return {"law": list(self._law.save()), "measured": measured, "target": before, "state": state}
+
+    def restore(self, arrays: dict[str, Any]) -> None:
+        """Take the state of a checkpoint."""
+        if not arrays:
+            raise InputError(
+                f"[[control]] {quote(self.control.name)}: its law has no save() and restore(): start the run again"
+            )
+        self._law.restore(arrays["law"])
+        self._measured = [
+            (np.array(value), None if rate is None else np.array(rate)) for value, rate in arrays["measured"]
+        ]
+        self._target_before = None if arrays["target"] is None else np.array(arrays["target"])
+        self.spent, self.largest, self.limited = arrays["state"]
+
+    def plain(self) -> dict[str, Any]:
+        """Largest value and integral of its size, for ``run.json``."""
+        unit = UNITS.get(self.control.sets.partition(".")[0])
+        return {
+            "name": self.control.name,
+            "sets": self.control.sets,
+            "spent": self.spent if unit else None,
+            "error": None,
+            "unit": unit,
+            "largest": self.largest,
+        }
+
+
+def controllers_of(scene: Scene, names: Sequence[str], times: NDArray[np.float64]) -> list[Controller]:
+    """The controls of a scene."""
+    made = []
+    for number, control in enumerate(scene.control):
+        with refused_at(f"[[control]] {number + 1}"):
+            if control.name in [earlier.control.name for earlier in made]:
+                raise InputError(f"name = {quote(control.name)} is already used")
+            made.append(Controller(control, number, scene, names, times))
+    return made
+
+
+def commands_of(scene: Scene, system: System, watch: Watch, schedule: Schedule, given: Sequence[Any]) -> Commands:
+    """The commands of a scene: those of its controls, and given ones."""
+    controllers = controllers_of(scene, [o.name for o in watch.observables], schedule.times)
+    return Commands(Inputs(system), schedule, given, controllers, watch.table)
+
+
+def check(scene: Scene, system: System) -> None:
+    """Refuse controls that do not fit a scene or set what cannot be set; `InputError`."""
+    inputs, times = Inputs(system), row_times(scene)
+    for number, made in enumerate(controllers_of(scene, [o.name for o in scene.observables], times)):
+        control = made.control
+        vector = control.sets.partition(".")[0] in VECTORS
+        with refused_at(f"[[control]] {number + 1}"):
+            inputs.checked(Command(0.0, control.sets, [0.0] * 3 if vector else 0.0))
+
+
+def _multiple(key, value, name, unit):
+    """Ratio of two times, a whole number."""
+    count = round(value / unit)
+    if count < 1 or abs(value - count * unit) > NEAR * unit:
+        raise InputError(f"{key} = {value:g} must be a multiple of {name} = {unit:g} [s]")
+    return count
+
+
+def _index(key, name, names):
+    if name not in names:
+        raise InputError(f"{key}: {quote(name)} is not an observable, {nearest(name, names)}")
+    return names.index(name)
+
+
+def _law(control, folder):
+    """The law of a control, with its parameters."""
+    file, sign, name = control.law.rpartition(":")
+    kind = _class_in(file, name, folder) if sign else LAWS.get(control.law)
+    if kind is None:
+        raise InputError(f'law = {quote(control.law)} is none, {nearest(control.law, LAWS)}; or "FILE.py:CLASS"')
+    given = control.parameters or {}
+    if not sign:
+        fields = dataclasses.fields(kind)
+        known = [f.name for f in fields]
+        for key in given:
+            if key not in known:
+                raise InputError(f"parameters.{short(key)}: law = {quote(control.law)} has none, {nearest(key, known)}")
+        for f in fields:
+            if f.name not in given and f.default is dataclasses.MISSING:
+                raise InputError(f"parameters.{f.name} is missing: law = {quote(control.law)} needs it")
+    try:
+        return kind(**given)
+    except Exception as error:  # whatever the class of a user raises
+        raise InputError(f"law = {quote(control.law)} cannot be made: {one_line(error)}") from None
+
+
+def _class_in(file, name, folder):
+    """A class of a Python file, relative to the folder of the scene."""
+    path = pathlib.Path(folder or "", file)
+    try:
+        spec: Any = importlib.util.spec_from_file_location(path.stem, path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return getattr(module, name)
+    except Exception as error:  # whatever the file of a user raises
+        raise InputError(f"law = {quote(f'{file}:{name}')} cannot be read: {one_line(error)}") from None
+
+
+class _asked:
+    """Failures of a law become one line that names control and time."""
+
+    def __init__(self, control, time):
+        self._control, self._time = control, time
+
+    def __enter__(self):
+        pass
+
+    def __exit__(self, kind, error, trace):
+        if isinstance(error, Exception):
+            raise SolverError(
+                f"[[control]] {quote(self._control.name)} at t = {self._time:.6g} s: its law failed with "
+                f"{type(error).__name__}: {one_line(error)}"
+            ) from None
+        return False
