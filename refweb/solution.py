@@ -374,6 +374,7 @@ def _last_state(folder, scene, commands):
             time, x, v = float(kept["time"]), kept["displacements"], kept["velocities"]
             controls = str(kept["controls"]) if "controls" in kept else None
             broken = [kept[name] for name in ("broken", "broken_energies") if name in kept]
+            shares = kept["contact_shares"] if "contact_shares" in kept else None
     except Exception as error:  # whatever a spoilt file makes of it
         raise InputError(f"{short(str(path))}: cannot be read: {error}") from None
     if x.shape != (system.rows, 3):
@@ -392,6 +393,10 @@ def _last_state(folder, scene, commands):
         from .system.broken_lines import torn
 
         system = torn(system, *broken)
+    if shares is not None:
+        from .system.contact_shares import with_shares
+
+        system = with_shares(system, shares)
     return State(system, time, x, v)
 
 

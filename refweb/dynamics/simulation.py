@@ -111,6 +111,7 @@ class Simulation:
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
         self._lines, self._through = None, _through_of(system)
         self._tables, self._compared, self._share_rows, self._kept = [], [], [], kept
+        self._jumps = None
         _check_step(scene)
         self._stand(kept)
         self.integrator = self.integrator_at(self.standing.knob)
@@ -159,6 +160,8 @@ class Simulation:
         self.settle(tell)
         while True:
             try:
+                if self._jumps and self.scene.solve.method in ("cvode", "ida"):
+                    raise IntegrationError(f'{self._jumps}; use method = "central-difference"')
                 run_within_drift(self, folder, tell)
                 if (digits := self.scene.accuracy.digits) is not None:
                     reach_digits(self, digits, folder, tell)
@@ -187,7 +190,7 @@ class Simulation:
         if self.scene.solve.start != "equilibrium" or self._kept is not None:
             return
         from ..statics.remarks import on_stability, remark_on_open
-        from ..system.static_system import waiting
+        from ..system.static_system import at_rest, waiting
 
         equilibrium_ = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
         x = self.system.settled(equilibrium_.x)
@@ -196,6 +199,11 @@ class Simulation:
             text = f"of the equilibrium it starts from: {finding.text}"
             self.solution.findings.append(finding._replace(text=text))
         self.solution.findings += on_stability(state, equilibrium_, "the equilibrium it starts from")
+        if equilibrium_.contact_shares is not None:
+            from ..statics.contact_kinks import jumps
+
+            self._jumps = jumps(at_rest(self.system), equilibrium_)
+            self.solution.findings.append(Finding("shared-push", self._jumps, "contact"))
         self.solution.findings += remarks_on(self.begin, self.system)
         absent = waiting(self.system)
         if names := [body.name for body in absent if body.carried]:

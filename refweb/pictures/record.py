@@ -212,6 +212,14 @@ def of_solution(solution, with_frames=True):
     return Record(scene.title, kind, summary, tables, times, frame, lambda: table)
 
 
+def _node(text):
+    """The number of a node; not a number where a body is named."""
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
+
+
 def _table(folder):
     """Columns and history of a folder."""
     path = next((folder / name for name in TABLES if (folder / name).exists()), folder / TABLES[0])
@@ -223,7 +231,8 @@ def _table(folder):
             )  # a run that is alive may be writing the last
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # that there are no rows
-                rows = np.loadtxt(complete_lines, delimiter=",", ndmin=2)
+                named = {columns.index("node [1]"): _node} if path.name == "modes.csv" else None
+                rows = np.loadtxt(complete_lines, delimiter=",", ndmin=2, converters=named)
         return columns, as_history(columns, rows)
     except (OSError, ValueError) as error:
         raise InputError(f"{short(str(path))}: cannot be read: {error}") from None

@@ -308,6 +308,8 @@ class Folder:
                     "broken": net.broken,
                     "broken_energies": net.line_data.rupture_energy[net.broken],
                 }
+            if state.system.contact_shares is not None:
+                arrays["contact_shares"] = state.system.contact_shares
             arrays |= run or {}
             write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
         self.listed([(number, state.time if shape is None else number)], net.bodies)

@@ -95,11 +95,11 @@ def rows_of_modes(step):
                 text,
                 axes,
                 moving,
-                "" if result["where"] is None else str(result["where"]),
+                str(step["at"][k]),
                 ", ".join(remarks),
             ]
         )
-    return Rows(["mode", "frequency", "along", "moving mass", "most at node", ""], rows, [])
+    return Rows(["mode", "frequency", "along", "moving mass", "most at", ""], rows, [])
 
 
 def on_web(web):

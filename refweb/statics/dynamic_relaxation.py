@@ -164,7 +164,7 @@ class Relaxation:
                     {"nsteps": done},
                     x,
                 )
-                raise with_reason(system, t, failed)
+                raise with_reason(system, t, failed, 'use method = "newton", by which both share its push, or ')
             if system.carried.any():
                 self._weigh_bodies(f, inverse)
             self._relax(LOOK, t, x, v, f, inverse, self._kernels, self._cells, data, self._per_cell, *turning)

@@ -82,6 +82,8 @@ class Equilibrium:
         Stability; None where the energy is convex, so that the equilibrium is stable.
     may_turn_over : bool
         True if there may be other equilibria because lines can push, see `refweb.statics.snap_through`.
+    contact_shares : ndarray, optional
+        Shares of elements in the push of spheres, see `refweb.statics.shared_push`; None where none share.
     duality_bound : refweb.statics.duality_bound.DualityBound, optional
         Bounds of energy and tension, for the tension-only law.
     deviations : ndarray, shape (k, rows, 3), optional
@@ -101,6 +103,15 @@ class Equilibrium:
     floating: Floating | None = None
     stability: Stability | None = None
     may_turn_over: bool = False
+    contact_shares: NDArray[np.float64] | None = None
+
+    def system_of(self, system):
+        """The system whose forces balance: the one that is given, or where elements share a push with these shares."""
+        if self.contact_shares is None:
+            return system
+        from ..system.contact_shares import with_shares
+
+        return with_shares(system, self.contact_shares)
 
 
 def add_spent(stats, more):
@@ -157,20 +168,40 @@ def carried_off(system, t, parts):
     return None
 
 
-def with_reason(system, t, error):
-    """The error with what it may come from: rings together, two contacts alike, or parts that nothing else holds."""
+def with_reason(system, t, error, remedy=""):
+    """The error with what it may come from: rings together, two contacts alike, or parts that nothing else holds.
+
+    ``remedy`` is another one for two contacts alike.
+    """
     from ..system.unsupported_parts import find_parts
     from .contact_kinks import kink_remark
 
     if error.x is not None and (together := _together(system, error.x)) is not None:
         return NotFound(f"no equilibrium found at step {t:g}: {together}", error.stats)
-    if system.contact and error.x is not None and (kink := kink_remark(system, error.x)) is not None:
+    if system.contact and error.x is not None and (kink := kink_remark(system, error.x, remedy)) is not None:
         return NotFound(f"no equilibrium found at step {t:g}: {kink}", error.stats)
-
+    if error.x is not None and (body := gone(system, error.x)) is not None:
+        return NotFound(
+            f'no equilibrium found at step {t:g}: body "{body.name}" leaves the web, through a mesh or over its rim, '
+            "and nothing else holds it: take a finer mesh, a larger body or a wider web, or tie it to the web by "
+            "[[attach]]",
+            error.stats,
+        )
     carried = carried_off(system, t, find_parts(system, touching=False))
     if carried is None:
         return error
     return NotFound(f"{error}; while it touches nothing, {carried}, or start where it touches", error.stats)
+
+
+def gone(system, x):
+    """The first free body that touches nothing and is farther from all nodes than the web is wide; None if none is."""
+    position = system.net.points + x
+    web = position[: system.net.nodes]
+    for body in system.resting if system.contact else []:
+        apart = np.linalg.norm(web - position[body.row], axis=1).min(initial=np.inf)
+        if not (body.carried or body.axle) and apart > body.extent + np.linalg.norm(np.ptp(web, axis=0)):
+            return body
+    return None
 
 
 def _together(system, x):

@@ -18,6 +18,8 @@ from .newton import Newton
 
 MOST = 400
 """Largest number of factorizations from the last state, where the interior-point method cannot be used."""
+SHARING = 60
+"""Largest number of factorizations from the last state where elements of a line may share the push of a sphere."""
 PATIENCE = 3000
 """Largest number of factorizations of the smooth law after the interior-point method has failed."""
 FAR = 1e4
@@ -48,12 +50,22 @@ def solve(system, load_steps, progress=None):
         If there is no equilibrium, or none is found; the load steps before have been yielded.
     """
     full_system, system = system, at_rest(system)
-    newton, states = Newton(system, progress, load_steps[0]), []
+    newton, push, states = Newton(system, progress, load_steps[0]), None, []
     for t in load_steps:
+        x, error = _start(system, t, states), None
+        solver, shared = newton, bool(states) and states[-1].contact_shares is not None
         try:
-            state = _equilibrium(newton, t, _start(system, t, states), warm=bool(states))
-        except NotFound as error:
-            raise with_reason(system, t, error) from None
+            state = None if shared else _equilibrium(newton, t, x, warm=bool(states))
+        except NotFound as not_found:
+            if not _may_share(system):
+                raise with_reason(system, t, not_found) from None
+            shared, error = True, not_found
+        if shared:
+            if push is None:
+                from .shared_push import SharedPush
+
+                push = SharedPush(newton, load_steps[0])
+            solver, state = push.newton, push.equilibrium(t, x, error)
         if system.net.forming.any() or system.net.law_is("plastic").any():
             _refuse_far(system, t, state)
         if system.convex:
@@ -63,14 +75,14 @@ def solve(system, load_steps, progress=None):
             state.duality_bound = duality_bound(system, state, newton.factor)
             state.floating = between_slack_lines(system, state)
         if newton.follows:
-            newton.factorize_at(state)
+            solver.factorize_at(state)
         if not system.convex:
             from .stability import ask
 
-            ask(full_system, system, state, newton.factor if newton.follows else None)
+            ask(full_system, solver.system, state, solver.factor if newton.follows else None)
             if state.stability.sign == 1 and system.dead and (system.net.forming & system.net.law_is("convex")).all():
                 state.stats["above_lowest"] = 0.0  # a quadratic potential has one minimum
-        state.deviations = newton.deviations(state)
+        state.deviations = solver.deviations(state)
         state.x = system.taken_on(t, state.x)
         states = [*states[-1:], state]
         yield state
@@ -110,7 +122,8 @@ def _equilibrium(newton, t, x, warm):
     pulling = not net.law_is("pushes").any()
     convex = pulling and not newton.turns
     try:
-        state = newton.solve(t, x, warm=warm, limit=WITH_A_WAY_AROUND if path else MOST)
+        limit = WITH_A_WAY_AROUND if path else SHARING if _may_share(newton.system) else MOST
+        state = newton.solve(t, x, warm=warm, limit=limit)
     except NotFound as error:
         if not path:
             raise
@@ -133,6 +146,11 @@ def _equilibrium(newton, t, x, warm):
         state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
     add_spent(state.stats, spent)
     return state
+
+
+def _may_share(system):
+    """Tell if elements of a line may share the push of a sphere."""
+    return system.contact and system.net.subdivide > 1 and any(body.shape.once for body in system.net.bodies)
 
 
 def _by_stiffening(newton, t, x, spent):

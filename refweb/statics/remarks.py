@@ -117,6 +117,11 @@ def remarks_on(state, stats, utilisation, equilibrium):
     yield from on_stability(state, equilibrium)
     yield from remark_on_open(state, equilibrium)
     yield from _not_proven(state)
+    if state.system.contact_shares is not None:
+        from .contact_kinks import sharing_remark
+
+        yield from sharing_remark(state, equilibrium.stability)
+    yield from _other_rests(state)
     if starts := equilibrium.stats.get("starts"):
         apart = max(starts) - min(starts)
         if apart > 1e-9 * max(map(abs, starts)):
@@ -136,6 +141,15 @@ def remarks_on(state, stats, utilisation, equilibrium):
             share = float(state.threads[thread.name][2] * scale[0])
             yield from curve_remark(thread.line, share, 0, thread.title)
     yield from collapse_remark(state)
+
+
+def _other_rests(state):
+    """Find bodies on axles that rest on lines or bodies: they may also rest beyond these."""
+    for body in state.system.resting:
+        if body.axle and state.reaction[body.row].any():
+            text = f'body "{body.name}" rests by contact, and its axle lets it rest elsewhere as well, as hanging free'
+            text += ": this is the rest that is reached downhill from the start; start elsewhere for another one"
+            yield Finding("other-rests", text, "body")
 
 
 def _not_proven(state):

@@ -102,7 +102,8 @@ class Simulation:
 
     def _accept(self, equilibrium, smoothing):
         """Record an equilibrium; return its history row."""
-        scene, solution, state = self.scene, self.solution, State(self.system, equilibrium.step, equilibrium.x)
+        scene, solution = self.scene, self.solution
+        state = State(equilibrium.system_of(self.system), equilibrium.step, equilibrium.x)
         rest = at_rest(self.system)
         if equilibrium.stability is None and not rest.convex:  # of a method that knows no tangents
             from .stability import ask

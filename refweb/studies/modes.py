@@ -97,8 +97,9 @@ class Modes(Solution):
         """
         check_folder(folder, force)
         out = Folder(folder, self.scene, COLUMNS, {**self.summary(), "status": "running"}, table="modes.csv")
-        for row in zip(*self.history.values(), strict=True):
-            out.row(row)
+        moving = [node_or_body for step in self.steps for node_or_body in step["at"]]
+        for row, node_or_body in zip(zip(*self.history.values(), strict=True), moving, strict=True):
+            out.row([*row[:-1], node_or_body])
         for number, shape in enumerate(self.spectra[-1].shapes if self.spectra else (), start=1):
             out.frame(number, self.state, shape)
         out.close()
@@ -161,7 +162,8 @@ def modes(
         with recorded(result, clock, lambda: f"{len(result.spectra)} load steps"), followed(progress) as tell:
             _follow(result, rest, number, tell)
     finally:
-        result.table = as_history(COLUMNS, [row for computed in result.spectra for row in _rows(computed)])
+        rows = [row for computed in result.spectra for row in _rows(computed, system.net.nodes)]
+        result.table = as_history(COLUMNS, rows)
         result.findings += left_out(system)
         if out is not None:
             result.save(out, force)
@@ -190,6 +192,10 @@ def _follow(result, rest, number, tell):
     method, steps = (scene.solve.method, scene.solve.load_steps) if static else ("newton", (0.0,))
     solve = load(STATICS[method])
     for equilibrium in solve(rest, steps, lambda text: tell(text, len(result.spectra) / len(steps))):
+        if equilibrium.contact_shares is not None:
+            from ..statics.contact_kinks import no_modes
+
+            raise no_modes(rest, equilibrium)
         tell(f"step {equilibrium.step:g}, modes", len(result.spectra) / len(steps))
         computed = spectrum(rest, equilibrium.step, equilibrium.x, number, scene.seed)
         result.state = State(rest, equilibrium.step, equilibrium.x)
@@ -210,6 +216,7 @@ def _follow(result, rest, number, tell):
                 "step": computed.step,
                 "results": _results(computed, rest.net.nodes),
                 "solver": stats,
+                "at": _nodes_or_bodies(computed, rest.net),
                 **_described(computed),
             }
         )
@@ -229,6 +236,12 @@ def _results(computed, nodes):
     }
 
 
+def _nodes_or_bodies(computed, net):
+    """The node that moves most in each mode, or the name of the body, a list."""
+    names = {row: body.name for body in net.bodies for row in (body.row, body.base, body.spin)}
+    return [names.get(row, row) for row in computed.nodes.tolist()]
+
+
 def _described(computed):
     """Data of a spectrum for ``run.json`` besides its frequencies."""
     names = ("squared", "bound", "residual", "modal_mass", "shares", "moving")
@@ -239,8 +252,8 @@ def _described(computed):
     }
 
 
-def _rows(computed):
-    """A spectrum as rows of ``modes.csv``."""
+def _rows(computed, nodes):
+    """A spectrum as rows of ``modes.csv``, without numbers of nodes where a body moves most."""
     count = np.arange(1, len(computed.squared) + 1)
     columns = [
         np.full(len(count), computed.step),
@@ -250,4 +263,5 @@ def _rows(computed):
         computed.squared,
         computed.residual,
     ]
-    return np.column_stack([*columns, computed.modal_mass, computed.shares, computed.moving, computed.nodes]).tolist()
+    node = np.where(computed.nodes < nodes, computed.nodes, np.nan)
+    return np.column_stack([*columns, computed.modal_mass, computed.shares, computed.moving, node]).tolist()

@@ -298,7 +298,8 @@ class Statics:
             states.append(equilibrium)
             _check(deadline)
         trial.cpu_s = clock() - began
-        return [State(system, state.step, state.x) for state in states], [state.stats for state in states]
+        made = [State(state.system_of(system), state.step, state.x) for state in states]
+        return made, [state.stats for state in states]
 
 
 def _check(deadline):

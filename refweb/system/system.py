@@ -90,7 +90,12 @@ class System:
     angles : bool
         True if the unknowns of rotation of bodies are rotation vectors, as in statics, see
         `refweb.system.resting_bodies`; False for quaternions.
+    contact_shares : ndarray or None
+        Shares of elements in the contact of their line with a sphere, see `refweb.system.contact_shares`; None where
+        the deepest element has all of it.
     """
+
+    contact_shares: NDArray[np.float64] | None = None
 
     def __init__(
         self, net: Net, effects: Sequence[Any], supported: NDArray[np.bool_], factorization: str = "auto"
@@ -276,13 +281,16 @@ class System:
         """Largest share, up to 1, of a step of the unknowns that keeps a tangent meaningful.
 
         It turns no body by more than `MOST_TURN`, and moves no body that may touch the web by more than half its
-        thickness.
+        thickness, on an axle by its turn.
         """
         share, step = 1.0, self.rows_of(p)
         for body in self.resting:
-            turn = 0.0 if body.turn is None else float(np.linalg.norm(step[body.spin])) / MOST_TURN
-            shift = float(np.linalg.norm(step[body.row])) / (0.5 * body.thickness) if self.contact else 0.0
-            share = min(share, 1.0 / max(turn, shift, 1.0))
+            angle = 0.0 if body.turn is None else float(np.linalg.norm(step[body.spin]))
+            shift = float(np.linalg.norm(step[body.row]))
+            if body.axle:
+                shift = angle * (float(np.linalg.norm(body.arm)) + body.extent)
+            shift = shift / (0.5 * body.thickness) if self.contact else 0.0
+            share = min(share, 1.0 / max(angle / MOST_TURN, shift, 1.0))
         return share
 
     @cached_property

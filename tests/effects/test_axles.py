@@ -4,7 +4,7 @@ import nets
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
@@ -350,6 +350,39 @@ def test_a_pendulum_at_rest_hangs_below_its_axle():
     ).results  # fmt: skip
     assert found["angle"].value == pytest.approx(0.5 * np.pi, abs=1e-8)
     assert found["held"].value == pytest.approx(3.0 * G, rel=1e-12)
+
+
+def test_a_flap_that_falls_onto_a_rope():
+    """It rests there, and does not step over the rope to hang; the other rest is told of.
+
+    Closed form: the rope slides along the flap until its two sides lie across it, at the distance s from the axle. They
+    touch the round of R at R tan φ from the middle, where T tan φ = (1 − R tan φ/l) P balances, and push by 2 P cos φ.
+    Contact of 1e9 N/m, of which a share 4 R tan φ/l is felt so near an end, gives way by 1e-6 m.
+    """
+    radius, rope = 0.05, np.array([0.8, -0.06])
+    body = {"name": "flap", "shape": "capsule", "radius": radius, "length": 1.0, "axis": [1, 0, 0], "mass": 2.0}
+    body |= {"position": [0.5, 0.0, 0.0], "axle": {"point": [0, 0, 0], "direction": [0, 1, 0]}}
+    web = {"kind": "inline", "points": [[rope[0], y, rope[1]] for y in (-1, 1)], "lines": [[0, 1]], "supports": [0, 1]}
+    solution = solved(
+        None, {"name": "angle", "quantity": "axle_angle", "body": "flap"},
+        {"name": "tension", "quantity": "tension", "select": "max"},
+        web=web, body=[body], gravity={"acceleration": [0.0, 0.0, -10.0]}, contact={"stiffness": 1e9},
+        cable={"law": "tension-only", "modulus": 1e9, "area": 1e-6, "density": 0, "subdivide": 2, "prestrain": 1e-3},
+    )  # fmt: skip
+
+    def rest(angle):
+        reach = rope @ [np.cos(angle), -np.sin(angle)]
+        above = rope @ [np.sin(angle), np.cos(angle)]
+        side = brentq(lambda side: np.tan(side) - radius / np.cos(side) - above, 0.0, 1.0)
+        tension = 1e3 * (1.001 / np.cos(side) - 1.0)
+        push = tension * np.tan(side) / (1.0 - radius * np.sin(side))
+        return 20.0 * 0.5 * np.cos(angle) - 2.0 * push * np.cos(side) * reach, tension
+
+    angle = brentq(lambda angle: rest(angle)[0], 0.1, 1.0)
+    assert solution.results["angle"].value == pytest.approx(angle, rel=1e-5)
+    assert solution.results["tension"].value == pytest.approx(rest(angle)[1], rel=1e-5)
+    assert solution.solver["smallest_pivot"] == 1
+    assert any('"flap" rests by contact, and its axle lets it rest elsewhere' in text for text in solution.warnings)
 
 
 def test_a_torque_that_nothing_balances_is_refused():

@@ -221,18 +221,6 @@ def test_a_body_at_rest_in_a_net(body):
         assert relaxed.results[name].value == pytest.approx(result.value, rel=1e-7)
 
 
-def test_a_ball_that_touches_a_line_twice():
-    """Contact with a sphere has a kink where a line bends around it; the remedy of the message is solved."""
-    steep = {"web": {"kind": "window", "mesh": "square", "rows": 6, "columns": 6, "side": 0.1}}
-    ball = {"name": "ball", "radius": 0.15, "mass": 1.0, "position": [0.02, 0.01, 0.16]}
-    ropes = {**ROPES, "modulus": 7e7, "area": 1e-5, "density": 900.0}
-    with pytest.raises(refweb.SolverError, match='"ball" touches line .* with two elements alike.* length = 0.00015'):
-        refweb.run(in_net(ball, cable={**ropes, "subdivide": 2}, **steep))
-    capsule = {**ball, "shape": "capsule", "axis": [0, 0, 1], "length": 0.00015}
-    solution = refweb.run(in_net(capsule, cable={**ropes, "subdivide": 2}, **steep))
-    assert solution.results["push"].value == pytest.approx(G, rel=1e-9)
-
-
 def test_a_ball_in_a_mesh_beside_a_program():
     """A ball in a square of ropes: it presses each by the depth of the nearest point of a segment."""
     outer, inner = [[1.0, 1.1, 0], [-1.1, 1, 0], [-1, -1, 0.1], [1, -0.9, 0]], [[1, 1], [-1, 1], [-1, -1], [1, -1]]

@@ -4,6 +4,8 @@ import numpy as np
 
 import refweb
 from refweb.pictures.frames import frame_of
+from refweb.pictures.record import of_folder
+from refweb.results.summary_text import rows_of_modes
 from refweb.results.vtu import meshes
 from refweb.studies.turning import coriolis
 from refweb.system.static_system import at_rest
@@ -177,3 +179,24 @@ def test_a_hub_that_spins_with_its_web():
     assert any("Coriolis forces hold it" in text for text in long.warnings)
     found = refweb.modes(spinning([1.0, 1.0, 1.5]), 6).frequency
     np.testing.assert_allclose(found[np.argsort(abs(found - 1 / np.pi))[:3]], 1 / np.pi, rtol=1e-6)  # Ω/2π, thrice
+
+
+def test_table_names_a_body_that_moves_most(tmp_path):
+    """A pendulum beside a web: its name stands in the table and in the file, which plots and pages read."""
+    axle = {"point": [0.0, 0.0, 0.0], "direction": [0.0, 1.0, 0.0]}
+    arm = {"name": "arm", "shape": "box", "size": [0.5, 0.2, 0.2], "mass": 2.0, "position": [0.5, 0.0, 0.0]}
+    arm |= {"inertia": [0.01, 0.05, 0.05]}
+    web = {"kind": "inline", "points": [[-1, 0, 1], [1, 0, 1]], "lines": [[0, 1]], "supports": [0, 1]}
+    scene = {
+        "web": web,
+        "body": [{**arm, "axle": axle}],
+        "cable": {"law": "linear", "modulus": 1e9, "area": 1e-6, "density": 0},
+    }
+    gravity, solve = {"acceleration": [0.0, 0.0, -G]}, {"kind": "static"}
+    found = refweb.modes(refweb.Scene.from_dict({**scene, "gravity": gravity, "solve": solve}), out=tmp_path / "out")
+    squared = 2.0 * G * 0.5 / (0.05 + 2.0 * 0.5**2)
+    np.testing.assert_allclose(found.frequency, np.sqrt(squared) / (2.0 * np.pi), rtol=1e-9)
+    assert (tmp_path / "out" / "modes.csv").read_text().rstrip().endswith(",arm")
+    assert rows_of_modes(found.summary()["steps"][0]).rows[0][4] == "arm" and np.isnan(found.history["node"]).all()
+    _, table = of_folder(tmp_path / "out").table()
+    np.testing.assert_array_equal(table["frequency"], found.frequency)

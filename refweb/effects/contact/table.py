@@ -77,12 +77,13 @@ def rotations(body):
 class Contact(Table):
     """Contact of the web with all bodies, and optionally of bodies with each other.
 
-    A sphere has one contact with a line. Other shapes have a contact with each element at both ends, and one in
-    between. The latter, at ξ of the length, has the energy W k δ^(p + 1)/(p + 1) with W = 4 ξ (1 − ξ), so that no force
-    jumps as a line slides. The window W also causes a push along the line, in alternating directions. On average it is
-    some 0.3 (δ²/(L r))^⅓ of the push, for an element of length L and a surface of radius r along it. ± does not contain
-    this error: a finding reports it if it is above 5 % and above friction. More elements, ``subdivide``, and a larger
-    stiffness reduce it.
+    A sphere has one contact with a line, at the deepest of its elements. Where several are as deep, statics finds their
+    shares of the push, and dynamics goes to and fro between them. Other shapes have a contact with each element at both
+    ends, and one in between. The latter, at ξ of the length, has the energy W k δ^(p + 1)/(p + 1) with W = 4 ξ (1 − ξ),
+    so that no force jumps as a line slides. The window W also causes a push along the line, in alternating directions.
+    On average it is some 0.3 (δ²/(L r))^⅓ of the push, for an element of length L and a surface of radius r along it. ±
+    does not contain this error: a finding reports it if it is above 5 % and above friction. More elements,
+    ``subdivide``, and a larger stiffness reduce it.
 
     A line can only pass through a body by its middle, where the push changes its direction. The penetration check
     follows the depth of every line from the start of a run: before each drift of an explicit step, and on the
