@@ -342,8 +342,10 @@ def notices(scene: Scene, system: System) -> Iterator[Finding]:
     yield from _idle(system, getattr(scene.solve, "load_steps", (0.0, *system.corners)))
     if scene.solve.kind == "static" and (parts := system.unsupported_parts):
         axes = ", ".join(sorted({"xyz"[part.axis] for part in parts}))
-        nodes = np.unique(np.concatenate([part.rows for part in parts]))
-        text = f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
+        rows = np.unique(np.concatenate([part.rows for part in parts]))
+        nodes = np.count_nonzero(rows < system.net.nodes)
+        bodies = f" and {len(rows) - nodes} bodies" if nodes < len(rows) else ""
+        text = f"{nodes} nodes{bodies} have no support along {axes}: their position there is not unique"
         yield Finding("no-support", text, "supports")
 
 

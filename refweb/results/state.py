@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..compiled.rows import records_of
-from ..effects.base import TOUCH
+from ..effects.base import FELT, TOUCH
 from ..findings import Finding
 from .columns import static_energies
 
@@ -65,6 +65,11 @@ class State:
         """Depth of the deepest contact of each element with a body [m], 0 without contact, shape (cells,)."""
         term, cells = self.system.contact_forces.lines_on(body)
         return self._forces[2][term][cells]
+
+    @property
+    def pair_overlaps(self) -> NDArray[np.float64]:
+        """Depth of the bodies of each pair in each other [m], 0 without contact, shape (pairs,)."""
+        return records_of(FELT, self._forces[3])["depth"][self.system.rows - self.system.net.nodes :]
 
     def _by_line(self, values):
         """Largest value over the elements of each line."""

@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 
+from ..effects.base import pairs_of
 from ..effects.contact.overlap import CORE, Overlaps
 from ..errors import SolverError
 from ..results.state import State
@@ -44,7 +45,12 @@ class Passage:
     """
 
     def __init__(self, scene, system, x=None):
-        self._system, self.overlaps = system, Overlaps(scene.settled(), system, moving=False)
+        settled, pairs = scene.settled(), None
+        if pairs_of(system):
+            from ..effects.contact.pair_overlap import PairOverlaps
+
+            pairs = PairOverlaps(settled.contact, settled.chosen, system, moving=False)
+        self._system, self.overlaps = system, Overlaps(settled, system, moving=False, pairs=pairs)
         self._waiting = [body.row for body in waiting(system)]
         self._x = np.zeros((system.rows, 3)) if x is None else x
 
@@ -63,6 +69,10 @@ class Passage:
                 at = int(deep.argmax())
                 self.overlaps.record(i, float(deep[at]), state.time, int(net.line[at]))
                 self._look_back(body, deep, state)
+        if (pairs := self.overlaps.pairs) is not None:
+            for i, depth in enumerate(state.pair_overlaps):
+                if not {body.row for body in pairs.deepest[i].bodies} & {*self._waiting}:
+                    pairs.record(i, float(depth), state.time)
         self._x = state.x
 
     def _looks(self, body, path):

@@ -183,8 +183,8 @@ def with_reason(system, t, error, remedy=""):
     if error.x is not None and (body := gone(system, error.x)) is not None:
         return NotFound(
             f'no equilibrium found at step {t:g}: body "{body.name}" leaves the web, through a mesh or over its rim, '
-            "and nothing else holds it: take a finer mesh, a larger body or a wider web, or tie it to the web by "
-            "[[attach]]",
+            "and nothing else holds it: start on the side of the web on which it can rest, take a finer mesh or a "
+            "wider web, or tie it to the web by [[attach]]",
             error.stats,
         )
     carried = carried_off(system, t, find_parts(system, touching=False))
@@ -199,7 +199,9 @@ def gone(system, x):
     web = position[: system.net.nodes]
     for body in system.resting if system.contact else []:
         apart = np.linalg.norm(web - position[body.row], axis=1).min(initial=np.inf)
-        if not (body.carried or body.axle) and apart > body.extent + np.linalg.norm(np.ptp(web, axis=0)):
+        if body.carried or body.axle or apart < body.thickness + np.linalg.norm(np.ptp(web, axis=0)):
+            continue
+        if not any(system.force_of(term, 1.0, x)[body.row].any() for term in system.terms if term.contact.felt):
             return body
     return None
 

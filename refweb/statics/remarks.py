@@ -146,7 +146,7 @@ def remarks_on(state, stats, utilisation, equilibrium):
 def _other_rests(state):
     """Find bodies on axles that rest on lines or bodies: they may also rest beyond these."""
     for body in state.system.resting:
-        if body.axle and state.reaction[body.row].any():
+        if body.pivot is not None and state.reaction[body.row].any():
             text = f'body "{body.name}" rests by contact, and its axle lets it rest elsewhere as well, as hanging free'
             text += ": this is the rest that is reached downhill from the start; start elsewhere for another one"
             yield Finding("other-rests", text, "body")

@@ -40,12 +40,15 @@ import numpy as np
 
 from ..effects.base import Balance, ForceTerm, Tangent
 from ..net.rotation import to_quaternion
-from ..system.contact_shares import shareable, shared
-from .equilibrium import NotFound, add_spent, force_scale, gone, residual, with_reason
+from ..system.contact_shares import STIFFNESS, shareable, shared
+from .equilibrium import LIMIT, NotFound, add_spent, force_scale, gone, residual, with_reason
 from .newton import Newton
 
 WIDEST, NARROWEST = 100.0, 1e-3
 """w over the energy of a line at the start, and at last: rounding of energies over w is an error of shares."""
+STIFF = 2e-6
+"""Least w over the energy of a line, over the radius and under the depth of the largest force: where contact is stiff,
+rounding of the depth moves shares more."""
 NARROWER = 0.1
 """Factor on w from one round to the next."""
 NEGLIGIBLE = 1e-6
@@ -53,6 +56,8 @@ NEGLIGIBLE = 1e-6
 EQUAL, ENOUGH = 1e-12, 1e-9
 """Difference of energies over the largest one of a line at which rounds end; that at which they may end where it does
 not fall."""
+ROUNDING = 64.0 * np.finfo(float).eps
+"""Error of an energy over its push times the radius, as the depth is a difference of lengths."""
 ROUNDS, FIRST, LATER = 40, 400, 400
 """Largest number of rounds, and of factorizations of the first and of another one."""
 
@@ -106,10 +111,15 @@ class LineShares:
 
     def advance(self, t, x, scale):
         """Take α at x as β and a smaller w; return the largest difference of energies over the largest of its line."""
+        radius, stiffness = self.term.data[:: self.pieces, : STIFFNESS + 1].T
         energies = self.energies(t, x)
         largest, self.before = energies.max(axis=1), self.shares(energies)
-        self.width = np.maximum(NARROWER * self.width, NARROWEST * np.maximum(largest, self._negligible(scale)))
+        narrowest = np.maximum(NARROWEST, STIFF * radius * stiffness / scale) * np.maximum(
+            largest, self._negligible(scale)
+        )
+        self.width = np.maximum(NARROWER * self.width, narrowest)
         differences = np.where(self.before > 0.0, largest[:, None] - energies, 0.0).max(axis=1)
+        differences = np.maximum(differences - ROUNDING * radius * np.sqrt(2.0 * stiffness * largest), 0.0)
         pressed = self.once & (largest > 0.0)
         return (differences[pressed] / largest[pressed]).max(initial=0.0)
 
@@ -244,7 +254,12 @@ class SharedPush:
             if difference <= EQUAL or (difference <= ENOUGH and difference > 0.5 * last):
                 break
         else:
-            raise NotFound(f"no equilibrium found at step {t:g} in {ROUNDS} rounds of shares", stats, x)
+            raise NotFound(
+                f"no equilibrium found at step {t:g} in {ROUNDS} rounds of shares of elements in the push of a sphere, "
+                f'energies differ by {difference:.2g}: give spheres shape = "capsule", of a small length',
+                stats,
+                x,
+            )
         state.stats |= stats
         self._polish(t, state)
         x = state.x
@@ -252,7 +267,8 @@ class SharedPush:
             lines.width *= NARROWEST**2  # a tangent that keeps energies equal
         if not self.newton.follows:
             state.stats["smallest_pivot"] = self.newton.smallest_pivot(t, x, state.stats)
-        if any(lines.several(t, x).any() for lines in self._lines):
+        shared = any(lines.several(t, x).any() for lines in self._lines)
+        if shared and residual(self._plain, self._plain.force(t, x), self.newton.scale) > LIMIT:
             state.contact_shares = np.concatenate([lines.before.ravel() for lines in self._lines])
         return state
 

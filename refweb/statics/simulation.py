@@ -113,8 +113,9 @@ class Simulation:
             self._refuse_break(equilibrium)
         if self._passage is not None:
             self._passage.record(state)
-            solution.bodies = self._passage.overlaps.plain()
-            self._passage.overlaps.refuse()
+            overlaps = self._passage.overlaps
+            solution.bodies, solution.pairs = overlaps.plain(), overlaps.pairs.plain() if overlaps.pairs else {}
+            overlaps.refuse()
         if self._lines is not None:
             self._lines.record(state)
             solution.passage = {**solution.passage, "lines": f"not certified: {self._lines.why}"}

@@ -616,8 +616,8 @@ class System:
     def across_lines(self, tension: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of the stiffness of lines from a tension in each element alone [N], shape (elements,), as built.
 
-        Threads get that of the mean tension. Free bodies get the stiffness of the mean line as well, so that the matrix
-        is definite.
+        Threads get that of the mean tension. Free bodies and what contact alone holds get the stiffness of the mean
+        line as well, so that the matrix is definite.
         """
         force = tension / self.net.natural_length
         blocks = self.net.unit_tension * force[:, None, None]
@@ -630,6 +630,13 @@ class System:
             unknowns = np.flatnonzero(np.isin(self.free // 3, rows))
             spring = force.mean() * np.repeat(self.levers**2, 3)[self.free[unknowns]]
             values[self.pattern.diagonal[unknowns]] += spring
+        if self.contact:
+            from .unsupported_parts import find_parts
+
+            parts = find_parts(self, touching=False)
+            unknowns = np.concatenate([np.zeros(0, dtype=int), *(part.unknowns for part in parts)])
+            unknowns = unknowns[self.free[unknowns] < 3 * self.net.nodes]
+            values[self.pattern.diagonal[unknowns]] += force.mean()
         if self.carriers:
             self.carriers.add_across(values, self, self._lines_in_tangent, blocks)
         return values

@@ -384,3 +384,76 @@ def blown_equilibrium(solution):
 
     state = solution.state
     return Equilibrium(1.0, state.x, state.element_tension, state.system.force(1.0, state.x))
+
+
+def test_two_balls_that_hang_from_one_point():
+    """They press each other by m g tan α, at the angle of their ropes; contact that is too soft is told of, or refused.
+
+    A rope of 1 m ends on a ball 0.204 m from its centre, so that sin α = (0.2 − δ/2)/1.204, δ being their overlap.
+    """
+    arm = float(np.hypot(0.2, 0.04))
+    points, ball = [[0, 0, 0], [-0.21, 0, -1], [0.21, 0, -1]], {"radius": 0.2, "mass": 1.0}
+
+    def hanging(stiffness):
+        web = {"kind": "inline", "points": points, "lines": [[0, 1], [0, 2]], "supports": [0], "natural_length": 1.0}
+        tables = beam(
+            web=web,
+            cable={**ROPES, "modulus": 1e12, "density": 0.0},
+            body=[{**ball, "name": name, "position": [0.25 * s, 0.0, -1.2]} for name, s in (("a", -1), ("b", 1))],
+            attach=[{"body": "a", "node": [1]}, {"body": "b", "node": [2]}],
+            contact={"stiffness": stiffness, "between_bodies": True},
+            observe=[{"name": "push", "quantity": "reaction", "body": "b", "component": "x"}],
+        )
+        return refweb.Scene.from_dict(tables)
+
+    for stiffness in (1e6, 50.0):
+        solution = refweb.run(hanging(stiffness))
+        push = solution.results["push"].value
+        sine = (0.2 - 0.5 * push / stiffness) / (1.0 + arm)
+        assert push == pytest.approx(G * sine / np.sqrt(1.0 - sine**2), rel=1e-6)  # ropes stretch by 1e-7
+        assert solution.pairs["a, b"]["overlap"] == pytest.approx(push / stiffness, rel=1e-9)
+        assert not any("never touches" in text for text in solution.warnings)
+    assert any('"a" and "b" are 0.0305 m deep in each other at load step 1' in text for text in solution.warnings)
+    with pytest.raises(refweb.SolverError, match='"a" and "b" are .* at load step 1, in the core.*stiffness = 5000'):
+        refweb.run(hanging(5.0))
+
+
+def test_a_rope_that_a_wheel_alone_holds():
+    """Two equal weights on a rope over a wheel: it has their weight, though nothing else holds the web."""
+    points = [[-0.25, 0, -1], [-0.25, 0, 0], [0, 0, 0.25], [0.25, 0, 0], [0.25, 0, -1]]
+    wheel = {"name": "wheel", "shape": "cylinder", "radius": 0.24, "length": 0.2, "axis": [0, 1, 0], "fixed": True}
+    solution = refweb.run(
+        in_net(
+            {**wheel, "position": [0.0, 0.0, 0.0]},
+            web={"kind": "inline", "points": points, "lines": [[i, i + 1] for i in range(4)], "supports": []},
+            cable={**ROPES, "density": 0.0, "subdivide": 4},
+            contact={"stiffness": 1e6},
+            point_mass=[{"node": [0, 4], "mass": 5.0}],
+        )
+    )
+    assert solution.results["push"].value == pytest.approx(-10.0 * G, rel=1e-9)
+    assert solution.tension[[0, 3]] == pytest.approx(5.0 * G, rel=1e-9)
+
+
+def test_a_body_that_falls_through_the_web_is_said_to():
+    with pytest.raises(refweb.SolverError, match='"ball" leaves the web, through a mesh.*start on the side of the web'):
+        refweb.run(in_net({**BALL, "radius": 0.05, "position": [0.05, 0.02, 0.05]}))
+
+
+def test_nodes_and_bodies_without_support_are_counted():
+    """A tether with a body at each end in orbit: it has the tension 3 n² m r."""
+    end, rate = {"shape": "box", "size": [1.0, 1.0, 1.0], "mass": 10.0}, 1.1e-3
+    solution = refweb.run(
+        refweb.Scene.from_dict(
+            {
+                "web": {"kind": "inline", "points": [[-49.5, 0, 0], [49.5, 0, 0]], "lines": [[0, 1]], "supports": []},
+                "cable": {**ROPES, "density": 0.0},
+                "orbit": {"mean_motion": rate},
+                "body": [{**end, "name": name, "position": [50.0 * s, 0, 0]} for name, s in (("a", -1), ("b", 1))],
+                "attach": [{"body": "a", "node": [0]}, {"body": "b", "node": [1]}],
+                "solve": {"kind": "static"},
+            }
+        )
+    )
+    assert solution.tension == pytest.approx(3.0 * rate**2 * 10.0 * 50.0, rel=1e-6)
+    assert "2 nodes and 2 bodies have no support along x, y, z: their position there is not unique" in solution.warnings

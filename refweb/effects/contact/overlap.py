@@ -158,6 +158,11 @@ class Deepest:
         return min(body.thickness for body in self.bodies)
 
     @property
+    def instant(self):
+        """Time or load step of the overlap, a text."""
+        return f"t = {self.time:.6g} s" if self.moving else f"load step {self.time:g}"
+
+    @property
     def too_deep(self):
         """True if the overlap is not allowed."""
         return self.overlap > self.allowed
@@ -237,8 +242,7 @@ class DeepestLine(Deepest):
 
     @property
     def _depth(self):
-        instant = f"t = {self.time:.6g} s" if self.moving else f"load step {self.time:g}"
-        return f'{self.overlap:.3g} m deep in body "{self.body.name}" at {instant}'
+        return f'{self.overlap:.3g} m deep in body "{self.body.name}" at {self.instant}'
 
     @property
     def _where(self):

@@ -36,7 +36,7 @@ class DeepestPair(Deepest):
 
     @property
     def _where(self):
-        return f"bodies {self.name} are {self.overlap:.3g} m deep in each other at t = {self.time:.6g} s"
+        return f"bodies {self.name} are {self.overlap:.3g} m deep in each other at {self.instant}"
 
     @property
     def _at_start_text(self):
@@ -75,10 +75,12 @@ class PairOverlaps:
         Names of the bodies whose stiffness is refweb's choice.
     system : refweb.system.system.System
         That of the scene.
+    moving : bool
+        True in dynamics, False in statics.
     """
 
-    def __init__(self, contact, chosen, system):
-        self._contact, self._chosen, self._system = contact, set(chosen), system
+    def __init__(self, contact, chosen, system, moving=True):
+        self._contact, self._chosen, self._system, self._moving = contact, set(chosen), system, moving
         self.deepest = [self._deepest(bodies, 0.0, 0.0, 0.0) for bodies in pairs_of(system)]
         self._path_limit, self._met = None, None
 
@@ -88,7 +90,8 @@ class PairOverlaps:
         deep = overlap > CORE * min(body.thickness for body in bodies)
         smallest = first_between(self._system, bodies, exponent) if deep else 0.0
         limit = min(map(allowed, bodies))
-        return DeepestPair(bodies, overlap, time, stiffness, exponent, chosen, smallest, initial, limit)
+        law = stiffness, exponent, chosen, smallest
+        return DeepestPair(bodies, overlap, time, *law, initial, limit, self._moving)
 
     def record(self, i, overlap, time):
         """Note the deepest overlap [m] of pair ``i`` and its time [s], if it is deeper than before."""
