@@ -299,7 +299,8 @@ class Newton:
         if net.law_is("plastic").any():
             return "above the limit load of lines that yield there is none: lower the loads, or raise yield_stress"
         smoothing = " use a larger smoothing," if net.law_is("smoothed").any() else ""
-        return f'raise the load in smaller load_steps,{smoothing} or use method = "relaxation"'
+        contact = " a smaller stiffness of [contact]," if self.system.contact else ""
+        return f'raise the load in smaller load_steps,{smoothing}{contact} or use method = "relaxation"'
 
     def _not_found(self, t, iterate, error, limit, stats):
         row = self.system.sizes(np.where(self.system.supported, 0, iterate.force)).argmax()

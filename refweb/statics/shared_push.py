@@ -51,15 +51,16 @@ STIFF = 2e-6
 rounding of the depth moves shares more."""
 NARROWER = 0.1
 """Factor on w from one round to the next."""
-NEGLIGIBLE = 1e-6
-"""Energy of a line below which w is a share of this, over the largest force times the radius."""
+NEGLIGIBLE = 1e-3
+"""Energy of a line below which w is a share of this, over F²/k with the largest force F."""
 EQUAL, ENOUGH = 1e-12, 1e-9
 """Difference of energies over the largest one of a line at which rounds end; that at which they may end where it does
 not fall."""
 ROUNDING = 64.0 * np.finfo(float).eps
 """Error of an energy over its push times the radius, as the depth is a difference of lengths."""
-ROUNDS, FIRST, LATER = 40, 400, 400
-"""Largest number of rounds, and of factorizations of the first and of another one."""
+ROUNDS, PARTS, PART = 40, 4, 100
+"""Largest number of rounds, and of parts of one and of factorizations of a part; no part follows where a body has left
+the web."""
 
 
 class LineShares:
@@ -107,17 +108,15 @@ class LineShares:
         touching = self.once & energies.any(axis=1)
         self.before[self.once] = 1.0 / self.pieces
         self.before[touching] = energies[touching] / energies[touching].sum(axis=1)[:, None]
-        self.width = WIDEST * np.maximum(energies.max(axis=1), self._negligible(scale))
+        self.width = np.maximum(WIDEST * energies.max(axis=1), scale * self._laws[0])
 
     def advance(self, t, x, scale):
         """Take α at x as β and a smaller w; return the largest difference of energies over the largest of its line."""
-        radius, stiffness = self.term.data[:: self.pieces, : STIFFNESS + 1].T
-        energies = self.energies(t, x)
+        (radius, stiffness), energies = self._laws, self.energies(t, x)
         largest, self.before = energies.max(axis=1), self.shares(energies)
-        narrowest = np.maximum(NARROWEST, STIFF * radius * stiffness / scale) * np.maximum(
-            largest, self._negligible(scale)
-        )
-        self.width = np.maximum(NARROWER * self.width, narrowest)
+        share = np.maximum(NARROWEST, STIFF * radius * stiffness / scale)
+        self.narrowest = share * np.maximum(largest, NEGLIGIBLE * scale**2 / stiffness)
+        self.width = np.maximum(NARROWER * self.width, self.narrowest)
         differences = np.where(self.before > 0.0, largest[:, None] - energies, 0.0).max(axis=1)
         differences = np.maximum(differences - ROUNDING * radius * np.sqrt(2.0 * stiffness * largest), 0.0)
         pressed = self.once & (largest > 0.0)
@@ -127,8 +126,10 @@ class LineShares:
         """Mask of the lines that push with several elements, shape (lines,)."""
         return self.once & (((self.before > 0.0) & (self.energies(t, x) > 0.0)).sum(axis=1) > 1)
 
-    def _negligible(self, scale):
-        return NEGLIGIBLE * scale * self.term.data[:: self.pieces, 0]
+    @property
+    def _laws(self):
+        """Radius [m] and stiffness of each line's contact."""
+        return self.term.data[:: self.pieces, : STIFFNESS + 1].T
 
     def energy(self, t, x, cells, data, out):
         """Write φ, by element."""
@@ -231,8 +232,8 @@ class SharedPush:
         """
         error = error or NotFound("", dict(nsteps=0, nfev=0, njev=0, nlu=0), x)
         for start in (x, error.x):
-            if error.x is None or gone(self._plain, error.x) is not None:
-                break
+            if start is None or gone(self._plain, start) is not None:
+                continue
             try:
                 return self._solve(t, start, error.stats)
             except NotFound as another:
@@ -247,7 +248,7 @@ class SharedPush:
             lines.begin(t, x, scale)
         stats = {key: spent[key] for key in ("nsteps", "nfev", "njev", "nlu")}
         for n in range(ROUNDS):
-            state = self.newton.solve(t, x, warm=n > 0, limit=LATER if n else FIRST)
+            state = self._balanced(t, x, n > 0, stats)
             add_spent(stats, state.stats)
             x, last = state.x, difference
             difference = max(lines.advance(t, x, self.newton.scale) for lines in self._lines)
@@ -272,11 +273,22 @@ class SharedPush:
             state.contact_shares = np.concatenate([lines.before.ravel() for lines in self._lines])
         return state
 
+    def _balanced(self, t, x, warm, stats):
+        """Equilibrium with φ, from x; ``stats`` grow by what the parts before the last have spent."""
+        for part in range(PARTS):
+            try:
+                return self.newton.solve(t, x, warm=warm, limit=PART)
+            except NotFound as error:
+                if part == PARTS - 1 or error.x is None or gone(self._plain, error.x) is not None:
+                    raise
+                add_spent(stats, error.stats)
+                x = error.x
+
     def _polish(self, t, state):
         """Take two more steps, as long as the residual falls; with a large w, that rounding changes shares little."""
         system, newton = self.newton.system, self.newton
         for lines in self._lines:
-            lines.width /= NARROWEST
+            lines.width = np.maximum(lines.narrowest, lines.energies(t, state.x).max(axis=1))
         newton.factorize_at(state)
         for _ in range(2):
             p = newton.factor.solve(state.force.ravel()[system.free])
