@@ -329,8 +329,11 @@ def _check_event(event, earlier, observables, system):
         if not system.contact:
             raise InputError('kind = "contact" needs a [contact] in the scene')
         _check_touch(event, system)
-    if event.kind == "taut":
+    if event.kind == "taut" and event.thread is None:
         _check_taut(event, system.net)
+    if event.thread not in (None, *(names := [thread.name for thread in system.net.threads])):
+        hint = nearest(event.thread, names) if names else "the scene has no [[thread]]"
+        raise InputError(f"thread = {quote(event.thread)} is not a thread, {hint}")
     if event.kind == "threshold" and event.observe not in (names := [o.name for o in observables]):
         raise InputError(f"observe = {quote(event.observe)} is not an observable, {nearest(event.observe, names)}")
     if event.kind == "threshold" and (average := observables[names.index(event.observe)].average) is not None:

@@ -339,6 +339,11 @@ def notices(scene: Scene, system: System) -> Iterator[Finding]:
     if scene.solve.kind == "static" and any(map(rubs, scene.effects)):
         text = 'statics has no friction: contact pushes along its normal alone; [solve] kind = "dynamic" has it'
         yield Finding("left-out", text, "contact")
+    if system.net.threads and any(hasattr(effect, "expansion") for effect in scene.effects):
+        text = (
+            f'[temperature] acts on lines alone: thread "{system.net.threads[0].name}" keeps its natural length; give '
+        )
+        yield Finding("left-out", text + "it the one that it has then, length or prestrain", "thread")
     yield from _idle(system, getattr(scene.solve, "load_steps", (0.0, *system.corners)))
     if scene.solve.kind == "static" and (parts := system.unsupported_parts):
         axes = ", ".join(sorted({"xyz"[part.axis] for part in parts}))

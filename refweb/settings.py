@@ -228,8 +228,8 @@ class Event(Table):
         Its name.
     kind : {"contact", "taut", "threshold", "rest"}
         A body first touches the web, or another body; a line that is slack snaps taut, of several slack ones the
-        first; an observable passes a value, either way: one that comes back within the same step may not be seen; the
-        scene has come to rest.
+        first, or a thread does; an observable passes a value, either way: one that comes back within the same step may
+        not be seen; the scene has come to rest.
     body : str, optional
         Body of a contact, by default any.
     with : str, optional
@@ -237,6 +237,8 @@ class Event(Table):
         true`` in ``[contact]``. A contact begins with an overlap, at t = 0 if there is one at the start.
     line : int, str or list, optional
         Lines, by number or group, see `refweb.net.groups`, of which the first to become taut counts.
+    thread : str, optional
+        Thread that becomes taut, in place of lines.
     observe : str, optional
         Name of the observable of a threshold.
     value : float, optional
@@ -252,10 +254,10 @@ class Event(Table):
     Raises
     ------
     InputError
-        If the line of "taut", or the observable or value of "threshold", is missing, and for a key of another kind.
-        From `Scene.build`, for a body, line or observable that the scene does not have, for lines of different
-        slackness, for "contact" without a contact or with a body that does not touch this one, and for two events of
-        one name.
+        If the line or thread of "taut", or the observable or value of "threshold", is missing, and for a key of another
+        kind. From `Scene.build`, for a body, line, thread or observable that the scene does not have, for lines of
+        different slackness, for "contact" without a contact or with a body that does not touch this one, and for two
+        events of one name.
 
     Examples
     --------
@@ -271,6 +273,7 @@ class Event(Table):
     body: str | None = text(default=None)
     with_: str | None = text(default=None)
     line: Several = nodes(default=None, what="line")
+    thread: str | None = text(default=None, limit=80)
     observe: str | None = text(default=None)
     value: float | None = real(default=None)
     share: float | None = real(default=None, above=0, below=1)
@@ -279,11 +282,13 @@ class Event(Table):
 
     def check(self) -> None:
         """Refuse keys of another kind, and what a kind lacks."""
-        needed: dict[str, tuple[str, ...]] = {"taut": ("line",), "threshold": ("observe", "value")}
+        needed: dict[str, tuple[str, ...]] = {"threshold": ("observe", "value")}
         possible: dict[str, tuple[str, ...]] = {"contact": ("body", "with"), "rest": ("share", "during")}
+        if self.kind == "taut":
+            needed["taut"] = ("thread",) if self.thread is not None else ("line",)
         needs = needed.get(self.kind, ())
         may = possible.get(self.kind, needs)
-        for key in ("body", "with", "line", "observe", "value", "share", "during"):
+        for key in ("body", "with", "line", "thread", "observe", "value", "share", "during"):
             value = self.with_ if key == "with" else getattr(self, key)
             if value is None and key in needs:
                 raise InputError(f'{key} is missing: kind = "{self.kind}" needs {key} = ...')

@@ -115,6 +115,10 @@ def _event_of(event, system, duration):
         named = {body.name: body for body in system.net.bodies}
         touch = probe_of_touch(system, named.get(event.body), named.get(event.with_))
         return touch, Event(-1, 0.0, True, event.stop, at_once=True)
+    if event.kind == "taut" and event.thread is not None:
+        (thread,) = (thread for thread in system.net.threads if thread.name == event.thread)
+        probe = Observe(name="_", quantity="strain", thread=event.thread).probe(system)
+        return probe, Event(-1, float(thread.line.slackness[0]), True, event.stop)
     if event.kind == "taut":
         probe = Observe(name="_", quantity="strain", line=event.line).probe(system)
         return probe, Event(-1, float(system.net.slackness[probe.rows[1]]), True, event.stop)

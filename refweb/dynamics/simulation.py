@@ -111,7 +111,7 @@ class Simulation:
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
         self._lines, self._through = None, _through_of(system)
         self._tables, self._compared, self._share_rows, self._kept = [], [], [], kept
-        self._jumps = None
+        self._jumps, self._coincident = None, False
         _check_step(scene)
         self._stand(kept)
         self.integrator = self.integrator_at(self.standing.knob)
@@ -380,6 +380,14 @@ class Simulation:
     def _frame(self, number, folder, course):
         """Keep a state; in a folder, with a checkpoint."""
         state = self._state(course)
+        if self.system.net.threads and not self._coincident:
+            from ..net.threads import coincident_nodes
+
+            text = coincident_nodes(self.system.net, state.x, self.system.supported)
+            self._coincident = text is not None
+            if self._coincident:
+                text += f", or expect short steps (at t = {state.time:.6g} s)"
+                self.solution.findings.append(Finding("coincident-nodes", text, "thread"))
         if folder is None:
             self.solution.frames.append((number, state))
             return

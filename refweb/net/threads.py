@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from .net import Net
 
 
+NEAR = 1e-3
+"""Distance of rings that have come together, over the length of their thread."""
+
+
 class ThreadLine(NamedTuple):
     """A thread through nodes of a net.
 
@@ -94,3 +98,19 @@ def thread_line(
     ends = [[0.0, 0.0, 0.0], [total, 0.0, 0.0]]
     web = Web(ends, [[0, 1]], None if length is None else [length])
     return ThreadLine(name, rows, vectors, distances, discretisation.build(web, cable, explicit=True))
+
+
+def coincident_nodes(net: Net, x: NDArray[np.float64], supported: NDArray[np.bool_]) -> str | None:
+    """Text that names nodes that have come together on a thread, which pulls them so; None where none have.
+
+    ``x`` are displacements [m], shape (rows, 3), and ``supported`` is True for components that do not move.
+    """
+    for thread in net.threads:
+        apart = np.linalg.norm(np.diff((net.points + x)[thread.rows], axis=0), axis=1)
+        free = ~supported[thread.segments].all(axis=(1, 2))
+        for first, second in thread.segments[(apart < NEAR * thread.natural_length) & free][:1]:
+            return (
+                f'nodes {first} and {second} come together on thread "{thread.name}", which has no direction there: '
+                "keep them apart by a line or a load, make them one node"
+            )
+    return None

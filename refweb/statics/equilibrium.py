@@ -19,14 +19,13 @@ from ..errors import InputError, SolverError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..system.system import System
     from .duality_bound import DualityBound
     from .floating import Floating
 
 TOLERANCE = 1e-10
 """Residual at which an iteration stops; `LIMIT` is what it may end at when rounding allows no further step."""
 LIMIT = 1e-9
-NEAR = 1e-3
-"""Distance of rings that have come together, over the length of their thread."""
 WITH_A_WAY_AROUND = 25
 """Largest number of factorizations of Newton's method where an interior point can take over."""
 
@@ -105,7 +104,7 @@ class Equilibrium:
     may_turn_over: bool = False
     contact_shares: NDArray[np.float64] | None = None
 
-    def system_of(self, system):
+    def system_of(self, system: System) -> System:
         """The system whose forces balance: the one that is given, or where elements share a push with these shares."""
         if self.contact_shares is None:
             return system
@@ -176,8 +175,12 @@ def with_reason(system, t, error, remedy=""):
     from ..system.unsupported_parts import find_parts
     from .contact_kinks import kink_remark
 
-    if error.x is not None and (together := _together(system, error.x)) is not None:
-        return NotFound(f"no equilibrium found at step {t:g}: {together}", error.stats)
+    if system.net.threads and error.x is not None:
+        from ..net.threads import coincident_nodes
+
+        if (together := coincident_nodes(system.net, error.x, system.supported)) is not None:
+            text = f'no equilibrium found at step {t:g}: {together}, or try method = "relaxation"'
+            return NotFound(text, error.stats)
     if system.contact and error.x is not None and (kink := kink_remark(system, error.x, remedy)) is not None:
         return NotFound(f"no equilibrium found at step {t:g}: {kink}", error.stats)
     if error.x is not None and (body := gone(system, error.x)) is not None:
@@ -203,19 +206,6 @@ def gone(system, x):
             continue
         if not any(system.force_of(term, 1.0, x)[body.row].any() for term in system.terms if term.contact.felt):
             return body
-    return None
-
-
-def _together(system, x):
-    """Text that names nodes that have come together on a thread, which pulls them so; None where none have."""
-    for thread in system.net.threads:
-        apart = np.linalg.norm(np.diff((system.net.points + x)[thread.rows], axis=0), axis=1)
-        free = ~system.supported[thread.segments].all(axis=(1, 2))
-        for first, second in thread.segments[(apart < NEAR * thread.natural_length) & free][:1]:
-            return (
-                f'nodes {first} and {second} come together on thread "{thread.name}", which has no direction there: '
-                'keep them apart by a line or a load, make them one node, or try method = "relaxation"'
-            )
     return None
 
 

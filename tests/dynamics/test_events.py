@@ -177,6 +177,36 @@ def test_masses_that_fly_apart(solve, law):
     agrees(refweb.run(apart), "taut", (1.2 * (1.0 + slackness) - 1.0) / 2.0, within=1e-9)
 
 
+@pytest.mark.ordinary("central-difference", "bdf")
+@pytest.mark.parametrize("solve", METHODS, ids=NAMES)
+def test_a_thread_that_becomes_taut(solve):
+    """A mass on a slack thread of 1.4 m between supports 1 m apart, at 2 m/s across: after (0.7² − 0.5²)^½/2 s."""
+    thread = refweb.Thread(
+        name="sling", nodes=[0, 1, 2], length=1.4, law="tension-only", modulus=1e6, area=1e-4, density=0.0
+    )
+    flies = scene(
+        [refweb.Event(name="taut", kind="taut", thread="sling")],
+        solve,
+        duration=0.3,
+        web=refweb.Inline(
+            points=[[-0.5, 0, 0], [0, 0, 0], [0.5, 0, 0], [0.5, 1, 0]], lines=[[2, 3]], supports=[0, 2, 3]
+        ),
+        cable=cable(),
+        effects=[thread, refweb.PointMass(node=1, mass=2.0), refweb.Velocity(node=1, value=(0.0, 0.0, 2.0))],
+    )
+    agrees(refweb.run(flies), "taut", np.sqrt(0.7**2 - 0.5**2) / 2.0, within=1e-9)
+
+
+def test_a_thread_of_an_event_is_one_of_the_scene():
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2])
+    event = refweb.Event(name="taut", kind="taut", thread="rope")
+    slack = scene([event], EXPLICIT, duration=0.1, web=web, cable=cable(density=1000.0))
+    with pytest.raises(refweb.InputError, match='thread = "rope" is not a thread, the scene has no'):
+        refweb.run(slack)
+    with pytest.raises(refweb.InputError, match='line = 0 has no meaning for kind = "taut"'):
+        refweb.Event(name="taut", kind="taut", line=0, thread="rope")
+
+
 @pytest.mark.parametrize("solve", METHODS, ids=NAMES)
 def test_a_string_that_is_pulled_taut(solve):
     """By a support at 2 m/s, with a mass beyond it on a line that is slack all the time: nothing else can happen."""

@@ -150,6 +150,24 @@ def test_rings_that_meet():
         static(TWO, [0, 1], TWO_ROPE, dict(zip((2, 3), WEIGHTS, strict=True)))
 
 
+def test_rings_that_begin_together_are_told_of_in_dynamics():
+    """Two rings at one point of a thread at rest; a run says so once."""
+    points = [[0, 0, 0], [1, 0, 0], [0.5, 0, -0.5], [0.5, 0, -0.5]]
+    solve = {"kind": "dynamic", "method": "central-difference", "duration": 1e-3}
+    run = refweb.run(scene(points, [0, 1], {"nodes": [0, 2, 3, 1]}, solve, {2: 1.0, 3: 1.0}))
+    (text,) = (text for text in run.warnings if "come together" in text)
+    assert text.startswith('nodes 2 and 3 come together on thread "rope"') and "at t = 0 s" in text
+
+
+def test_heat_of_lines_leaves_threads_and_says_so():
+    """The tension of the thread is that without [temperature]."""
+    points, masses, heat = [[0, 0, 0], [1, 0, 0], [0.5, 0, -0.5]], {2: 1.0}, {"expansion": 1e-5, "change": 50.0}
+    cold, hot = (static(points, [0, 1], {"nodes": [0, 2, 1]}, masses, **more) for more in ({}, {"temperature": heat}))
+    assert hot.results["pull"].value == cold.results["pull"].value
+    (text,) = (text for text in hot.warnings if "[temperature]" in text)
+    assert 'thread "rope" keeps its natural length' in text
+
+
 # Dynamics
 
 
