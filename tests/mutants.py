@@ -108,7 +108,8 @@ MIRRORS = {
     "system/material_flow": "effects/test_reel_mass.py",
     "system/static_system": "dynamics/test_bodies_come_to_rest.py dynamics/test_starts.py",
     "system": "system/test_system.py test_contract.py dynamics/integrators/test_cvode.py",
-    "system/system": "system/test_system.py test_contract.py dynamics/integrators/test_cvode.py effects/test_thread.py",
+    "system/system": "system/test_system.py test_contract.py dynamics/integrators/test_cvode.py effects/test_thread.py "
+    "effects/test_axles.py",
     "statics/body_penetration": "effects/test_overlap.py",
     "statics/contact_kinks": "statics/test_contact_kinks.py",
     "statics/shared_push": "statics/test_contact_kinks.py",
@@ -374,6 +375,7 @@ MUTANTS = [
     Mutant("effects/thread", "across = 2.0 * max(tension * inverse, soon)", "across = 2.0 * soon"),
     Mutant("effects/thread", "np.add.at(mass, rows[1:], 0.5", "np.add.at(mass, rows[:-1], 0.5"),
     Mutant("net/threads", "return self.line.element_mass[0] * self.distances", "return 0.0 * self.distances"),
+    Mutant("system/system", "shift = angle * (float(np.linalg.norm(body.arm)) + body.extent)", "pass"),
     Mutant("system/system", "tension.mean() * term.tangent.across", "0.0 * term.tangent.across"),
     Mutant("net/mesh_file", 'np.asarray(block.data["thread"]) == 0.0', 'np.asarray(block.data["thread"]) >= 0.0'),
     Mutant("effects/bending", "inner = ~np.isin(rows[:, 1], clamped)", "inner = rows[:, 1] >= 0"),

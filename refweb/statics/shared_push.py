@@ -20,7 +20,7 @@ Its gradient Σ α_c ∇e_c is continuous, with the α of the simplex that is ne
 equilibrium; then β becomes α, until all elements with a share have the same energy. Elements come and go by the
 simplex, so that no sets of them are tried. The result does not depend on w. It begins above the energy of a line, where
 φ is nearly that of constant shares, and falls to a thousandth of it: in a net of 6 by 6 meshes with 8 elements a line
-a ball takes 89 factorizations from its start, and is not found with w a hundredth of the energy from the start.
+a ball takes 65 factorizations from its start, and is not found with w a hundredth of the energy from the start.
 
 Dynamics has the force of the deepest element alone. Damped, it comes to the same rest, and goes to and fro about it by
 the way of a step.
@@ -79,13 +79,14 @@ class LineShares:
     ----------
     before : ndarray, shape (lines, pieces)
         β [1].
-    width : ndarray, shape (lines,)
-        w [J].
+    width, narrowest : ndarray, shape (lines,)
+        w, and its last value [J].
     """
 
     def __init__(self, term, pieces, once):
         self.term, self.pieces, self.once = term, pieces, once
-        self.before, self.width = np.ones((len(once), pieces)), np.ones(len(once))
+        self.before = np.ones((len(once), pieces))
+        self.width = self.narrowest = np.ones(len(once))
 
     def energies(self, t, x):
         """Energy of each element as if its line had no others [J], shape (lines, pieces)."""
