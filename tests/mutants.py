@@ -465,6 +465,7 @@ MUTANTS = [
     Mutant("statics/shared_push", "slopes -= slopes.mean(axis=0)", "pass"),
     Mutant("statics/shared_push", "largest[:, None] - energies, 0.0)", "0.0, 0.0)"),
     Mutant("system/contact_shares", "*= shares", "*= 1.0"),
+    Mutant("statics/body_penetration", "if element is not None and len(path):", "if element is not None and False:"),
     Mutant("statics/body_penetration", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),
     Mutant("effects/contact_solver", "1.0 / (1.0 - math.exp(-z)) - 1.0 / z", "1.0 / (1.0 - math.exp(-z))"),
     Mutant("effects/contact_solver", "p, normal, change = 0.0, contact", "p, normal, change = 0.0, 2.0 * contact"),

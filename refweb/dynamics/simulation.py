@@ -214,7 +214,7 @@ class Simulation:
             from ..statics.body_penetration import Passage
 
             passage = Passage(self.scene, self.system)
-            passage.record(State(self.system, 0.0, equilibrium_.x))
+            passage.record(State(self.system, 0.0, equilibrium_.x), equilibrium_.path)
             passage.overlaps.refuse()
 
     def run(self, folder, tell):

@@ -17,6 +17,8 @@ import numpy as np
 from ..errors import InputError, SolverError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from ..system.system import System
@@ -83,6 +85,9 @@ class Equilibrium:
         True if there may be other equilibria because lines can push, see `refweb.statics.snap_through`.
     contact_shares : ndarray, optional
         Shares of elements in the push of spheres, see `refweb.statics.shared_push`; None where none share.
+    path : sequence of ndarray
+        Displacements of all rows on the way from the load step before [m], each near the next; empty where they are not
+        kept.
     duality_bound : refweb.statics.duality_bound.DualityBound, optional
         Bounds of energy and tension, for the tension-only law.
     deviations : ndarray, shape (k, rows, 3), optional
@@ -103,6 +108,7 @@ class Equilibrium:
     stability: Stability | None = None
     may_turn_over: bool = False
     contact_shares: NDArray[np.float64] | None = None
+    path: Sequence[NDArray[np.float64]] = ()
 
     def system_of(self, system: System) -> System:
         """The system whose forces balance: the one that is given, or where elements share a push with these shares."""

@@ -54,6 +54,7 @@ def solve(system, load_steps, progress=None):
     for t in load_steps:
         x, error = _start(system, t, states), None
         solver, shared = newton, bool(states) and states[-1].contact_shares is not None
+        newton.start_path()
         try:
             state = None if shared else _equilibrium(newton, t, x, warm=bool(states))
         except NotFound as not_found:
@@ -82,7 +83,7 @@ def solve(system, load_steps, progress=None):
             ask(full_system, solver.system, state, solver.factor if newton.follows else None)
             if state.stability.sign == 1 and system.dead and (system.net.forming & system.net.law_is("convex")).all():
                 state.stats["above_lowest"] = 0.0  # a quadratic potential has one minimum
-        state.deviations = solver.deviations(state)
+        state.deviations, state.path = solver.deviations(state), solver.path
         state.x = system.taken_on(t, state.x)
         states = [*states[-1:], state]
         yield state

@@ -61,6 +61,8 @@ LENT, FADES = 0.1, 3.0
 second factor times the residual, where this product is below 1."""
 CLOSE, END = 1e-4, 1e-14
 """Least relative tolerance of conjugate gradients in a step; residual that the last step aims at."""
+LONGEST = 5_000_000
+"""Largest number of coordinates in a path."""
 ROUGH = 0.03
 """Relative tolerance of conjugate gradients for deviations, which are estimates."""
 
@@ -104,6 +106,9 @@ class Newton:
         Indices of diagonal entries that anchor parts without support, on which the loads balance.
     scale : float
         Largest force of the equilibria so far [N].
+    path : list of ndarray
+        Displacements of all iterates since `start_path` [m], where bodies that are free may touch the web; empty if
+        they are larger than `LONGEST` numbers.
     """
 
     def __init__(self, system, progress=None, first=None):
@@ -125,6 +130,19 @@ class Newton:
         anchors = np.concatenate([np.zeros(0, dtype=int), *(part.unknowns for part in system.unsupported_parts)])
         self.anchors = system.pattern.diagonal[anchors]
         self.scale = 0.0
+        self.start_path()
+
+    def start_path(self, path=()):
+        """Forget the iterates so far, or begin with those of a ``path``."""
+        self.path = list(path)
+        self._followed = self.system.contact and bool(self.system.resting)
+
+    def _follow(self, x):
+        """Add an iterate to the path."""
+        if self._followed:
+            self.path.append(x)
+            if len(self.path) * x.size > LONGEST:
+                self.path, self._followed = [], False
 
     def solve(self, t, x, warm=False, limit=200):
         """Equilibrium at load step t from the displacement x.
@@ -156,6 +174,7 @@ class Newton:
         system.drive(t, x)
         stats: dict = dict(nsteps=0, nfev=0, njev=0, nlu=0)
         iterate, search = self._evaluated(t, x, stats), self._search(t, x)
+        self._follow(x)
         scale, best, last, made = self._scale(t, iterate), np.inf, np.inf, np.inf
         shift = self.axial * min(max((scale / self.axial) ** (2 / 3), 1e-9), 1e-2) * (1e-4 if warm else 1.0)
         ahead = None
@@ -189,6 +208,7 @@ class Newton:
             else:
                 ahead = None
             iterate, last = self._evaluated(t, x, stats), error
+            self._follow(x)
             stats["nsteps"] += 1
             self.progress(f"step {t:g}, residual {error:.0e}")
         if stats["nsteps"]:

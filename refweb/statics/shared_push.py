@@ -150,9 +150,10 @@ class LineShares:
     def exchange(self, t, x, v, blocks, cells, data, definite):
         """Write the tangent of the change of shares, of all nodes of a line."""
         blocks[:] = 0.0
-        shares = self.shares(self.energies(t, x))
+        energies = self.energies(t, x)
+        shares = self.shares(energies)
         nodes, width = self.term.contact.felt[0], blocks.shape[1] // 3
-        for line in np.flatnonzero(((shares > 0.0).sum(axis=1) > 1) & self.once):
+        for line in np.flatnonzero(((shares > 0.0).sum(axis=1) > 1) & self.once & energies.any(axis=1)):
             pieces = np.flatnonzero(shares[line] > 0.0)
             slopes = np.zeros((len(pieces), width, 3))
             for slope, c, force in zip(slopes, pieces, self._forces(t, x, line * self.pieces + pieces), strict=True):
@@ -210,7 +211,7 @@ class SharedPush:
     """
 
     def __init__(self, newton, first):
-        self._plain, net = newton.system, newton.system.net
+        self._without_shares, self._plain, net = newton, newton.system, newton.system.net
         once, system = [body.row for body in net.bodies if body.shape.once], copy.copy(newton.system)
         for cached in ("pattern", "unsupported_parts", "mass", "links", "carriers", "contact_forces"):
             system.__dict__.pop(cached, None)
@@ -235,6 +236,7 @@ class SharedPush:
         for start in (x, error.x):
             if start is None or gone(self._plain, start) is not None:
                 continue
+            self.newton.start_path(() if start is x else self._without_shares.path)
             try:
                 return self._solve(t, start, error.stats)
             except NotFound as another:

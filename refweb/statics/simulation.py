@@ -112,7 +112,7 @@ class Simulation:
         if self.system.weakness is not None:
             self._refuse_break(equilibrium)
         if self._passage is not None:
-            self._passage.record(state)
+            self._passage.record(state, equilibrium.path)
             overlaps = self._passage.overlaps
             solution.bodies, solution.pairs = overlaps.plain(), overlaps.pairs.plain() if overlaps.pairs else {}
             overlaps.refuse()

@@ -16,6 +16,8 @@ import refweb
 from refweb.__main__ import main
 from refweb.dynamics.simulation import Simulation
 from refweb.effects.contact.overlap import push_along
+from refweb.results.state import State
+from refweb.statics.body_penetration import Passage
 
 RADIUS, MASS = 0.1, 1.0
 HELD = refweb.Inline(points=[[-1, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1])
@@ -352,3 +354,31 @@ def test_pushes_along_lines_are_told(stiffness, friction, told):
     found = refweb.run(scene)
     assert found.bodies["bar"]["overlap"] > 0.0
     assert any("contact may push it forth and back by" in text for text in found.warnings) == told
+
+
+def test_a_line_that_went_around_a_body_is_told_from_one_that_went_through():
+    """Of a line that stands behind a body the straight way leads through it; a path of steps says which it was."""
+    web = {"kind": "inline", "points": [[-1, -0.1, 0], [-1, 0.1, 0]], "lines": [[0, 1]], "supports": []}
+    scene = refweb.Scene.from_dict(
+        {
+            "web": web,
+            "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-6, "density": 1000.0},
+            "body": [{"name": "post", "radius": 0.3, "position": [0.0, 0.0, 0.0], "fixed": True}],
+            "contact": {"stiffness": 1e4},
+            "solve": {"kind": "static"},
+        }
+    )
+    system = scene.build()
+
+    def record(*ways):
+        """The line at places, the last of which is that of an equilibrium."""
+        path = [np.zeros((system.rows, 3)) for _ in ways]
+        for x, way in zip(path, ways, strict=True):
+            x[:2] = way
+        Passage(scene, system).record(State(system, 1.0, path[-1]), path[:-1])
+
+    around = [[1.0 - np.cos(angle), 0.0, np.sin(angle)] for angle in np.linspace(0.3, np.pi, 8)]
+    record(*around)
+    for ways in ([around[-1]], [[0.5, 0.0, 0.0], [1.0, 0.0, 0.0], around[-1]]):
+        with pytest.raises(refweb.SolverError, match='line 0 passes the core of body "post" on its way to load step 1'):
+            record(*ways)
