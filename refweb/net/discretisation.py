@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..registry import SHIPPED
 from .elements import gauss, line_element, lumped_shares, values
 from .laws.line_data import LineData, offsets
 from .net import Net
@@ -226,4 +227,8 @@ def _with_laws(net, values):
             if name not in net.line_data.dtype.names:
                 net = net.with_column(name, 0.0)
             net.line_data[name][elements] = column
+        if law.name not in SHIPPED["law"]:
+            from .laws.consistency import refuse_inconsistent
+
+            refuse_inconsistent(law, net.line_data[elements], net.line[elements])
     return net if len(net.laws) == 1 else net.with_column("law", law_index)

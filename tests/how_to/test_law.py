@@ -11,9 +11,11 @@ from scipy.optimize import minimize
 from test_contract import check_term, largest_frequency, state
 
 import refweb
-import refweb.net.laws
+import refweb.net.laws.straight
+import refweb.registry
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects.elasticity import Elasticity
+from refweb.kernels import kernel
 from refweb.net import discretisation
 from refweb.net.cable import Cable
 from refweb.statics.duality_bound import duality_bound
@@ -172,3 +174,34 @@ def test_laws_that_are_none_are_refused():
     reserved = table(type("One", (refweb.net.laws.law.TensionLaw, Table), {"name": "one", **RESERVED}))
     with pytest.raises(refweb.InputError, match='the parameter "slackness" has a name of refweb\'s own'):
         refweb.register("law", "one", reserved)
+
+
+@kernel()
+def _twice(strain, line):
+    return line.ea * strain * strain if strain > 0.0 else 0.0
+
+
+@kernel()
+def _falls(strain, line):
+    return 0.9 * line.ea if strain >= 0.0 else 0.0
+
+
+@pytest.mark.parametrize(
+    "kernels, words",
+    [
+        ({"energy_density": _twice}, r"at a strain of 1e-05 energy_density rises by 0.14 N .* stress is 0.07 N"),
+        ({"tangent": _falls}, r"at a strain of 1e-05 stress rises by 7000 N .* tangent is 6300 N"),
+    ],
+)
+def test_a_law_that_contradicts_itself_is_refused(page, kernels, words, monkeypatch):
+    """Twice the energy, or nine tenths of the tangent; the message has the law, the strain and both numbers."""
+    own = type("Wrong", (refweb.net.laws.straight.TensionOnly,), {"name": "wrong", "__module__": __name__, **kernels})
+    monkeypatch.setitem(refweb.registry.LAWS, "wrong", own)
+    web = {"points": [[0, 0, 0], [1, 0, 0]], "lines": [[0, 1]], "supports": [0]}
+    cable = {key: value for key, value in page["cable"].items() if key != "parameters"} | {"law": "wrong"}
+    with pytest.raises(refweb.InputError, match='law = "wrong" of line 0: ' + words):
+        scene(page, web, cable=cable, solve={"kind": "static"}).build()
+    monkeypatch.setitem(
+        refweb.registry.LAWS, "wrong", type("Right", (refweb.net.laws.straight.TensionOnly,), {"name": "wrong"})
+    )
+    scene(page, web, cable=cable, solve={"kind": "static"}).build()
