@@ -84,7 +84,8 @@ MIRRORS = {
     "effects/contact/contact_points": "dynamics/integrators/test_nearby.py test_contract.py effects/test_contact.py "
     "effects/test_overlap.py effects/test_deep_contact.py",
     "effects/contact": "test_contract.py effects/test_contact.py effects/test_overlap.py effects/test_deep_contact.py",
-    "dynamics/integrators/rupture": "effects/test_rupture.py",
+    "dynamics/integrators/rupture": "effects/test_rupture.py effects/test_plastic.py",
+    "net/laws/consistency": "how_to/test_law.py",
     "net/mesh_file": "effects/test_rupture.py effects/test_thread.py",
     "net/threads": "effects/test_thread.py",
     "results/observables/thread": "effects/test_thread.py",
@@ -128,12 +129,14 @@ MIRRORS = {
     "statics/simulation": "statics/test_statics.py results/test_frames.py",
     "statics/duality_bound": "net/test_curves.py statics/test_reused_factorization.py statics/test_statics.py "
     "dynamics/test_accuracy.py",
+    "statics/monotone_loading": "statics/test_monotone_loading.py",
     "statics": "statics/test_reused_factorization.py statics/test_statics.py dynamics/test_accuracy.py",
     "dynamics/accuracy_loop": "dynamics/test_budget.py test_faults.py dynamics/test_accuracy.py",
     "dynamics/budget": "dynamics/test_budget.py",
     "dynamics/twin_error": "dynamics/test_agreement_by_chance.py dynamics/test_one_row.py "
     "dynamics/test_events.py dynamics/test_dynamics.py",
-    "dynamics/history": "dynamics/test_agreement_by_chance.py dynamics/test_dynamics.py results/test_remarks.py",
+    "dynamics/history": "dynamics/test_agreement_by_chance.py dynamics/test_dynamics.py results/test_remarks.py "
+    "effects/test_plastic.py",
     "dynamics/initial_state": "dynamics/test_starts.py",
     "dynamics/commands": "dynamics/test_stepped_run.py",
     "dynamics/stepped_run": "dynamics/test_stepped_run.py",
@@ -330,6 +333,12 @@ MUTANTS = [
         "effects/plastic", "yields, ahead = slope, p + beyond / (ea + slope)", "yields, ahead = slope, p + beyond / ea"
     ),
     Mutant("effects/plastic", "slope = line.ea * yields / (line.ea + yields)", "slope = yields"),
+    Mutant("effects/plastic", "length = 0.5 * (before + length) if before > 0.0 else length", "length += 0.0"),
+    Mutant("dynamics/history", "limits[o.name] = max(limits[o.name], course.worst)", "limits[o.name] += 0.0"),
+    Mutant("dynamics/integrators/rupture", ">= 1.0) | self._yielded(course))", ">= 1.0))"),
+    Mutant(
+        "net/laws/consistency", "off = (rise < low - allowed) | (rise > high + allowed)", "off = rise < low - allowed"
+    ),
     Mutant("effects/plastic", "(y0 + 0.5 * (end - p0)", "(y0 + (end - p0)"),
     Mutant("effects/plastic", "return plastic + tension / numbers.ea", "return plastic"),
     Mutant("effects/rupture", "np.where(yields & ~np.isnan(plastic), strains, np.inf)", "strains"),
@@ -338,6 +347,12 @@ MUTANTS = [
         "share = max(lines[n, rows[0]] * data[n, 0], lines[n, rows[1]] * data[n, 1])",
         "share = lines[n, rows[0]] * data[n, 0]",
     ),
+    Mutant(
+        "statics/monotone_loading",
+        "return bool((reached - asked > margin[:, None])",
+        "return bool((0.0 > margin[:, None])",
+    ),
+    Mutant("statics/monotone_loading", "(slope / (ea + slope)).T", "(slope / ea).T"),
     Mutant("net/laws/curve", "np.ones(len(begin)), 0.5 * begin**2", "np.ones(len(begin)), begin**2"),
     Mutant("net/laws/curve", "if curve.first > 0.0:", "if curve.first < 0.0:"),
     Mutant("net/law_keys", 'if curves[line].unit == "N" else 1.0', 'if curves[line].unit == "Pa" else 1.0'),

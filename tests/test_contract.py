@@ -21,6 +21,7 @@ import refweb.effects
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects import elasticity
 from refweb.effects.base import PrescribedMotion, no_force
+from refweb.effects.plastic import ROW
 from refweb.errors import InputError
 from refweb.net import discretisation
 from refweb.net.laws.law import LINE
@@ -159,6 +160,14 @@ def state(net, seed):
     return 0.05 * rng.standard_normal(net.points.shape), rng.standard_normal(net.points.shape)
 
 
+def set_internal(net, x, numbers):
+    """Give internal variables some numbers, and lines that yield their length: the energy of a step of that is kept."""
+    x[len(x) - net.internal :] = numbers
+    if ROW in net.line_data.dtype.names:
+        last = 2 * len(net.weights)
+        x[net.line_data[ROW].astype(int) + last // 3, last % 3] = net.natural_length
+
+
 def slope(errors, steps):
     return np.polyfit(np.log(steps), np.log(errors), 1)[0]
 
@@ -192,7 +201,7 @@ def check_term(net, system, term, seed):
     """A term alone in its system."""
     assert term.cells.dtype == np.int32 and len(term.cells) == len(system.data_of(term, 0.0))
     x, v = state(net, seed)
-    x[len(x) - net.internal :] = np.abs(x[len(x) - net.internal :])
+    set_internal(net, x, np.abs(x[len(x) - net.internal :]))
     d = np.where(system.supported, 0.0, state(net, seed + 100)[0])
     # Steps that cross no kink: the lines of this net are at least 1e-3 of strain from it at these states.
     steps = np.array([2e-3, 1e-3, 5e-4, 2.5e-4])
@@ -298,7 +307,7 @@ def check_derivatives(name, i, law, place):
     noise = np.random.default_rng(7).standard_normal((2, len(net.points), 3))
     x, v = np.zeros((2, *net.points.shape))
     x[: net.nodes], v[: net.nodes] = place(net.points[: net.nodes], noise[0, : net.nodes])
-    x[len(x) - net.internal :] = 0.02  # arms that have crept: without, all are at their kink
+    set_internal(net, x, 0.02)  # arms that have crept: without, all are at their kink
     d, t = noise[1], 0.7
     for terms in potentials(system):
         alone, term = SimpleNamespace(on=lambda _, terms=terms: terms), terms[0]

@@ -8,6 +8,8 @@ Probes stand in the order of observables, warnings and events; `rupture` takes t
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from ..effects.base import STRAIN, pairs_of
@@ -297,7 +299,9 @@ class Watch:
         They are the differences of extremes from the values at steps, and the errors of the integrals of means. A
         method with a ``relative`` tolerance finds an extreme at an instant no better than that. A method with
         ``absolute`` tolerances, by unit, finds displacements and velocities no better than these, such as the small
-        motions of a web at rest. A closer agreement of run and step refinement is chance.
+        motions of a web at rest. A closer agreement of run and step refinement is chance. Work and
+        lost energy, integrals along the steps, are known no better than to the error of the energy balance: run and
+        step refinement may take the same steps.
         """
         absolute = absolute or {}
         limits = {o.name: SPREAD * absolute.get(o.unit, 0.0) for o in self.observables}
@@ -306,7 +310,20 @@ class Watch:
                 limits[o.name] = max(limits[o.name], _correction(course.extremes, self._slot(o), relative))
             elif o.average is not None:
                 limits[o.name] = max(limits[o.name], float(course.extremes.corrections[self._slot(o)]))
+            if o.observable.booked and (o.observable.weights(self.system) @ self._integrated):
+                limits[o.name] = max(limits[o.name], course.worst)
         return limits
+
+    @cached_property
+    def _integrated(self):
+        """1 for each energy that is integrated along the steps, in the order of `weights`."""
+        system, changing = self.system, bool(self.system.net.factors)
+        path = [
+            term.balance.power is not None and not term.dead or changing and term.balance.column == "plastic_energy"
+            for term in system.terms
+        ]
+        work = bool(system.drives) or changing or any(np.array(path) & (system.working > 0))
+        return np.array([*path, False, work, False], dtype=float)
 
     def drifts(self, course, twin, time):
         """Difference of positions of bodies, by observable, from different velocities in a run and its refinement.

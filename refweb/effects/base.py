@@ -277,6 +277,8 @@ class InternalVariables(NamedTuple):
         Takes them over a step of an explicit method.
     space : int
         Number of strains that this notes.
+    title : str
+        Table or key of a scene that brings them, for messages.
     follower : object, optional
         Has ``taken_on(net, x)``, the displacement of all rows with variables that follow at once and are no unknowns,
         and ``plastic_strain(net, x)`` and ``strain(net, x)`` at each point; None where all are unknowns.
@@ -287,6 +289,7 @@ class InternalVariables(NamedTuple):
     resistance: np.ndarray
     relax: Callable
     space: int
+    title: str
     follower: Any = None
 
 

@@ -10,14 +10,14 @@ The state of a line is its plastic strain p ≥ 0. With the yield stress Y(p), w
 A line that does not push yields in one direction alone, so that p is the largest that the strain has asked for. Within
 a step the energy that it loses, the area of its loops, is a function of p, and the sum of both energies is the
 incremental potential: convex in the strain, and its gradient is the tension for any p of before. So states of steps
-that do not turn back need no history within the step. L is the natural length at which the line yields, at the end of
-a step: material that a reel pays out has lost nothing. Beside ``law = "elastic-plastic"``, whose term has the elastic
-tension of p = 0, this term has the rest.
+that do not turn back need no history within the step. L is the natural length at which the line yields, the mean of
+those between which p grows: material that a reel pays out has lost nothing, and takes none of the energy along. Beside
+``law = "elastic-plastic"``, whose term has the elastic tension of p = 0, this term has the rest.
 
 Numbers of each element stand in rows behind all places, see `refweb.effects.base.InternalVariables`: p of each
-quadrature point, then the energy that each has lost over A Y(0) [m]. They are no unknowns: explicit steps take them on
-at their ends, load steps of statics at equilibria, and CVODE and IDA between their steps, which end where a line that
-yields turns back.
+quadrature point, then the energy that each has lost over A Y(0) [m], and L of the element [m], 0 before it is known.
+They are no unknowns: explicit steps take them on at their ends, load steps of statics at equilibria, and CVODE and IDA
+at the ends of the pieces of their steps, which end where a line that yields turns back.
 
 Kernels read the columns behind `ROW` by position; `System` and `yielding` call `PlasticLines` as the ``follower``.
 """
@@ -108,7 +108,9 @@ def kernels(law, record, first, corners, gradients, weights):
     @kernel()
     def lost_now(p, x, data, c, q):
         """Energy lost at quadrature point q of cell c where its plastic strain is p, over A Y(0) [m]."""
-        more = line_at(data, c).natural_length * (lost(p, data, c) - lost(state_of(x, data, c, q), data, c))
+        length, before = line_at(data, c).natural_length, internal_number(x, int(data[c, first]), 2 * points)
+        length = 0.5 * (before + length) if before > 0.0 else length
+        more = length * (lost(p, data, c) - lost(state_of(x, data, c, q), data, c))
         return internal_number(x, int(data[c, first]), points + q) + more / data[c, first + 2]
 
     @kernel(FORCE)
@@ -170,12 +172,14 @@ def kernels(law, record, first, corners, gradients, weights):
     @kernel(RELAX)
     def relax(h, x, cells, data, before, lost_energy):
         for c in range(cells.shape[0]):
-            lost_energy[c], row = 0.0, int(data[c, first])
+            lost_energy[c], row, length = 0.0, int(data[c, first]), 2 * points
             for q in range(points if h > 0.0 else 0):
                 e, n = strain(x, cells, data, c, q, nodes, flat)[4], points + q
                 p = plastic(e, state_of(x, data, c, q), data, c)[0]
                 x[row + n // 3, n % 3] = lost_now(p, x, data, c, q)
                 x[row + q // 3, q % 3] = p
+            if h > 0.0 or x[row + length // 3, length % 3] == 0.0:
+                x[row + length // 3, length % 3] = line_at(data, c).natural_length
 
     @kernel(ENERGY)
     def length_force(t, x, cells, data, out):
@@ -184,26 +188,26 @@ def kernels(law, record, first, corners, gradients, weights):
             ea = line_at(data, c).ea
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
-                before = state_of(x, data, c, q)
-                p = plastic(e, before, data, c)[0]
+                p = plastic(e, state_of(x, data, c, q), data, c)[0]
                 stretch, elastic = max(e - p, 0.0), max(e, 0.0)
                 more = stretch * (0.5 * stretch - (1.0 + e)) - elastic * (0.5 * elastic - (1.0 + e))
-                out[c] += weights[q] * (lost(p, data, c) - lost(before, data, c) + ea * more)
+                out[c] += weights[q] * ea * more
 
     @kernel(ENERGY)
     def states(t, x, cells, data, out):
         for c in range(cells.shape[0]):
             for q in range(points):
-                e, begin = strain(x, cells, data, c, q, nodes, flat)[4], 2 * points * c + q
+                e, begin = strain(x, cells, data, c, q, nodes, flat)[4], (2 * points + 1) * c + q
                 p = plastic(e, state_of(x, data, c, q), data, c)[0]
                 out[begin], out[begin + points] = p, lost_now(p, x, data, c, q)
+            out[(2 * points + 1) * (c + 1) - 1] = line_at(data, c).natural_length
 
     return force, kept, stiffness, gone, relax, length_force, states
 
 
 def of(net):
     """The kernels for the curve and the element of a net."""
-    return kernels(net.law, net.law_record, net.line_data.column(ROW), _corners(net), *net.quadrature)
+    return kernels(net.law, net.law_record, net.line_data.column(ROW), corners(net), *net.quadrature)
 
 
 def plastic_strain(net, x):
@@ -212,8 +216,8 @@ def plastic_strain(net, x):
 
 
 def states(net, x):
-    """Plastic strain and energy lost over A Y(0) [m] of each quadrature point, shape (cells, 2 points)."""
-    numbers = np.empty((len(net.cells), 2 * len(net.weights)))
+    """Plastic strain, energy lost over A Y(0) [m] by quadrature point, and L [m], shape (cells, 2 points + 1)."""
+    numbers = np.empty((len(net.cells), 2 * len(net.weights) + 1))
     of(net)[6](0.0, x, net.cells, net.line_data.matrix, numbers.ravel())
     return numbers
 
@@ -221,7 +225,7 @@ def states(net, x):
 def strain_at(net, plastic):
     """Strain at which each element has a plastic strain while it yields, p + Y(p)/E, shape (elements,)."""
     numbers = net.line_data
-    curve = [f"plastic_{kind}_{i}" for i in range(_corners(net)) for kind in ("strain", "force")]
+    curve = [f"plastic_{kind}_{i}" for i in range(corners(net)) for kind in ("strain", "force")]
     (p0, y0), *rest = np.array([numbers[name] for name in curve]).reshape(-1, 2, len(plastic))
     tension = y0
     for p1, y1 in rest:
@@ -230,7 +234,7 @@ def strain_at(net, plastic):
     return plastic + tension / numbers.ea
 
 
-def _corners(net):
+def corners(net):
     """Number of points of the curves of yield stress."""
     return sum(name.startswith("plastic_force_") for name in net.line_data.dtype.names)
 
@@ -254,7 +258,8 @@ class PlasticLines:
 
     def add_internal(self, net):
         """The net with rows for plastic strains behind all others, and numbers of the curves by element."""
-        curves, net = yield_curves(self.cable, net.web), with_internal(net, ROW, 2 * len(net.weights), length_force)
+        curves, each = yield_curves(self.cable, net.web), 2 * len(net.weights) + 1
+        net = with_internal(net, ROW, each, length_force)
         for i in range(curves.shape[1]):
             net = net.with_column(f"plastic_strain_{i}", curves[net.line, i, 0])
             net = net.with_column(f"plastic_force_{i}", net.area * curves[net.line, i, 1])
@@ -281,7 +286,7 @@ class PlasticLines:
             force=no_force,
             energy=gone,
             balance=Balance("plastic_energy", internal=True),
-            internal=InternalVariables(none, none, np.zeros(0), relax, 0, self),
+            internal=InternalVariables(none, none, np.zeros(0), relax, 0, 'law = "elastic-plastic"', self),
         )
         return [tension, lost]
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @accepts(any_of(real().metadata["read"].accepts, rows(2).metadata["read"].accepts))
 def _change(name, value):
-    table = isinstance(value, (list, tuple)) or hasattr(value, "tolist")
+    table = isinstance(value, (list, tuple)) or getattr(value, "ndim", 0) > 0
     return checked(name, value, rows(2, increasing=True) if table else real(unit="K"))
 
 

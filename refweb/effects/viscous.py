@@ -325,6 +325,7 @@ class ViscousArms:
                 resistance=by_component[element, number],
                 relax=relax,
                 space=len(net.cells) * len(net.weights),
+                title="[cable.viscous]",
             ),
         )
         return [springs, dashpots]

@@ -25,7 +25,7 @@ def hardening_key() -> Any:
 
     @accepts(any_of(number.accepts, listed.accepts))
     def read(name, value):
-        if not (isinstance(value, (list, tuple)) or hasattr(value, "tolist")):
+        if not (isinstance(value, (list, tuple)) or getattr(value, "ndim", 0) > 0):
             return number(name, value)
         return listed(name, value)
 

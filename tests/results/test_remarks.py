@@ -133,6 +133,15 @@ def test_what_is_moved_does_not_collapse():
     assert not told(solved(far, pull((0.0, 0.0, 1.0))), "collapses")
 
 
+def test_what_is_paid_out_does_not_collapse():
+    """A line of 1 m that a reel makes ten times as long lets its load move by 9 m; a mast falls beside a short one."""
+    out = refweb.Reel(lines=0, factor=[(0.0, 1.0), (1.0, 10.0)])
+    line = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0])
+    assert not told(solved(out, pull((1.0, 0.0, 0.0)), web=line), "collapses")
+    little = refweb.Reel(lines=0, factor=[(0.0, 1.0), (1.0, 1.01)])
+    assert told(solved(little, pull((0.0, 0.0, -1.0), node=3), web=MAST), "the web collapses: node 3 moves by ")
+
+
 # Contact
 
 

@@ -174,7 +174,7 @@ class CentralDifference(Integrator):
         where = np.zeros(2, dtype=np.int64)
         begin.call(x, v, force, where, self.model, self._observed, extremes, work, total)
         monitors = begin_monitors(self._observed, extremes, total, self._events)
-        energy, stored = own_energies(total, system.working)
+        energy, stored = own_energies(total, system)
         ledger = MomentumBalance.empty()
         mass = self.model.inertia.mass[:, None]
         open_balance.call(x, mass * np.where(system.supported, 0.0, v), self.model.outside, ledger)

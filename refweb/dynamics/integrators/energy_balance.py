@@ -53,10 +53,14 @@ def least_energy(net):
     return float(0.5 * (lines.ea * lines.natural_length).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
 
 
-def own_energies(total, working):
-    """Sum of the energies in ``total`` that are no potential of work [J], and the same without regard to sign."""
-    per_term = np.delete(total[:-2], np.flatnonzero(working > 0))
-    return per_term.sum(), np.abs(per_term).sum()
+def own_energies(total, system):
+    """Sum of the energies in ``total`` that are no potential of work [J], and the same without regard to sign.
+
+    The energy of a term beside the law of lines, which yield takes away, counts with its sign.
+    """
+    stored, beside = np.append(system.working <= 0, True), [f.adds_tension for f in system.terms]
+    sizes = np.where([*beside, False], total[:-2], np.abs(total[:-2]))
+    return total[:-2][stored].sum(), sizes[stored].sum()
 
 
 def refuse_open(course, limit, remedy):

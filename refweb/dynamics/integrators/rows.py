@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...kernels import Integers, Matrix, Vector, kernel
+from ...kernels import Integers, Matrix, Vector, among, kernel
 from .averages import write_means
 from .energy_balance import book_energies, own_energy
 from .extremes import look_at
@@ -31,7 +31,7 @@ def energies_now(model: Model, running: Running, total: Vector) -> tuple[float, 
     stored = 0.0
     for i in range(total.size - 2):
         if i >= terms.working.size or terms.working[i] <= 0:
-            stored += abs(total[i])
+            stored += total[i] if among(terms.beside, i) else abs(total[i])
     return own_energy(total, terms.working), stored
 
 

@@ -93,7 +93,7 @@ class Rupturing:
         self.inner = self._of(self._intact)
         course = self.inner.start(x, v)
         course.breaks = Breaks()
-        over = np.flatnonzero(self._shares(course) >= 1.0)
+        over = np.flatnonzero((self._shares(course) >= 1.0) | self._yielded(course))
         holds = self._holding(np.append(self._intact.net.broken, over))
         now = [element for time, element in self._weakness.times if time <= 0.0 and holds(element)]
         if len(over) or now:
@@ -158,6 +158,17 @@ class Rupturing:
     def _shares(self, course):
         """Shares of the limits of elements, see `refweb.effects.base.BreakLimits.shares`."""
         return self._weakness.shares(self.inner.system.forces(course.time, course.x, course.v).per_cell)
+
+    def _yielded(self, course):
+        """Tell of elements if their plastic strain is above their limit, of lines that are slack as well."""
+        system, strains = self.inner.system, self._weakness.strains
+        if strains is None:
+            return np.zeros(len(self._weakness.limits), dtype=bool)
+        from ...effects.plastic import plastic_strain, strain_at
+
+        net, intact = system.at(course.time).net, self._intact.net.line_data.ea > 0.0
+        with np.errstate(invalid="ignore"):  # of broken elements
+            return intact & (strain_at(net, plastic_strain(net, course.x).max(axis=1)) >= strains)
 
     def _kept(self, course):
         """A course as arrays of its own."""

@@ -121,9 +121,13 @@ class Piece(NamedTuple):
 
     @property
     def unevenness(self):
-        """Difference of the work between Simpson's and the trapezoidal rule [J]."""
-        start, middle, last = (rates.flow[:-6] for rates in self.rates)
-        return (self.end.time - self.start.time) * np.abs(start - 2.0 * middle + last).sum() / 12.0
+        """Difference of the work between Simpson's and the trapezoidal rule [J], natural lengths included."""
+        start, middle, last = self.rates
+        uneven = (self.end.time - self.start.time) * np.abs(start.flow - 2.0 * middle.flow + last.flow)[:-6].sum()
+        if start.lengths is not None:
+            curved = np.atleast_2d(start.length_force - 2.0 * middle.length_force + last.length_force)[0]
+            uneven += np.abs(curved * (last.lengths - start.lengths)).sum()
+        return uneven / 12.0
 
 
 class SimpsonBalance:
@@ -137,10 +141,13 @@ class SimpsonBalance:
         ``hold(x, v)`` moves a state to the nearest one that the equations allow.
     fast : float
         Velocity [m/s] below which nothing is held to be moving.
+    uneven : float
+        Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule.
     """
 
-    def __init__(self, system, hold, fast):
+    def __init__(self, system, hold, fast, uneven=UNEVEN):
         self.system, self._hold, self.least_energy = system, hold, least_energy(system.net)
+        self._uneven = uneven
         self._linear, self._turns = system.rows - system.net.spins, RigidRotations.of(system.net)
         self._still = system.net.mass[: self._linear].sum() * fast
         terms = system.terms
@@ -207,10 +214,9 @@ class SimpsonBalance:
 
     def uneven(self, course, piece):
         """Tell if powers change too much within a piece."""
-        apart = piece.unevenness
-        return apart > UNEVEN * course.largest and apart > UNEVEN * self.kinetic(
-            piece.end.time, piece.end.x, piece.end.v
-        )
+        apart, end = piece.unevenness, piece.end
+        done = np.abs(piece.booked(end.time)[:-6]).sum()
+        return apart > self._uneven * max(course.largest, done, self.kinetic(end.time, end.x, end.v))
 
     def _mass(self, t):
         """The `refweb.system.mass.Mass` at time t."""
@@ -246,7 +252,7 @@ class SimpsonBalance:
     def open(self, course, energies):
         """Note the energy and the momentum at the start of a course."""
         open_balance(course.x, self._momenta(course.time, course.v), self._outside, course.ledger)
-        course.energy, stored = own_energies(energies, self._working)
+        course.energy, stored = own_energies(energies, self.system)
         course.largest = max(stored, self.least_energy)
 
     def impulses(self, course, row):
@@ -256,11 +262,11 @@ class SimpsonBalance:
 
     def note_largest(self, course, energies):
         """Note the largest energy of a course."""
-        course.largest = max(course.largest, own_energies(energies, self._working)[1])
+        course.largest = max(course.largest, own_energies(energies, self.system)[1])
 
     def close(self, course, energies, before, remedy):
         """Compare the energies at a row with the work; raise `EnergyDriftError` where a large drift does not fall."""
-        if drifts_away.py_func(course, *own_energies(energies, self._working), energies[-2], DRIFT):
+        if drifts_away.py_func(course, *own_energies(energies, self.system), energies[-2], DRIFT):
             raise EnergyDriftError(
                 f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and "
                 f"{course.time:.6g} s, limit {DRIFT:g}: {remedy}",

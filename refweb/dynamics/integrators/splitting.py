@@ -115,10 +115,9 @@ class Splitting(CentralDifference):
     def __init__(self, system, *observed, order=6, **steps):
         for term in system.terms:
             if term.internal is not None:
-                what = 'law = "elastic-plastic"' if term.internal.follower else f"[cable.{term.name}]"
                 raise InputError(
-                    f'[solve] method = "explicit" takes no {what}: steps of order above 2 go back in time '
-                    'as well, where what relaxes would grow; use "central-difference" or "cvode"'
+                    f'[solve] method = "explicit" takes no {term.internal.title}: steps of order above 2 go back in '
+                    'time as well, where what relaxes would grow; use "central-difference" or "cvode"'
                 )
             timed = term.balance.power is not None or len(term.timing.times) > 0
             if term.velocity.damping is not None or timed and not term.dead:

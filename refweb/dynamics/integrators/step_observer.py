@@ -23,7 +23,7 @@ from .events import event_rows, search
 from .integrator import MAX_STEPS_PER_ROW, History, Integrator, IntegratorState
 from .measurements import Measurements
 from .momentum_balance import allowed, refuse_open_momentum
-from .simpson_balance import Sample, SimpsonBalance, refuse_endless
+from .simpson_balance import UNEVEN, Sample, SimpsonBalance, refuse_endless
 from .step_limits import StepLimits
 from .tolerances import scales
 
@@ -40,8 +40,9 @@ PATIENCE = 1000
 """Number of steps in turn of which a row would take more than `MAX_STEPS_PER_ROW`; at a start they are short."""
 BREATH = 100
 """Number of steps after each of which it is told how far a run is, and it may be ended."""
-HALVINGS = 8
-"""Number of times that a piece of a step is halved where powers change too much in it."""
+HALVINGS, HALVINGS_BY_PATH = 8, 14
+"""Number of times that a piece of a step is halved where powers change too much in it, and where lines yield while
+their natural lengths change: the energy that they lose depends on the path."""
 TWIN_TOLERANCES = 10.0
 """Tolerances of a run over those of its twin: by less, both may take the same steps, which are changed by factors of
 up to 2."""
@@ -145,9 +146,8 @@ class StepObserver(Integrator):
         if not self.takes_massless:
             refuse_massless(system, self.method)
         if system.internal and not system.internal.follower and not self.takes_internal:
-            raise InputError(
-                f'[cable.viscous] needs method = "central-difference", "cvode" or "ida", not {self.method}'
-            )
+            others = 'method = "central-difference", "cvode" or "ida"'
+            raise InputError(f"{system.internal.title} needs {others}, not {self.method}")
         if system.constraints and not self.takes_links:
             raise InputError(f'[[link]] needs method = "ida": {self.method} does not hold lengths')
         if not self.takes_flows:
@@ -168,7 +168,10 @@ class StepObserver(Integrator):
         self.tolerances: dict[str, float] = {"m": self.atol_position, "m/s": self.atol_velocity}
         self.stats: dict[str, int] = dict(nfev=0, njev=0, nlu=0)
         self._events = event_rows(events)
-        self._book = SimpsonBalance(system, self.hold, max(fast, self.atol_velocity / rtol))
+        by_path = bool(system.net.factors and system.internal and system.internal.follower)
+        self._halvings = HALVINGS_BY_PATH if by_path else HALVINGS
+        even = {"uneven": min(rtol, UNEVEN)} if by_path else {}
+        self._book = SimpsonBalance(system, self.hold, max(fast, self.atol_velocity / rtol), **even)
         self._measurements = Measurements(probes, sums, self._book)
         self._limits = StepLimits(system, self.rotations, lambda t: self.state(t, *self.interpolated(t))[0])
         self._monitors = self._measurements, self._limits.passages
@@ -353,17 +356,20 @@ class StepObserver(Integrator):
     def _enter(self, course):
         """Begin at the state of a course."""
         system, x, v = self.system, course.x, course.v
-        self._reference = np.where(system.supported, x, 0.0)  # motion is written over it
+        self._refer(course)
         course.sample, course.least_energy = Sample(system, course.time, x, v), self._book.least_energy
         with self._report(course):
             self.begin(course.time, x.ravel()[system.free], v.ravel()[system.free])
 
+    def _refer(self, course):
+        """Take on the plastic strains of a course, and what is no unknown from there on."""
+        if self._yielding is not None:
+            self._yielding.take_on(course)
+        self._reference = np.where(self.system.supported, course.x, 0.0)  # motion is written over it
+
     def _take_step(self, course: ObservedState, end):
         """Take a step of the method, not beyond a corner of a table, nor further than a body can be passed."""
-        turned = False
-        if self._yielding is not None:
-            turned = self._yielding.take_on(course)
-            self._reference = np.where(self.system.supported, course.x, 0.0)
+        turned = self._yielding is not None and self._yielding.turned_back()
         stop = self._limits.stop(course.time, course.x, course.v, end)
         ahead = max(end, course.time + 1e-3 * end)  # from a corner it may be too near for a first step to be chosen
         if turned or self.restarts and course.nsteps and self._limits.at_corner(course.time):
@@ -394,13 +400,13 @@ class StepObserver(Integrator):
         self.hold(x, v)
         return Sample(self.system, t, x, v)
 
-    def _cover(self, course, end, halvings=HALVINGS):
+    def _cover(self, course, end, halved=0):
         """Look at a course in the middle between its time and ``end``, and at the end; leave it there."""
         piece = self._book.piece(course, end, self._sample_at)
-        if halvings and self._book.uneven(course, piece):
-            self._cover(course, piece.middle.time, halvings - 1)
+        if halved < self._halvings and self._book.uneven(course, piece):
+            self._cover(course, piece.middle.time, halved + 1)
             if not course.stopped:
-                self._cover(course, end, halvings - 1)
+                self._cover(course, end, halved + 1)
             return
         if len(course.events):
             stop = search(course.events, piece, self._measurements.value)
@@ -411,6 +417,8 @@ class StepObserver(Integrator):
         course.work, course.impulse, course.ledger.pushed[:] = np.split(piece.booked(piece.end.time), (-6, -3))
         course.sample = end = piece.end
         course.time, course.x, course.v = float(end.time), end.x, end.v
+        if self._yielding is not None:
+            self._refer(course)
         if self._limits.at_corner(course.time):  # what is stored there may be gone again at the row
             self._book.note_largest(course, self._book.energies(end, course.work, course.step))
         if piece.jump is not None and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well

@@ -1,7 +1,8 @@
-"""Plastic strains between the steps of a method that chooses them: steps end where a line that yields turns back.
+"""Plastic strains along the steps of a method that chooses them: steps end where a line that yields turns back.
 
-Within a step forces follow from the plastic strains at its start, which is exact until a line that yields turns back.
-So a step whose dense output turns back is cut at the first such moment, from which the method begins anew.
+Forces follow from plastic strains of any time before, which is exact until a line that yields turns back. So a step
+whose dense output turns back is cut at the first such moment, from which the method begins anew. The energy that is
+lost needs the natural length at which a line yields, so that plastic strains are taken on after each piece of a step.
 
 ``method`` has `state` and `interpolated` of `step_observer`, and names of the follower stand in
 `effects.base.InternalVariables`; `SAMPLES`, `ROUNDS` and `SMALL` are free.
@@ -35,8 +36,11 @@ class Yielding:
         self._lines = system.internal.follower
 
     def take_on(self, course):
-        """Write the plastic strains of a state to it; True if a line has turned back there."""
+        """Write the plastic strains of a state to it."""
         course.x[:] = self._system.taken_on(course.time, course.x)
+
+    def turned_back(self):
+        """True if a line has turned back at the end of the last step; it is told once."""
         turned, self._turned = self._turned, False
         return turned
 
