@@ -33,6 +33,7 @@ CODES = {
     "material": "Values of the cable that its material gives, which are typical ones.",
     "mesh-file": "Lines of a file that lie on each other, or nodes that coincide.",
     "method-changed": 'Method = "auto" goes on with another method.',
+    "monotone-loading": "± of statics is proven for lines that yield and do not turn back.",
     "moved-at-start": "Nodes that are elsewhere at the start than their places.",
     "never-touched": "A body with contact that nothing touches.",
     "no-error": "± of results is not known.",

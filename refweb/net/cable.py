@@ -222,7 +222,8 @@ class Cable(Table):
     yield_stress : float, optional
         Of the law "elastic-plastic": stress at which a line yields [Pa], > 0. It keeps its elongation: unloaded, it is
         slack below it. Statics takes plastic strains on at each load step, and what happens between two of them does
-        not show: ± are estimates for these load steps, no proven bounds.
+        not show. ± of tension, strain and energy are proven under dead loads, beside lines of convex laws, as long as
+        no line has turned back and all that yield harden; else they are estimates.
     hardening : float or list of list of float, optional
         Of the same law: the slope of the yield stress over plastic strain [Pa], ≥ 0 and 0 by default, which is a brake
         that pays out at constant force; or points of that curve, [[plastic strain, stress in Pa], ...], from a plastic

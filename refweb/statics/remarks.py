@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..findings import Finding
+from ..findings import NOTE, Finding
 from ..results.state import curve_remark, floor_remark, strain_remark
 from ..results.strength import strength_remark
 
@@ -116,7 +116,7 @@ def remarks_on(state, stats, utilisation, equilibrium):
     yield from floor_remark(net, float(state.stress.max()))
     yield from on_stability(state, equilibrium)
     yield from remark_on_open(state, equilibrium)
-    yield from _not_proven(state)
+    yield from _not_proven(state, equilibrium)
     if state.system.contact_shares is not None:
         from .contact_kinks import sharing_remark
 
@@ -152,7 +152,7 @@ def _other_rests(state):
             yield Finding("other-rests", text, "body")
 
 
-def _not_proven(state):
+def _not_proven(state, equilibrium):
     """A finding where lines that yield, one line, or a free body keeps the errors of dead loads from being proven."""
     net = state.system.net
     proven = net.law_is("convex") & ~(net.forming & (net.line_data.ea <= 0.0))
@@ -164,11 +164,14 @@ def _not_proven(state):
         text = f'thread "{net.threads[0].name}" runs through several nodes: ± are estimates, as the proven bound asks '
         yield Finding("not-proven", text + "for lines between two nodes", "thread")
     if net.law_is("plastic").any():
-        yield Finding(
-            "not-proven",
-            'lines can yield (law = "elastic-plastic"): ± are estimates for these load steps, no proven bounds, and a '
-            "line that yields and turns back between two of them is not seen; compare with more load_steps",
-        )
+        unseen = "a line that yields and turns back between two load steps is not seen; compare with more load_steps"
+        start = 'lines can yield (law = "elastic-plastic"): ±'
+        if equilibrium.duality_bound is not None:
+            text = f"{start} are proven for loading in which no line turns back, and none has so far; {unseen}"
+            yield Finding("monotone-loading", text, severity=NOTE)
+            return
+        why = "as the proven bound asks for dead loads, constant natural lengths, and lines that do not turn back and"
+        yield Finding("not-proven", f"{start} are estimates, {why} harden where they yield; {unseen}")
         return
     if not state.system.dead or proven.all() or not (proven.any() or net.forming.any()):
         return
@@ -193,7 +196,7 @@ def collapse_remark(state):
     """Find a net that has collapsed because its lines do not push.
 
     A net has collapsed if a node has moved farther than the size of the web, beyond the displacements of [[motion]],
-    while all strains are below 1. The size is the diagonal of the box around the web.
+    while all strains are below 1. The size is the diagonal of the box around the web, and what reels pay out.
     """
     system, net = state.system, state.system.net
     if net.law_is("bar").all() or net.forming.any():
@@ -202,7 +205,8 @@ def collapse_remark(state):
     driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(int)
     driven = driven[driven < net.nodes]
     far, size = float(moved.max() - moved[driven].max(initial=0.0)), float(np.linalg.norm(np.ptp(points, axis=0)))
-    if far > size and state.strain.max() < 1.0:
+    longer = system.natural_length(state.time) - net.line_data.natural_length
+    if far > size + np.maximum(longer, 0.0).sum() and state.strain.max() < 1.0:
         yield Finding(
             "collapse",
             f"the web collapses: node {int(moved.argmax())} moves by {moved.max():.4g} m, and the whole web measures "

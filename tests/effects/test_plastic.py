@@ -75,8 +75,7 @@ def test_ten_cycles_of_a_line_by_hand(law):
     )
     rest = refweb.run(static)
     np.testing.assert_allclose([step["results"]["lost"].value for step in rest.steps], exact[:, 2], rtol=1e-9)
-    assert [finding.code for finding in rest.findings] == ["not-proven"]
-    assert not any(result.proven for step in rest.steps for result in step["results"].values())
+    assert [finding.code for finding in rest.findings] == ["monotone-loading", "not-proven"]  # it turns back
 
 
 @pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])

@@ -139,10 +139,9 @@ class RuptureEnergy(Booked):
     needs = "[rupture]"
 
 
-class PlasticEnergy(Booked):
-    """Energy lost in lines that have yielded."""
+class PlasticEnergy(StrainEnergy):
+    """Energy lost in lines that have yielded: a proven error is that of what they have taken up, kept or lost."""
 
-    signed = False
     needs = 'law = "elastic-plastic"'
 
 

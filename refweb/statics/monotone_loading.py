@@ -1,0 +1,89 @@
+"""Lines that yield under loading in which none turns back: the system of their curve, whose errors are proven.
+
+As long as a line that yields is not let go, its tension is a function of strain that rises: E ε up to the yield stress,
+then along the slope of hardening over the elastic and the plastic strain together (Hencky's deformation theory). So the
+equilibrium is that of lines with a curve, whatever the path has been, and `refweb.statics.duality_bound` proves it. It
+has no bound where a line yields without hardening, since its tension then tells nothing of its strain.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects import plastic
+from ..effects.base import with_numbers
+from ..net.laws.curve import WIDTH, Table
+from .duality_bound import duality_bound
+from .floating import between_slack_lines
+
+CLOSE = 1e-8
+"""Plastic strain over the strain at yield by which a line counts as not let go: equilibria differ by rounding."""
+
+
+def add_bounds(system, state, factor=None):
+    """Add ``duality_bound`` and ``floating`` to an equilibrium, if its errors can be proven.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        The system at rest.
+    state : refweb.statics.equilibrium.Equilibrium
+        Its state, with the plastic strains of the load step before.
+    factor : refweb.system.factorization.Factor, optional
+        See `refweb.statics.duality_bound.duality_bound`.
+    """
+    if not system.convex:
+        if not system.net.law_is("plastic").any() or system.net.factors or _turned_back(system, state):
+            return
+        system = of_curves(system)
+        if not system.convex:
+            return
+    bound = duality_bound(system, state, factor)
+    if all(np.isfinite(errors).all() for errors in (bound.tension, bound.strain, bound.strain_energy)):
+        state.duality_bound = bound
+        state.floating = between_slack_lines(system, state)
+
+
+def _turned_back(system, state):
+    """Tell if a line has been let go: it has yielded more than its strain asks for."""
+    net, x = system.net, system.taken_on(state.step, state.x)
+    reached = plastic.plastic_strain(net, x)
+    asked = plastic.plastic_strain(net, with_numbers(net, x, np.zeros((len(net.cells), 0))))
+    margin = CLOSE * plastic.strain_at(net, reached.max(axis=1))
+    return bool((reached - asked > margin[:, None])[net.law_is("plastic")].any())
+
+
+def of_curves(system):
+    """The system whose lines have a curve in place of yield."""
+    net, changed = system.net, copy.copy(system)
+    yields, pieces = net.law_is("plastic"), pieces_of(net)
+    addresses = pieces.ctypes.data + pieces[0].nbytes * np.arange(len(pieces))
+    for name, values in zip(Table.columns, (addresses, pieces.shape[1], np.inf), strict=True):
+        known = name in net.line_data.dtype.names
+        net = replace(net, line_data=net.line_data.copy()) if known else net.with_column(name, 0.0)
+        net.line_data[name][:] = np.where(yields, values, net.line_data[name])
+    laws = tuple(Table if law.plastic else law for law in net.laws)
+    changed.net = replace(net, laws=laws, kept=(*net.kept, pieces))
+    changed.terms = [term for term in system.terms if term.name != "plastic"]
+    return changed
+
+
+def pieces_of(net):
+    """Pieces of the curve of each element as those of `refweb.net.laws.curve.Curve`, shape (elements, points, WIDTH).
+
+    The first is elastic, the others are those of the points of the yield stress.
+    """
+    numbers, points = net.line_data, plastic.corners(net)
+    ea = numbers.ea
+    strain, force = (np.array([numbers[f"plastic_{kind}_{i}"] for i in range(points)]) for kind in ("strain", "force"))
+    slope = np.diff(force, axis=0) / np.diff(strain, axis=0)
+    begin, share = strain + force / ea, force / ea
+    pieces = np.zeros((len(ea), points, WIDTH))
+    pieces[:, 0, 2] = 1.0
+    pieces[:, 1:, 0], pieces[:, 1:, 1], pieces[:, 1:, 2] = begin[:-1].T, share[:-1].T, (slope / (ea + slope)).T
+    energy = np.cumsum(0.5 * (share[1:] + share[:-1]) * np.diff(begin, axis=0), axis=0)
+    pieces[:, 1:, 5] = (0.5 * share[0] ** 2 + np.vstack([np.zeros(len(ea)), energy[:-1]])).T
+    return pieces
