@@ -200,6 +200,7 @@ COMMANDS = {
     "report": "refweb.commands.report",
     "view": "refweb.commands.view",
     "modes": "refweb.commands.modes",
+    "gradient": "refweb.commands.gradient",
     "cost": "refweb.commands.cost",
     "trust": "refweb.commands.trust",
     "sweep": "refweb.commands.sweep",

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from pyvista import MultiBlock
 
+    from .statics.gradients import Gradient
+
 
 class Solution(SolutionData):
     """A solved scene, as `refweb.run` returns it.
@@ -154,6 +156,48 @@ class Solution(SolutionData):
         from .pictures.pictures import picture
 
         return picture(self, frame, time, field, range, scale, view, out, labels)
+
+    def gradient(self, result: str, path: str, by: str | None = None) -> Gradient:
+        """Derivative of a result of statics by numbers of the scene, at the last load step.
+
+        One solution with the factorization of the equilibrium, its adjoint, gives the derivatives of a result by all
+        numbers. They are those of the law as it is: exact, and with ± from the residuals of the equilibrium and of the
+        adjoint, from rounding, and from differences where a number of the scene is changed. Where two lines or nodes
+        share the largest value, a derivative is that for a number that rises, and ``left`` that for one that falls.
+
+        Parameters
+        ----------
+        result : str
+            Name of a result: a tension, stress, strain, displacement, position, reaction, distance, mouth or energy.
+        path : str
+            Any number of the scene by its path, such as ``cable.area`` or ``load.0.force.2``. By line or group
+            ``cable.modulus``, ``cable.area``, ``cable.density``, ``cable.prestrain`` or ``natural_length`` of each: the
+            others, natural lengths among them, stay as they are. ``force``: the forces on each node; ``position``: the
+            positions of each support, with the natural lengths as they are.
+        by : {"line", "group", "node"}, optional
+            Entries of the gradient; by default one number of the scene, or nodes.
+
+        Returns
+        -------
+        refweb.statics.gradients.Gradient
+            Its ``value`` and ``error`` are arrays; ``float`` takes it where it is one number.
+
+        Raises
+        ------
+        InputError
+            For a result or path that there is none of, dynamics, bodies that are free to move, lines that have yielded,
+            a result that depends on parts without stiffness, and a kink: a line that is neither slack nor taut, or a
+            size that is 0.
+
+        Examples
+        --------
+        >>> solution.gradient("max_stress", "cable.area")  # doctest: +SKIP
+        """
+        from .statics.gradients import Gradients
+
+        if "_gradients" not in self.__dict__:
+            self._gradients = Gradients(self)
+        return self._gradients.gradient(result, path, by)
 
     def to_pandas(self, what: str = "history") -> DataFrame:
         """Results or history as a table of pandas, which is to be installed.

@@ -129,6 +129,9 @@ MIRRORS = {
     "statics/simulation": "statics/test_statics.py results/test_frames.py",
     "statics/duality_bound": "net/test_curves.py statics/test_reused_factorization.py statics/test_statics.py "
     "dynamics/test_accuracy.py",
+    "statics/adjoint": "statics/test_gradients.py",
+    "statics/responses": "statics/test_gradients.py",
+    "statics/gradients": "statics/test_gradients.py",
     "statics/monotone_loading": "statics/test_monotone_loading.py",
     "statics": "statics/test_reused_factorization.py statics/test_statics.py dynamics/test_accuracy.py",
     "dynamics/accuracy_loop": "dynamics/test_budget.py test_faults.py dynamics/test_accuracy.py",
@@ -352,6 +355,18 @@ MUTANTS = [
         "return bool((reached - asked > margin[:, None])",
         "return bool((0.0 > margin[:, None])",
     ),
+    Mutant("statics/adjoint", "((1.0 + self.strain) * self.tangent * along)", "(self.tangent * along)"),
+    Mutant(
+        "statics/adjoint", "self.stretch(rows), self.net.line_data.ea", "self.stretch(-rows), self.net.line_data.ea"
+    ),
+    Mutant(
+        "statics/responses",
+        "reacting[group] = np.where(linear.system.supported[group], along, 0.0)",
+        "reacting[group] = 0.0",
+    ),
+    Mutant("statics/responses", "explicit.area[cell] = -sign * tension", "explicit.area[cell] = 0.0 * tension"),
+    Mutant("statics/gradients", "(rows - response.reacting).plus(response.explicit)", "(rows - response.reacting)"),
+    Mutant("statics/gradients", "(near & felt).any(axis=1) & kinked", "near.any(axis=1) & kinked"),
     Mutant("statics/monotone_loading", "(slope / (ea + slope)).T", "(slope / ea).T"),
     Mutant("net/laws/curve", "np.ones(len(begin)), 0.5 * begin**2", "np.ones(len(begin)), begin**2"),
     Mutant("net/laws/curve", "if curve.first > 0.0:", "if curve.first < 0.0:"),

@@ -187,6 +187,7 @@ def test_one_table_names_the_effects():
     assert found.keys() <= {
         "build",
         "results.state",
+        "statics.adjoint",
         "statics.interior_point",
         "statics.bars",
         "statics.floating",

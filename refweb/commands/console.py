@@ -356,11 +356,57 @@ def print_sweep(summary):
     _box(f"{summary['title']}: {summary['status']}", rows)
 
 
+def print_gradients(solution, result, gradients, refused, limit):
+    """Print the box of gradients of a result, at most so many entries of each; ``refused`` are texts."""
+    computed, numbers = solution.results[result], [gradient for gradient in gradients if not gradient.by]
+    idle = [gradient.path for gradient in numbers if not float(gradient) and gradient.left is None]
+    numbers = [gradient for gradient in numbers if gradient.path not in idle]
+    rows: list = [("by", _of_numbers(numbers, computed.unit))] if numbers else []
+    rows += [("no effect", ", ".join(idle))] if idle else []
+    for gradient in (gradient for gradient in gradients if gradient.by):
+        rows.append((gradient.path, _entries(gradient, limit)))
+        if (more := len(gradient.names) - limit) > 0:
+            rows.append(("", f"{more} more with smaller ones: --json prints all"))
+    rows += [("left out", text) for text in refused]
+    _box(
+        f"{solution.scene.title}: gradient of {result} = {readable(computed.value, computed.error, computed.unit)}",
+        rows,
+    )
+
+
+def _of_numbers(gradients, unit):
+    """Gradients by numbers of the scene, each with the change of the result by a hundredth of the number."""
+    grid = _headed(["number of the scene", "", "gradient", "±", f"+ 1 % changes [{unit}]"])
+    for gradient in gradients:
+        value = float(gradient)
+        left = "" if gradient.left is None else f", {gradient.left[0]:.6g} where it falls"
+        cells = [gradient.path, f"{gradient.number:g}", f"{value:.6g}{left}", f"{gradient.error[0]:.1e}"]
+        grid.add_row(*map(Text, [*cells, f"{0.01 * gradient.number * value:.3g}"]))
+    return grid
+
+
+def _entries(gradient, limit):
+    """The largest entries of a gradient by line or group."""
+    falls = [] if gradient.left is None else ["where it falls"]
+    grid = _headed([gradient.by, f"gradient [{gradient.unit}]", "±", *falls])
+    sides = [gradient.value, *([] if gradient.left is None else [gradient.left])]
+    for at in sorted(range(len(gradient.names)), key=lambda at: -max(abs(side[at]) for side in sides))[:limit]:
+        cells = [str(gradient.names[at]), f"{gradient.value[at]:.6g}", f"{gradient.error[at]:.1e}"]
+        grid.add_row(*map(Text, cells if gradient.left is None else [*cells, f"{gradient.left[at]:.6g}"]))
+    return grid
+
+
+def _headed(names):
+    """An empty grid below names of columns."""
+    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
+    for number, name in enumerate(names):
+        grid.add_column(Text(name), justify="right" if number else "left")
+    return grid
+
+
 def _columns(rows):
     """Rows below names of columns, as a grid."""
-    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for number, name in enumerate(rows.columns):
-        grid.add_column(Text(name), justify="right" if number else "left")
+    grid = _headed(rows.columns)
     for row in rows.rows:
         grid.add_row(*map(Text, row))
     return grid

@@ -49,6 +49,16 @@ def with_largest(record, field):
     return record._replace(frame=frame)
 
 
+def with_values(record, field, values):
+    """A record whose frames have one more field, of values of each line or of each path, shape (paths,)."""
+
+    def frame(number):
+        plain = record.frame(number)
+        return plain._replace(fields={**plain.fields, field: values})
+
+    return record._replace(frame=frame)
+
+
 def _values_of(record, field):
     """Number of each readable frame, and values of a field in it."""
     shape = None

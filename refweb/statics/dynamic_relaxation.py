@@ -175,7 +175,13 @@ class Relaxation:
         if system.dead and not system.convex:
             stats["above_lowest"] = None if (per_cell.tension < 0.0).any() else 0.0
         state = Equilibrium(t, x, per_cell.tension.copy(), f, stats)
-        if system.convex or system.net.law_is("plastic").any():
+        if system.convex:
+            from .duality_bound import duality_bound
+            from .floating import between_slack_lines
+
+            state.duality_bound = duality_bound(system, state)
+            state.floating = between_slack_lines(system, state)
+        elif system.net.law_is("plastic").any():
             from .monotone_loading import add_bounds
 
             add_bounds(system, state)

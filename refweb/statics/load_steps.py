@@ -69,7 +69,13 @@ def solve(system, load_steps, progress=None):
             solver, state = push.newton, push.equilibrium(t, x, error)
         if system.net.forming.any() or system.net.law_is("plastic").any():
             _refuse_far(system, t, state)
-        if system.convex or system.net.law_is("plastic").any():
+        if system.convex:
+            from .duality_bound import duality_bound
+            from .floating import between_slack_lines
+
+            state.duality_bound = duality_bound(system, state, newton.factor)
+            state.floating = between_slack_lines(system, state)
+        elif system.net.law_is("plastic").any():
             from .monotone_loading import add_bounds
 
             add_bounds(system, state, newton.factor)

@@ -29,18 +29,14 @@ def add_bounds(system, state, factor=None):
     Parameters
     ----------
     system : refweb.system.system.System
-        The system at rest.
+        The system at rest, with lines that yield.
     state : refweb.statics.equilibrium.Equilibrium
         Its state, with the plastic strains of the load step before.
     factor : refweb.system.factorization.Factor, optional
         See `refweb.statics.duality_bound.duality_bound`.
     """
-    if not system.convex:
-        if not system.net.law_is("plastic").any() or system.net.factors or _turned_back(system, state):
-            return
-        system = of_curves(system)
-        if not system.convex:
-            return
+    if system.net.factors or _turned_back(system, state) or not (system := of_curves(system)).convex:
+        return
     bound = duality_bound(system, state, factor)
     if all(np.isfinite(errors).all() for errors in (bound.tension, bound.strain, bound.strain_energy)):
         state.duality_bound = bound

@@ -370,7 +370,7 @@ class Newton:
                 state.floating = null.floating(system, state.x)
             if state.floating is not None:
                 solve = null.solve
-        forces = self._disturbing(state)
+        forces = self.disturbing(state)
         deviations = [solve(force) for force in forces]
         return None if any(p is None for p in deviations) else np.array([system.rows_of(p) for p in deviations])
 
@@ -378,7 +378,7 @@ class Newton:
         """The same with the last factorization, if the duality bound proves that no part floats; else None."""
         if state.duality_bound is None or state.floating is not None or not self._can_use_again(state.tension):
             return None
-        forces = np.column_stack(self._disturbing(state))
+        forces = np.column_stack(self.disturbing(state))
         deviation = self._by_factor_at_hand(self._matrix(state.step, state.x, self._tiny, False), forces, ROUGH)
         if not deviation.enough:
             return None
@@ -386,7 +386,7 @@ class Newton:
         deviations.reshape(len(deviations), -1)[:, self.system.free] = deviation.y.T
         return deviations
 
-    def _disturbing(self, state):
+    def disturbing(self, state):
         """Forces on the unknowns [N]: the residual, and three times the rounding errors with random signs."""
         system, net = self.system, self.system.net
         stiffness = net.axial / system.natural_length(state.step)

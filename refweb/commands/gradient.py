@@ -1,0 +1,92 @@
+"""Compute how results of statics change with the numbers of a scene: their gradients, by line as a picture."""
+
+from ..errors import InputError
+from .arguments import add_json, add_scene, add_values, print_json, scene_of
+
+SHOWN = 20
+"""Largest number of lines in a table: those of the largest derivatives."""
+
+
+def add_arguments(parser):
+    """The scene, the result, and by what it is differentiated."""
+    add_scene(parser)
+    add_values(parser)
+    parser.add_argument("--of", metavar="RESULT", help="name of a result (default: the first of the scene)")
+    text = "a number of the scene, as cable.area or load.0.force.2; repeatable (default: all, by line cable.area)"
+    parser.add_argument("--path", dest="paths", action="append", metavar="PATH", help=text)
+    text = "by each line or group, of cable.modulus, cable.area, cable.density, cable.prestrain or natural_length"
+    parser.add_argument("--by", choices=["line", "group"], help=text)
+    text = "a picture of the web to write, with the lines coloured by the gradient by line of the first PATH"
+    parser.add_argument("--picture", metavar="FILE", help=text)
+    add_json(parser)
+
+
+def run(arguments):
+    """Solve the scene, and print or draw the gradients."""
+    from ..results.progress import followed
+    from ..runner import run
+    from ..statics.gradients import numbers_of
+
+    scene = scene_of(arguments)
+    names = [o.name for o in scene.observables]
+    result = names[0] if arguments.of is None else arguments.of
+    paths = arguments.paths or (["cable.area"] if arguments.by else numbers_of(scene.to_dict()))
+    if arguments.picture:
+        from ..pictures.pictures import target
+
+        target(arguments.picture)
+    with followed(not arguments.json) as tell:
+        solution = run(scene, progress=tell)
+    gradients, refused = [], []
+    for path in paths:
+        try:
+            gradients.append(solution.gradient(result, path, arguments.by))
+        except InputError as error:
+            if arguments.paths or arguments.by or result not in names or str(error).startswith("gradient"):
+                raise
+            refused.append(f"{path}: {error}")
+    if arguments.picture:
+        _draw(solution, result, arguments.paths[0] if arguments.paths else "cable.area", arguments.picture)
+    if arguments.json:
+        print_json([_plain(gradient) for gradient in gradients])
+        return
+    from .console import print_gradients
+
+    print_gradients(solution, result, gradients, refused, SHOWN)
+    if arguments.picture:
+        print(arguments.picture)
+
+
+def _draw(solution, result, path, out):
+    """Draw the web with its lines coloured by the gradient."""
+    import pathlib
+
+    import numpy as np
+
+    from ..pictures.over_frames import with_values
+    from ..pictures.pictures import drawn, record_of
+    from ..results.files import write_atomically
+
+    values, net, record = solution.gradient(result, path, "line").value, solution.state.system.net, record_of(solution)
+    count = len(record.frame(max(record.times)).paths)
+    record = with_values(record, "gradient", values if count == len(values) else values[net.line])
+    title = f"{record.title}: gradient of {result} by {path} of each line [{solution.results[result].unit}, SI]"
+    record = record._replace(summary={**record.summary, "scene": title})
+    limits = [float(values.min()), float(values.max())] if np.ptp(values) > 0.0 else None
+    page = drawn(record, -1, field="gradient", range=limits)
+    write_atomically(pathlib.Path(out), lambda name: page.savefig(name, dpi="figure"))
+
+
+def _plain(gradient):
+    """A gradient as a dict of plain values."""
+    left = None if gradient.left is None else gradient.left.tolist()
+    return {
+        "result": gradient.result,
+        "path": gradient.path,
+        "by": gradient.by,
+        "names": list(gradient.names),
+        "value": gradient.value.tolist(),
+        "error": gradient.error.tolist(),
+        "left": left,
+        "unit": gradient.unit,
+    }
