@@ -185,9 +185,9 @@ class Solution(SolutionData):
         Raises
         ------
         InputError
-            For a result or path that there is none of, dynamics, bodies that are free to move, lines that have yielded,
-            a result that depends on parts without stiffness, and a kink: a line that is neither slack nor taut, or a
-            size that is 0.
+            For a result or path that there is none of, dynamics, lines that have yielded and turned back, a result that
+            depends on parts without stiffness, and a kink: a line that is neither slack nor taut, or between yielding
+            and not, or a size that is 0.
 
         Examples
         --------

@@ -192,6 +192,7 @@ def test_one_table_names_the_effects():
         "statics.bars",
         "statics.floating",
         "statics.lowest",
+        "statics.monotone_loading",
         "system.system",
     }
     assert all(names == {"effects.elasticity"} for names in found.values())

@@ -44,7 +44,8 @@ def run(arguments):
         except InputError as error:
             if arguments.paths or arguments.by or result not in names or str(error).startswith("gradient"):
                 raise
-            refused.append(f"{path}: {error}")
+            if not str(error).startswith(f"{path} = 0 cannot be changed"):  # as what has no meaning in statics
+                refused.append(f"{path}: {error}")
     if arguments.picture:
         _draw(solution, result, arguments.paths[0] if arguments.paths else "cable.area", arguments.picture)
     if arguments.json:

@@ -138,6 +138,9 @@ class Adjoint:
         InputError
             Where the result depends on parts that move without stiffness.
         """
+        slope = slope.copy()
+        if self.system.carriers:
+            self.system.carriers.add_forces_to_bodies(self.x, slope)
         b = slope.ravel()[self.system.free]
         solved = self._refined(b)
         if solved is None and self._shared:  # a line has become slack since then
@@ -147,7 +150,14 @@ class Adjoint:
             raise InputError(
                 "it depends on parts of the web that move without stiffness: hold them by supports, loads or lines"
             )
-        return tuple(map(self.system.rows_of, solved))
+        return tuple(map(self._rows_of, solved))
+
+    def _rows_of(self, p):
+        """Displacement of all rows by that of the unknowns, to first order, nodes that bodies carry included."""
+        rows = self.system.rows_of(p)
+        if self.system.carriers:
+            self.system.carriers.add_moves(self.x, rows[None])
+        return rows
 
     def _refined(self, b):
         """(Solution of Kᵀ λ = b, its last correction), None where the factorization does not lead to one."""
@@ -165,6 +175,8 @@ class Adjoint:
 
     def pulled(self, rows):
         """Kᵀ times a displacement of all rows, supports included, shape (rows, 3)."""
+        if self.system.angles and self.system.contact:
+            raise InputError("forces of supports are not taken beside contact of bodies that turn")
         system, total = self.system, np.zeros_like(rows)
         for term in (term for term in system.terms if term.tangent.stiffness is not None):
             size = 3 * term.cells.shape[1]
@@ -181,7 +193,7 @@ class Adjoint:
         force, per_cell = self.system.forces(self.t, self.x)
         state = Equilibrium(self.t, self.x, per_cell.tension, force)
         moves = [self.newton.factor.solve(disturbance) for disturbance in self.newton.disturbing(state)[:2]]
-        return np.array([self.system.rows_of(p) for p in moves])
+        return np.array([self._rows_of(p) for p in moves])
 
     @cached_property
     def weight(self):

@@ -34,7 +34,7 @@ BY_LINE = {
 """Numbers that lines have each, with their units; the others of a line stay as they are."""
 BY_NODE = {"force": "N", "position": "m"}
 """Vectors of nodes: a force on it, and the position of a support, with the natural lengths as they are."""
-KNOWN = ("elasticity", "plastic", "load", "gravity", "frame", "orbit", "pressure", "thrust", "contact", "thread")
+KNOWN = ("elasticity", "load", "gravity", "frame", "orbit", "pressure", "thrust", "contact", "thread")
 """Terms that do not depend on numbers of lines but as `refweb.statics.adjoint` knows."""
 MOVED = 1e-7
 """Displacement by which a possible error of x is enlarged for its effect, over the shortest natural length."""
@@ -105,7 +105,7 @@ class Gradients:
     Raises
     ------
     InputError
-        For a solution of dynamics, bodies that are free to move, and lines that have yielded.
+        For a solution of dynamics, and lines that have yielded and turned back.
     """
 
     def __init__(self, solution):
@@ -113,13 +113,26 @@ class Gradients:
         if state is None or not state.system.net.quasi_static:
             raise InputError('gradients are those of equilibria: [solve] kind = "static", with a solution')
         system = at_rest(state.system)
-        if system.carriers or system.resting:
-            raise InputError("gradients take no bodies that are free to move, or that carry nodes: fix them")
-        if state.plastic_strain is not None and state.plastic_strain.any():
-            line = int(system.net.line[int(state.plastic_strain.argmax())])
-            raise InputError(f"gradients take no line that has yielded, as line {line} has: it depends on the path")
-        self.state = State(system, state.time, state.x)
+        self._yields = state.plastic_strain is not None
+        self._yielded = self._yields and state.plastic_strain.any()
+        if self._yields:
+            from .monotone_loading import turned_back
+
+            if turned_back(system, state.time, state.x):
+                raise InputError("gradients take no line that has yielded and turned back: it depends on the path")
+        self.state = State(self._at_once(system), state.time, state.x)
         self._results, self._observed = {}, {o.name: o for o in self.scene.observables}
+
+    def _at_once(self, system):
+        """The system with curves in place of yield, of lines that have not turned back; itself where none yields."""
+        if not self._yields:
+            return system
+        from .monotone_loading import of_curves
+
+        curved = of_curves(system)
+        for known in ("pattern", "unsupported_parts"):
+            curved.__dict__.pop(known, None)
+        return curved
 
     @cached_property
     def linear(self):
@@ -134,7 +147,8 @@ class Gradients:
         for factor, deviation in zip(SHARES, linear.deviations, strict=True):
             size = np.abs(deviation).max()
             if size > 0.0:
-                x = linear.x + scale / size * deviation
+                step = np.where(linear.system.supported, 0.0, scale / size * deviation)
+                x = linear.system.moved(linear.x, step)
                 moved.append((Adjoint(linear.system, linear.t, x, linear.newton), factor * size / scale))
         return moved
 
@@ -147,6 +161,8 @@ class Gradients:
             raise InputError(f'result "{short(result)}" is none of this scene, {nearest(result, self._observed)}')
         if result not in self._results:
             observe = self._observed[result]
+            if self._yielded and observe.quantity in ("strain_energy", "plastic_energy"):
+                raise InputError(f'gradient of "{result}": of lines that yield observe the total_energy')
             try:
                 self._results[result] = [self._solved(item) for item in responses(observe, self.linear)]
             except InputError as error:
@@ -166,18 +182,23 @@ class Gradients:
     def _refuse_kinks(self, rows):
         """Refuse lines that are neither slack nor taut, and that the result depends on."""
         linear, net = self.linear, self.linear.net
-        kinked = net.law_is("cone") | net.law_is("convex") & ~net.forming | net.law_is("plastic")
-        kinked &= net.line_data.smoothing == 0.0
+        kinked = (net.law_is("convex") & ~net.forming)[:, None]
+        strains = net.slackness[:, None]
+        if self._yields:
+            from .monotone_loading import corners_of
+
+            strains = np.hstack([strains, corners_of(self.state.system.net)])
         error = np.abs([linear.lines.stretch(move) for move in linear.deviations]).sum(axis=0)
         error = error / (net.weights * net.natural_length[:, None])
         along = np.abs(linear.lines.stretch(rows))
         felt = along > FELT * along.max(initial=0.0)
-        near = np.abs(linear.lines.strain - net.slackness[:, None]) <= KINK + 3.0 * error
-        for element in np.flatnonzero((near & felt).any(axis=1) & kinked)[:1]:
-            raise InputError(
-                f"line {net.line[element]} is neither slack nor taut, where the result has a kink: give it some "
-                'prestrain, or law = "smooth"'
-            )
+        for number, strain in enumerate(strains.T):
+            near = np.abs(linear.lines.strain - strain[:, None]) <= KINK + 3.0 * error
+            for element in np.flatnonzero((near & felt & kinked).any(axis=1))[:1]:
+                where = "between yielding and not" if number else "neither slack nor taut"
+                raise InputError(
+                    f"line {net.line[element]} is {where}, where the result has a kink: change loads or prestrain"
+                )
 
     def gradient(self, result, path, by=None):
         """The `Gradient` of a result, see `refweb.Solution.gradient`."""
@@ -233,11 +254,14 @@ class Gradients:
                 raise InputError(f"by line and group [{term.name}] is not taken: name one number of the scene")
         if net.flows:
             raise InputError('by line and group [[reel]] mass = "follows" is not taken: name one number of the scene')
+        if path != "cable.modulus" and system.carried.any() and self.linear.weight:
+            raise InputError("by line and group mass beside [[attach]] is not taken: name one number of the scene")
         for element in np.flatnonzero(net.forming)[:1] if path != "cable.density" else ():
             raise InputError(f"{path} of line {net.line[element]} has no meaning, whose law is one of form finding")
         curves = "curve" in (net.line_data.dtype.names or ())
         for element in np.flatnonzero(net.line_data["curve"] > 0.0)[:1] if curves and path == "cable.modulus" else ():
-            raise InputError(f"cable.modulus of line {net.line[element]} has no meaning, whose law is a curve")
+            law = "yields: name one number of the scene" if self._yields else "has a curve"
+            raise InputError(f"cable.modulus by line and group is not taken: line {net.line[element]} {law}")
 
     def _is_of_all_lines(self, path):
         """Tell if a number of the cable is that of each line, and nothing else follows from it."""
@@ -366,19 +390,19 @@ class Gradients:
         from ..scene import Scene
 
         scene = Scene.from_dict(with_value(self._given, path, float(value)), self.scene.folder)
-        system, t = at_rest(scene.build()), self.state.time
+        system, t = self._at_once(at_rest(scene.build())), self.state.time
         if system.rows != self.state.system.rows or not np.array_equal(system.free, self.state.system.free):
             raise InputError("it changes the net itself, and has no gradient")
-        forces, states = {}, {}
+        forces, states, free = {}, {}, system.free
         for linear, *_ in solved[0]:
             x = linear.x.copy()
             system.drive(t, x)
             states[linear] = State(system, t, x)
-            forces[linear] = system.force(t, x)
+            forces[linear] = system.force(t, x).ravel()[free]
         return np.array(
             [
                 [
-                    (0.0 if response is None else response.value(states[linear])) + (rows * forces[linear]).sum()
+                    (0.0 if response is None else response.value(states[linear])) + rows.ravel()[free] @ forces[linear]
                     for linear, response, rows, _ in items
                 ]
                 for items in solved

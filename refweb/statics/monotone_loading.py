@@ -15,6 +15,7 @@ import numpy as np
 
 from ..effects import plastic
 from ..effects.base import with_numbers
+from ..effects.elasticity import Elasticity
 from ..net.laws.curve import WIDTH, Table
 from .duality_bound import duality_bound
 from .floating import between_slack_lines
@@ -35,7 +36,7 @@ def add_bounds(system, state, factor=None):
     factor : refweb.system.factorization.Factor, optional
         See `refweb.statics.duality_bound.duality_bound`.
     """
-    if system.net.factors or _turned_back(system, state) or not (system := of_curves(system)).convex:
+    if system.net.factors or turned_back(system, state.step, state.x) or not (system := of_curves(system)).convex:
         return
     bound = duality_bound(system, state, factor)
     if all(np.isfinite(errors).all() for errors in (bound.tension, bound.strain, bound.strain_energy)):
@@ -43,9 +44,9 @@ def add_bounds(system, state, factor=None):
         state.floating = between_slack_lines(system, state)
 
 
-def _turned_back(system, state):
+def turned_back(system, t, x):
     """Tell if a line has been let go: it has yielded more than its strain asks for."""
-    net, x = system.net, system.taken_on(state.step, state.x)
+    net, x = system.at(t).net, system.taken_on(t, x)
     reached = plastic.plastic_strain(net, x)
     asked = plastic.plastic_strain(net, with_numbers(net, x, np.zeros((len(net.cells), 0))))
     margin = CLOSE * plastic.strain_at(net, reached.max(axis=1))
@@ -62,8 +63,9 @@ def of_curves(system):
         net = replace(net, line_data=net.line_data.copy()) if known else net.with_column(name, 0.0)
         net.line_data[name][:] = np.where(yields, values, net.line_data[name])
     laws = tuple(Table if law.plastic else law for law in net.laws)
-    changed.net = replace(net, laws=laws, kept=(*net.kept, pieces))
-    changed.terms = [term for term in system.terms if term.name != "plastic"]
+    changed.net = net = replace(net, laws=laws, kept=(*net.kept, pieces))
+    rest = [term for term in system.terms if term.name != "plastic" and term is not system.lines]
+    changed.terms = [Elasticity().on(net), *rest]
     return changed
 
 
@@ -83,3 +85,10 @@ def pieces_of(net):
     energy = np.cumsum(0.5 * (share[1:] + share[:-1]) * np.diff(begin, axis=0), axis=0)
     pieces[:, 1:, 5] = (0.5 * share[0] ** 2 + np.vstack([np.zeros(len(ea)), energy[:-1]])).T
     return pieces
+
+
+def corners_of(net):
+    """Strains of the corners of the curve of each element, very large where it does not yield, (elements, points)."""
+    numbers = net.line_data
+    names = [(f"plastic_strain_{i}", f"plastic_force_{i}") for i in range(plastic.corners(net))]
+    return np.array([numbers[strain] + numbers[force] / numbers.ea for strain, force in names]).T

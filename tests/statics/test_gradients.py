@@ -84,6 +84,22 @@ def test_taylor_of_laws(law):
         check_slopes(remainders(net(law, (LOAD, weight)), path, NAMES))
 
 
+YIELDS = dict(yield_stress=1e5, hardening=2e6)
+
+
+def test_taylor_of_lines_that_yield():
+    """Some of them beyond their yield stress: by yield stress, hardening, modulus, area by group, and a load."""
+    scene = net("elastic-plastic", **YIELDS)
+    assert 0 < np.count_nonzero(refweb.run(scene).state.plastic_strain) < len(LINES)
+    names = [name for name in NAMES if name != "stored"]
+    for path in ("cable.yield_stress", "cable.hardening", "cable.modulus", "cable.groups.tie.area", "load.0.force.2"):
+        check_slopes(remainders(scene, path, names))
+    solution = refweb.run(scene)
+    by_group = solution.gradient("tension", "cable.area", "group")
+    tie = solution.gradient("tension", "cable.groups.tie.area")
+    assert abs(by_group.value[by_group.names.index("tie")] - float(tie)) <= by_group.error.sum() + 3.0 * tie.error[0]
+
+
 EFFECTS = {
     "frame": ([refweb.Frame(angular_velocity=(0.0, 0.2, 1.5))], "frame.angular_velocity.2"),
     "orbit": ([refweb.Orbit(mean_motion=2.0)], "orbit.mean_motion"),
@@ -110,6 +126,38 @@ def test_taylor_of_effects(name):
     effects, path = EFFECTS[name]
     for other in (path, "cable.area"):
         check_slopes(remainders(net(effects=(LOAD, *effects)), other, ["tension", "moved", "reaction", "stored"]))
+
+
+def test_bodies_that_are_free():
+    """A platform that hangs on ropes: by its mass, its place, and area and modulus of the ropes; by line as well."""
+    scene = refweb.Scene.load("platform-on-ropes")
+    names = ["height", "largest"]
+    for path in ("body.0.mass", "body.0.position.0", "gravity.acceleration.1", "cable.area"):
+        check_slopes(remainders(scene, path, names))
+    solution = refweb.run(scene)
+    for name in names:
+        by_line, whole = (solution.gradient(name, "cable.modulus", by) for by in ("line", None))
+        assert abs(by_line.value.sum() - float(whole)) <= by_line.error.sum() + 3.0 * whole.error[0]
+    with pytest.raises(InputError, match=r"mass beside \[\[attach\]\] is not taken"):
+        solution.gradient("height", "cable.area", "line")
+
+
+def test_a_ball_that_lies_in_a_net():
+    """Free, in contact with some lines: its height by its mass, by the modulus and by the stiffness of contact."""
+    scene = refweb.Scene(
+        web=refweb.Window(mesh="square", rows=3, columns=3, side=0.1),
+        cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-6, density=500.0, prestrain=0.02),
+        effects=[
+            refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
+            refweb.Body(name="ball", shape="sphere", radius=0.08, mass=0.05, position=(0.011, 0.007, 0.08)),
+            refweb.Contact(stiffness=1e3),
+        ],
+        observe=[refweb.Observe(name="height", quantity="position", body="ball", component="z")],
+        solve=refweb.Static(),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+    for path in ("body.0.mass", "cable.modulus", "contact.stiffness"):
+        check_slopes(remainders(scene, path, ["height"], (0.004, 0.002)))
 
 
 # Closed forms
@@ -287,6 +335,22 @@ def test_slack_parts():
 # Kinks and refusals
 
 
+def test_a_line_between_yielding_and_not_is_named():
+    """A load to the yield force of two lines in a row: where they begin to yield the end moves by another slope."""
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0])
+    cable = refweb.Cable(law="elastic-plastic", modulus=1e6, area=1e-5, density=0.0, yield_stress=1e5, hardening=1e5)
+    observe = [refweb.Observe(name="u", quantity="displacement", node=1, component="x")]
+    for force, slope in ((0.9, 1.0 / 10.0), (1.0, None), (1.1, 1.0 / 10.0 + 1.0)):
+        load = refweb.Load(node=1, force=(force, 0.0, 0.0))
+        scene = refweb.Scene(web=web, cable=cable, effects=[load], observe=observe, solve=refweb.Static())
+        solution = refweb.run(scene)
+        if slope is None:
+            with pytest.raises(InputError, match="line 0 is between yielding and not, where the result has a kink"):
+                solution.gradient("u", "load.0.force.0")
+        else:
+            np.testing.assert_allclose(solution.gradient("u", "load.0.force.0").value, slope, rtol=1e-9)
+
+
 def test_kinks_are_named():
     """A line that is neither slack nor taut; the size of a displacement that is 0; not where the result is another."""
     web = refweb.Inline(
@@ -328,8 +392,10 @@ def test_refusals(tmp_path):
     moving = refweb.run(net().replace(solve=refweb.Dynamic(duration=1e-4), observe=OBSERVE[:1]))
     with pytest.raises(InputError, match="gradients are those of equilibria"):
         moving.gradient("tension", "cable.area")
-    yields = refweb.run(net("elastic-plastic", yield_stress=1e5, hardening=1e6))
-    with pytest.raises(InputError, match="gradients take no line that has yielded, as line"):
+    loads = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)]
+    back = net("elastic-plastic", [refweb.Load(node=5, force=(1.0, 0.5, -4.0), factor=loads)], **YIELDS)
+    yields = refweb.run(back.replace(solve=refweb.Static(load_steps=[1.0, 2.0])))
+    with pytest.raises(InputError, match="gradients take no line that has yielded and turned back"):
         yields.gradient("tension", "cable.area")
     share = refweb.run(net().replace(observe=[refweb.Observe(name="slack", quantity="slack_fraction")]))
     with pytest.raises(InputError, match='quantity = "slack_fraction" has no gradient'):
