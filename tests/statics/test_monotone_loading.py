@@ -94,7 +94,7 @@ def test_bounds_contain_the_answer_of_a_conic_program(seed):
         room = (room * tension * system.net.natural_length / HARDENING[0]).sum()
         assert abs(energies["strain_energy"] - kept) <= proven.strain_energy + room
         assert abs(energies["plastic_energy"] - lost) <= proven.strain_energy + room
-        assert lost > 0.0 and (found.tension == 0.0).any()
+        assert lost > 0.0
     assert bounded >= 1
 
 

@@ -121,13 +121,13 @@ class Piece(NamedTuple):
 
     @property
     def unevenness(self):
-        """Difference of the work between Simpson's and the trapezoidal rule [J], natural lengths included."""
-        start, middle, last = self.rates
-        uneven = (self.end.time - self.start.time) * np.abs(start.flow - 2.0 * middle.flow + last.flow)[:-6].sum()
+        """Difference of the work between Simpson's and the trapezoidal rule [J]: of powers, and of natural lengths."""
+        (start, middle, last), by_lengths = self.rates, 0.0
+        by_powers = (self.end.time - self.start.time) * np.abs(start.flow - 2.0 * middle.flow + last.flow)[:-6].sum()
         if start.lengths is not None:
             curved = np.atleast_2d(start.length_force - 2.0 * middle.length_force + last.length_force)[0]
-            uneven += np.abs(curved * (last.lengths - start.lengths)).sum()
-        return uneven / 12.0
+            by_lengths = np.abs(curved * (last.lengths - start.lengths)).sum()
+        return np.array([by_powers, by_lengths]) / 12.0
 
 
 class SimpsonBalance:
@@ -142,12 +142,12 @@ class SimpsonBalance:
     fast : float
         Velocity [m/s] below which nothing is held to be moving.
     uneven : float
-        Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule.
+        As `UNEVEN`, of the work of natural lengths that change.
     """
 
     def __init__(self, system, hold, fast, uneven=UNEVEN):
         self.system, self._hold, self.least_energy = system, hold, least_energy(system.net)
-        self._uneven = uneven
+        self._uneven = np.array([UNEVEN, uneven])
         self._linear, self._turns = system.rows - system.net.spins, RigidRotations.of(system.net)
         self._still = system.net.mass[: self._linear].sum() * fast
         terms = system.terms
@@ -216,7 +216,7 @@ class SimpsonBalance:
         """Tell if powers change too much within a piece."""
         apart, end = piece.unevenness, piece.end
         done = np.abs(piece.booked(end.time)[:-6]).sum()
-        return apart > self._uneven * max(course.largest, done, self.kinetic(end.time, end.x, end.v))
+        return (apart > self._uneven * max(course.largest, done, self.kinetic(end.time, end.x, end.v))).any()
 
     def _mass(self, t):
         """The `refweb.system.mass.Mass` at time t."""

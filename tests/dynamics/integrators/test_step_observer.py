@@ -56,10 +56,13 @@ def test_a_jump_counts_at_the_end_alone():
 
 
 def test_unevenness_is_the_difference_of_two_rules():
-    """Of powers |t − 0.5|: Simpson's rule has 0.4 (0.2 + 0 + 0.2)/6, the trapezoidal one 0.4 · 0.2."""
-    apart = piece(lambda t: abs(t - 0.5)).unevenness
+    """Of powers |t − 0.5|: Simpson's rule has 0.4 (0.2 + 0 + 0.2)/6, the trapezoidal one 0.4 · 0.2; lengths alike."""
+    kink = lambda t: abs(t - 0.5)  # noqa: E731
     # The trapezoidal rule of both halves: 0.4 (0.2 + 2 · 0 + 0.2)/4.
-    assert apart == pytest.approx(abs(0.4 * 0.4 / 6.0 - 0.4 * 0.4 / 4.0), rel=1e-12)
+    apart = abs(0.4 * 0.4 / 6.0 - 0.4 * 0.4 / 4.0)
+    np.testing.assert_allclose(piece(kink).unevenness, [apart, 0.0], rtol=1e-12)
+    by_length = piece(lambda t: 0.0, length=lambda t: 3.0 * t, pull=kink).unevenness
+    np.testing.assert_allclose(by_length, [0.0, 3.0 * apart], rtol=1e-12)
 
 
 def test_events_are_found_to_rounding():
