@@ -168,7 +168,8 @@ class Solution(SolutionData):
         Parameters
         ----------
         result : str
-            Name of a result: a tension, stress, strain, displacement, position, reaction, distance, mouth or energy.
+            Name of a result: a tension, stress, strain, displacement, position, reaction of nodes, distance, mouth,
+            energy, a number of a thread, or the turn of a body. Forces on bodies, overlaps and shares are refused.
         path : str
             Any number of the scene by its path, such as ``cable.area`` or ``load.0.force.2``. By line or group
             ``cable.modulus``, ``cable.area``, ``cable.density``, ``cable.prestrain`` or ``natural_length`` of each: the

@@ -172,6 +172,8 @@ class Gradients:
     def _solved(self, response):
         """The multipliers of a response, their last correction, and those beside the equilibrium."""
         rows, change = self.linear.multipliers(response.slope)
+        if response.doubt is not None:
+            change = change + self.linear.multipliers(response.doubt)[0]
         self._refuse_kinks(rows - response.reacting)
         solved = [(self.linear, response, rows, 1.0), (self.linear, None, change, 1.0)]
         for linear, factor in self._moved:

@@ -17,6 +17,9 @@ from ..results.observables.distances import Between
 from ..results.observables.line import Strain, Stress, Tension
 from ..results.observables.nodal import Place
 from ..results.observables.reaction import Reaction
+from ..results.observables.rotation import Orientation
+from ..results.observables.support import AxleAngle
+from ..results.observables.thread import OfThread
 from ..results.state import State
 from .adjoint import LineState, Sensitivity
 
@@ -24,8 +27,8 @@ EQUAL = 1e-9
 """Difference of two values, over the larger, within which both count as the largest."""
 MOST = 64
 """Largest number of values that may be equal."""
-STEP = 1e-4
-"""Step of a difference over the size of what is measured."""
+STEP = 1e-5
+"""Step of a difference over the size of what is measured, of a turn in rad."""
 
 
 class Response(NamedTuple):
@@ -43,6 +46,8 @@ class Response(NamedTuple):
         ∂J/∂p by numbers of elements and rows.
     reacting : ndarray, shape (rows, 3)
         Displacement of supports whose virtual work, reversed, the result is; 0 for results that are no reaction.
+    doubt : ndarray, shape (rows, 3), optional
+        Possible error of the slope, where it is one of differences.
     """
 
     again: Any
@@ -50,6 +55,7 @@ class Response(NamedTuple):
     slope: np.ndarray
     explicit: Sensitivity
     reacting: np.ndarray
+    doubt: np.ndarray | None = None
 
 
 def responses(observe, linear):
@@ -76,10 +82,10 @@ def responses(observe, linear):
         makers = _nodes(observable, linear)
     elif isinstance(observable, Booked):
         makers = [partial(_energy, observe.quantity)]
-    elif isinstance(observable, Between):
+    elif isinstance(observable, (Between, OfThread, Orientation, AxleAngle)):
         makers = [partial(_by_differences, observable)]
     else:
-        raise InputError(f'quantity = "{observe.quantity}" has no gradient: it is not smooth, or is one of bodies')
+        raise InputError(f'quantity = "{observe.quantity}" has no gradient: it is not smooth, or is a force on a body')
     return [make(linear) for make in makers]
 
 
@@ -234,20 +240,38 @@ def _share(name, column):
 
 
 def _by_differences(observable, linear):
-    """The response of what follows from the positions of some rows, by differences of order 4."""
-    system, state, (explicit, reacting) = linear.system, linear.state, _nothing(linear)
-    rows = np.unique(observable.rows(system))
-    slope, step = np.zeros_like(reacting), STEP * float(np.ptp(state.position[rows], axis=0).max())
-    for row in rows:
-        for axis in range(3):
-            values = []
-            for steps in (-2, -1, 1, 2):
-                x = linear.x.copy()
-                x[row, axis] += steps * step
-                values.append(observable.of(State(system, linear.t, x)).value)
-            slope[row, axis] = (values[0] - 8.0 * values[1] + 8.0 * values[2] - values[3]) / (12.0 * step)
+    """The response of what follows from places and turns of some rows, by differences of order 4 by their unknowns."""
+    system, (explicit, reacting) = linear.system, _nothing(linear)
+    rows, size = _rows_and_size(observable, linear)
+    spins = [body.spin for body in system.net.bodies if body.spin is not None]
+    bodies = [row for body in system.resting for row in (body.row, body.spin) if row is not None]
+    places = system.free // 3
+    slope, doubt = np.zeros_like(reacting), np.zeros_like(reacting)
+    for k in np.flatnonzero(np.isin(places, [*rows, *bodies])):
+        step = STEP * (1.0 if places[k] in spins else size)
+        values = []
+        for steps in (-2.0, -1.0, 1.0, 2.0):
+            p = np.zeros(len(system.free))
+            p[k] = steps * step
+            values.append(observable.of(State(system, linear.t, system.moved(linear.x, system.rows_of(p)))).value)
+        near = (values[2] - values[1]) / (2.0 * step)
+        slope.ravel()[system.free[k]] = best = (8.0 * near - (values[3] - values[0]) / (2.0 * step)) / 6.0
+        doubt.ravel()[system.free[k]] = best - near
 
-    def value(changed):
-        return observable.of(changed).value
+    def value(state):
+        return observable.of(state).value
 
-    return Response(partial(_by_differences, observable), value, slope, explicit, reacting)
+    return Response(partial(_by_differences, observable), value, slope, explicit, reacting, doubt)
+
+
+def _rows_and_size(observable, linear):
+    """Rows that a value depends on, and a length that differences are small against [m]."""
+    if isinstance(observable, OfThread):
+        thread = next(t for t in linear.net.threads if t.name == observable.observe.thread)
+        return thread.rows, thread.natural_length
+    if isinstance(observable, Between):
+        rows = observable.rows(linear.system)
+        return rows, float(np.ptp(linear.state.position[rows], axis=0).max())
+    if isinstance(observable, Orientation) and observable.of(linear.state).value == 0.0:
+        raise InputError("the angle of a body has a kink at 0: name a component")
+    return [observable.body(linear.net).row], float(linear.net.natural_length.min())

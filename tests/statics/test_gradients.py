@@ -131,7 +131,7 @@ def test_taylor_of_effects(name):
 def test_bodies_that_are_free():
     """A platform that hangs on ropes: by its mass, its place, and area and modulus of the ropes; by line as well."""
     scene = refweb.Scene.load("platform-on-ropes")
-    names = ["height", "largest"]
+    names = ["height", "largest", "tilt"]
     for path in ("body.0.mass", "body.0.position.0", "gravity.acceleration.1", "cable.area"):
         check_slopes(remainders(scene, path, names))
     solution = refweb.run(scene)
@@ -140,6 +140,49 @@ def test_bodies_that_are_free():
         assert abs(by_line.value.sum() - float(whole)) <= by_line.error.sum() + 3.0 * whole.error[0]
     with pytest.raises(InputError, match=r"mass beside \[\[attach\]\] is not taken"):
         solution.gradient("height", "cable.area", "line")
+
+
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.2, -0.1, 0.15)])
+def test_a_body_on_an_axle(point):
+    """A box on its axle, or off it, on two ropes and with a torque: by its torque and mass, and by the modulus."""
+    axle = {"point": point, "direction": (0.3, 1.0, -0.2), "torque": [(0.0, 0.0), (1.0, 0.7)]}
+    web = refweb.Inline(
+        points=[[0.5, 0.3, 2.0], [-0.4, -0.2, 1.8], [0.3, 0.1, 0.05], [-0.25, -0.1, 0.1]],
+        lines=[[0, 2], [1, 3]], supports=[0, 1],
+    )  # fmt: skip
+    observe = [
+        refweb.Observe(name="angle", quantity="axle_angle", body="flap"),
+        refweb.Observe(name="T", quantity="tension"),
+        refweb.Observe(name="stored", quantity="strain_energy"),
+    ]
+    effects = [
+        refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
+        refweb.Body(name="flap", shape="box", size=(0.4, 0.3, 0.2), mass=2.0, position=(0.0, 0.0, 0.0), axle=axle),
+        refweb.Attach(body="flap", node=[2, 3]),
+    ]
+    scene = refweb.Scene(
+        web=web, cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-4, density=1000.0, prestrain=0.1),
+        effects=effects, observe=observe, solve=refweb.Static(), accuracy=refweb.Accuracy(error="none"),
+    )  # fmt: skip
+    for path in ("body.0.axle.torque.1.1", "body.0.mass", "cable.modulus"):
+        check_slopes(remainders(scene, path, ["angle", "T", "stored"]))
+
+
+def test_a_ring_on_a_thread():
+    """Its tension and its length, beside a line that pulls at the ring."""
+    web = refweb.Inline(
+        points=[[0, 0, 0], [1, 0, 0], [0.4, 0, -0.6], [0.4, 0.5, -1.2]], lines=[[2, 3]], supports=[0, 1, 3]
+    )
+    thread = refweb.Thread(name="rope", nodes=[0, 2, 1], modulus=1e7, area=1e-5, density=0.0, prestrain=0.01)
+    observe = [refweb.Observe(name=name, quantity=name, thread="rope") for name in ("tension", "length")]
+    cable = refweb.Cable(law="tension-only", modulus=1e6, area=1e-5, density=0.0, prestrain=0.02)
+    load = refweb.Load(node=2, force=(0.5, 0.0, -3.0))
+    ring = refweb.Scene(
+        web=web, cable=cable, effects=[thread, load], observe=observe, solve=refweb.Static(),
+        accuracy=refweb.Accuracy(error="none"),
+    )  # fmt: skip
+    for path in ("cable.area", "load.0.force.0", "thread.0.modulus"):
+        check_slopes(remainders(ring, path, ["tension", "length"]))
 
 
 def test_a_ball_that_lies_in_a_net():
