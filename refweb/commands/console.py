@@ -381,7 +381,7 @@ def _of_numbers(gradients, unit):
         value = float(gradient)
         left = "" if gradient.left is None else f", {gradient.left[0]:.6g} where it falls"
         cells = [gradient.path, f"{gradient.number:g}", f"{value:.6g}{left}", f"{gradient.error[0]:.1e}"]
-        grid.add_row(*map(Text, [*cells, f"{0.01 * gradient.number * value:.3g}"]))
+        grid.add_row(*map(Text, [*cells, f"{0.01 * gradient.number * value + 0.0:.3g}"]))
     return grid
 
 

@@ -28,6 +28,8 @@ def run(arguments):
     from ..statics.gradients import numbers_of
 
     scene = scene_of(arguments)
+    if scene.solve.kind != "static":
+        raise InputError(f'[solve] kind = "{scene.solve.kind}" must be "static": gradients are those of equilibria')
     names = [o.name for o in scene.observables]
     result = names[0] if arguments.of is None else arguments.of
     paths = arguments.paths or (["cable.area"] if arguments.by else numbers_of(scene.to_dict()))

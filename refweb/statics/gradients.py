@@ -48,6 +48,8 @@ STEPS, LARGEST_STEP, SHRINKS = 5, 1e-2, 8.0
 """Number of tries of a difference by a number of the scene, the first step over its size, and their ratio."""
 SKIPPED = ("schema", "title", "seed", "web", "solve", "output", "accuracy", "observe", "event", "supports", "support")
 """Tables whose numbers are not among `numbers_of`."""
+LIMITS = ("strength", "safety_factor", "knot_factor")
+"""Keys without effect on equilibria."""
 FEW = 3
 """Largest length of a list whose numbers are taken one by one."""
 ENOUGH = 1e-9
@@ -439,7 +441,7 @@ def numbers_of(given, above=""):
     paths = []
     for key, value in given.items() if isinstance(given, dict) else enumerate(given):
         path = f"{above}.{key}" if above else str(key)
-        if not above and key in SKIPPED:
+        if not above and key in SKIPPED or key in LIMITS:
             continue
         if isinstance(value, float):
             paths.append(path)

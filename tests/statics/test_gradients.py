@@ -454,6 +454,8 @@ def test_command(tmp_path, capsys):
     assert main(["gradient", str(path), "--of", "tension"]) in (0, None)
     out = capsys.readouterr().out
     assert "cable.groups.tie.area" in out and "load.0.force.2" in out and "no effect" in out
+    assert main(["gradient", "hexagon-impact"]) == 2
+    assert '[solve] kind = "dynamic" must be "static"' in capsys.readouterr().err
     picture = tmp_path / "web.png"
     words = ["gradient", str(path), "--of", "tension", "--by", "line", "--picture", str(picture)]
     assert main(words) in (0, None) and picture.stat().st_size > 1000
