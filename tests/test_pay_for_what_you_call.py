@@ -234,6 +234,7 @@ ALIKE = (
     "by ida",
     "reeled-tether",
     "winch-drum",
+    "drawstring",
     "platform-on-ropes",
 )
 """Scenes that call for what others call for, on another web, or each part of which others call for."""

@@ -39,6 +39,7 @@ LONG = (
     "materials",
     "threads",
     "feedback",
+    "drawstrings",
     "free_net",
     "price_of_modelling",
 )

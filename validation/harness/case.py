@@ -80,6 +80,7 @@ CASES = {
         "materials",
         "threads",
         "feedback",
+        "drawstrings",
         "drag_and_link",
     ),
     "missions": (
