@@ -334,7 +334,8 @@ def notices(scene: Scene, system: System) -> Iterator[Finding]:
     for body in system.net.bodies:
         for text in body.shape.remarks():
             yield Finding("surface", f'body "{body.name}": {text}', "body")
-    if not system.contact and any(not body.carried for body in system.net.bodies):
+    under = {wrap.body for thread in system.net.threads for wrap in thread.wraps}
+    if not system.contact and any(not body.carried and body.name not in under for body in system.net.bodies):
         yield Finding("body-not-felt", "the scene has a [[body]] but no [contact]: the web does not feel it", "body")
     if scene.solve.kind == "static" and any(map(rubs, scene.effects)):
         text = 'statics has no friction: contact pushes along its normal alone; [solve] kind = "dynamic" has it'

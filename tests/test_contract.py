@@ -85,6 +85,11 @@ EXAMPLES = {
         dict(name="rope", nodes=[0, 2, 5], area=1e-4, density=0.0, prestrain=0.2, law="smooth", modulus=1e5),
         dict(name="rope", nodes=[0, 2, 5], area=1e-4, density=0.0, length=2.5, law="table")
         | dict(stress=[[0.01, 0.0], [0.1, 1e4], [0.5, 1e5]]),
+        dict(name="rope", nodes=[0, "ball", 2, 5], around=[dict(body="ball")], modulus=1e5, area=2e-4, density=0.0),
+        dict(name="rope", nodes=[1, 0, "wall", 2], around=[dict(body="wall")], closed=True, prestrain=0.2)
+        | dict(modulus=1e5, area=2e-4, density=0.0),
+        dict(name="rope", nodes=[0, "drum", 5, "hoop", 2], modulus=1e5, area=2e-4, density=0.0, prestrain=0.1)
+        | dict(around=[dict(body="drum", side=(0.0, 0.0, 1.0), turns=1), dict(body="hoop", side=(-1.0, 0.0, 0.0))]),
     ],
     "Reel": [
         dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
@@ -144,7 +149,7 @@ def make(name, i, law, tensionless=False):
     web = replace(web, natural_length=None) if tensionless else web
     pieces = 3 if name == "Bending" else 1  # no line of it continues another
     net = discretisation.build(web, replace(nets.skew_cable(law), subdivide=pieces))
-    touched = name in ("Contact", "Attach", "Damping")
+    touched = name in ("Contact", "Attach", "Damping") or "around" in EXAMPLES[name][i]
     bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if touched else []
     system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
     return system.net, system
@@ -338,7 +343,9 @@ def check_derivatives(name, i, law, place):
 @pytest.mark.parametrize("name, i", cases("extend"))
 def test_extension(name, i):
     """Rows and mass are added, what was there stays, and the given net is left alone."""
-    net = example("Body", 1).extend(skew_net()) if name == "Attach" else skew_net()
+    net = skew_net()
+    for number in range(5) if "around" in EXAMPLES[name][i] else [1] if name == "Attach" else []:
+        net = example("Body", number).extend(net)
     before = net.points.copy(), net.mass.copy()
     effect = example(name, i)
     longer = effect.extend(net)

@@ -140,7 +140,19 @@ EFFECTS = {
     ),
     "link": st.lists(table(nodes=NUMBERS), min_size=1, max_size=1),
     "thread": st.lists(
-        table(name=st.just("rope"), nodes=NUMBERS, modulus=ANY, area=ANY, density=ANY, optional={"prestrain": SIGNED}),
+        table(
+            name=st.just("rope"),
+            nodes=NUMBERS | st.just([0, "ball", 1]),
+            modulus=ANY,
+            area=ANY,
+            density=ANY,
+            optional={
+                "prestrain": SIGNED,
+                "around": st.lists(
+                    table(body=st.just("ball"), optional={"side": VECTOR, "turns": st.integers(-1, 3)}), max_size=1
+                ),
+            },
+        ),
         min_size=1,
         max_size=1,
     ),

@@ -97,13 +97,15 @@ def roots(given, method):
         yield "results.throw"
     if any("axle" in body for body in bodies):
         yield "effects.axle"
+    if any("around" in thread for thread in given.get("thread", ())):
+        yield from ("effects.around", "effects.winding")
     if any(reel.get("mass") == "follows" for reel in given.get("reel", ())):
         yield "system.material_flow"
     if any(shape in ("cylinder", "box") and "mass" in body for shape, body in zip(shapes, bodies, strict=True)):
         yield from ("net.solid", *(["effects.turning_bodies"] if spun else []))
     if "mesh" in shapes:
         yield from ("effects.contact.nonconvex_contacts", *(f"net.boundary.{name}" for name in MESH))
-    if len(bodies) > 1 and not (contact or {}).get("between_bodies"):
+    if not static and len(bodies) > 1 and not (contact or {}).get("between_bodies"):
         yield "effects.contact.undetected_overlap"  # bodies that overlap in silence
     if "self_contact" in given:
         yield from (f"effects.self_contact.{name}" for name in ("line_line_ccd", "penetration", "line_line_penalty"))

@@ -25,28 +25,40 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..accepted import accepts, array
 from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..messages import quote
 from ..net.law_keys import points
 from ..net.materials import MATERIALS
-from ..net.threads import ThreadLine
+from ..net.threads import COLUMNS, TAUT, ThreadLine
 from ..registry import LAWS
-from ..tables import Several, Table, boolean, choice, nodes, numbers_by_name, real, table, text
+from ..tables import Several, Table, boolean, choice, field, nodes, numbers_by_name, real, table, text
 from .base import Balance, ForceTerm, Tangent
 from .line_kernels import line_at
 
 if TYPE_CHECKING:
     from ..net.net import Net
 
-COLUMNS = 4
-"""Numbers that the force observes: tension [N], stress [Pa], strain [1] and length [m]."""
-TAUT = 0.01
-"""Strain up to which bounds of steps hold for tensions that are not there yet."""
 OF_CABLE = ("law", "material", "modulus", "area", "density", "slackness", "smoothing", "stress", "tension")
 OF_CABLE += ("parameters", "prestrain")
 """Keys that mean what they mean in ``[cable]``."""
+
+
+def _around_table():
+    from .around import Around
+
+    return Around
+
+
+@accepts(lambda: array(_around_table(), 1))
+def _around(name, value):
+    """Read the tables of bodies that a thread runs over."""
+    if not isinstance(value, (list, tuple)) or not value:
+        raise InputError(f'{name} = {quote(value)} must be a list of tables such as [{{ body = "drum" }}]')
+    kind = _around_table()
+    return tuple(v if isinstance(v, kind) else kind.read(f"{name}[{i}]", v) for i, v in enumerate(value))
 
 
 @functools.cache
@@ -162,8 +174,9 @@ class Thread(Table):
 
     A drawstring, a rope over pulleys or a line with rings on it: one tension rules all of it, by the sum of the
     distances of neighbours in the list. Nodes may be free, supported, moved, or on a body by ``[[attach]]``. A thread
-    may pass a node several times, as a tackle does. It does not touch bodies or lines, and does not break. Rings that
-    nothing keeps apart slide together; statics finds no equilibrium there, where the thread has no direction.
+    may pass a node several times, as a tackle does. It touches the bodies of ``around`` alone, and no lines, and does
+    not break; where it may touch others, let a chain of lines do so by ``[contact]``. Rings that nothing keeps apart
+    slide together; statics finds no equilibrium there, where the thread has no direction.
 
     Its mass is shared by its nodes, half of each segment to either end as it lies in the web's position, and stays
     there: material that slides through a ring brings no mass along. Where masses of a thread count beside those of its
@@ -178,13 +191,15 @@ class Thread(Table):
         Name of the thread, for observables.
     nodes : list or str
         Two nodes or more in the order of the thread, by number or name; or one name of several nodes, in the order of
-        the name, of a closed thread counterclockwise around their middle.
+        the name, of a closed thread counterclockwise around their middle. Names of ``around`` are bodies.
     closed : bool
         True if the thread runs on from its last node to the first.
     length : float, optional
         Natural length [m]; by default the sum of the distances over 1 + ``prestrain``.
     prestrain : float
         Strain in the web's position [1], > −1; negative is slack.
+    around : list of tables, optional
+        Bodies that the thread runs over between two nodes, ``[{ body = ..., side = ..., turns = ... }]``.
     law : {"tension-only", "smooth", "table"}
         Tension law, as in ``[cable]``; or that of another package, unless it is one of bars or of form finding, or
         yields.
@@ -216,6 +231,7 @@ class Thread(Table):
     closed: bool = boolean(default=False)
     length: float | None = real(default=None, above=0.0, unit="m")
     prestrain: float = real(default=0.0, above=-1, unit="1")
+    around: Any = field(_around, default=None)
     law: str = choice(LAWS, default="tension-only")
     material: str | None = choice(*MATERIALS, default=None)
     modulus: Any = real(default=None, above=0, unit="Pa")
@@ -235,6 +251,10 @@ class Thread(Table):
             raise InputError(f"nodes = {quote(self.nodes)} must be a list of two nodes or more, or a name of several")
         if isinstance(self.nodes, tuple):
             self._refuse_repeated(self.nodes)
+        if self.around:
+            from .around import check_route
+
+            check_route(self.nodes, self.around, self.closed)
         if self.length is not None and self.prestrain != 0.0:
             raise InputError(
                 f"length = {self.length:g} and prestrain = {self.prestrain:g} both say what the natural length is: "
@@ -266,15 +286,17 @@ class Thread(Table):
 
         if any(thread.name == self.name for thread in net.threads):
             raise InputError(f"name = {quote(self.name)} is listed twice: names of threads are unique")
-        rows = self._rows(net.web)
-        thread = thread_line(self.name, net.web.points[rows], rows, self._cable(), self.length)
+        rows, over = self._rows(net.web)
+        wraps = tuple(around.wrap(net, at, rows[at], rows[at + 1]) for at, around in over)
+        thread = thread_line(self.name, net.web.points[rows], rows, self._cable(), self.length, wraps)
         mass = net.mass.copy()
         np.add.at(mass, rows[:-1], 0.5 * thread.masses)
         np.add.at(mass, rows[1:], 0.5 * thread.masses)
         return replace(net, mass=mass, threads=(*net.threads, thread), kept=(*net.kept, *thread.line.kept))
 
     def _rows(self, web):
-        """Numbers of its nodes in order, the first again at the end of a closed thread, int32."""
+        """(Numbers of its nodes in order, the first again at the end if it is closed, int32, `Around` by segment)."""
+        bodies, over = {around.body: around for around in self.around or ()}, []
         if isinstance(self.nodes, str):
             rows = (web.find_around if self.closed else web.find)(self.nodes).tolist()
             if len(rows) < 2:
@@ -282,16 +304,24 @@ class Thread(Table):
         else:
             rows = []
             for i, node in enumerate(self.nodes):
+                if node in bodies:
+                    over.append((len(rows) - 1, bodies[node]))
+                    continue
                 numbers = web.find(node, f"nodes[{i}]").tolist()
                 if len(numbers) != 1:
                     raise InputError(f"nodes[{i}] = {quote(node)} is {len(numbers)} nodes, must be one")
                 rows += numbers
         self._refuse_repeated(rows)
-        return np.array([*rows, rows[0]] if self.closed else rows, dtype=np.int32)
+        return np.array([*rows, rows[0]] if self.closed else rows, dtype=np.int32), over
 
     def on(self, net: Net) -> ForceTerm:
         """The term of one cell, whose ``out`` is tension, stress, strain and length."""
-        return _term(next(thread for thread in net.threads if thread.name == self.name))
+        thread = next(thread for thread in net.threads if thread.name == self.name)
+        if thread.wraps:
+            from .winding import term
+
+            return term(net, thread)
+        return _term(thread)
 
 
 def _term(thread: ThreadLine):

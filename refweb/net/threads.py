@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,11 @@ from .web import Web
 if TYPE_CHECKING:
     from .cable import Cable
     from .net import Net
+
+COLUMNS = 4
+"""Numbers that the force observes: tension [N], stress [Pa], strain [1] and length [m]."""
+TAUT = 0.01
+"""Strain up to which bounds of steps hold for tensions that are not there yet."""
 
 
 NEAR = 1e-3
@@ -36,6 +41,8 @@ class ThreadLine(NamedTuple):
         Vectors from node to node in the web's position, and their magnitudes [m].
     line : refweb.net.net.Net
         The same material as one line from end to end of the sum of the distances, which has its law and numbers.
+    wraps : tuple of refweb.effects.around.Wrap
+        Segments on bodies; their ``distances`` are along these.
     """
 
     name: str
@@ -43,6 +50,7 @@ class ThreadLine(NamedTuple):
     vectors: NDArray[np.float64]
     distances: NDArray[np.float64]
     line: Net
+    wraps: tuple[Any, ...] = ()
 
     @property
     def title(self) -> str:
@@ -81,9 +89,14 @@ class ThreadLine(NamedTuple):
 
 
 def thread_line(
-    name: str, places: NDArray[np.float64], rows: NDArray[np.int32], cable: Cable, length: float | None = None
+    name: str,
+    places: NDArray[np.float64],
+    rows: NDArray[np.int32],
+    cable: Cable,
+    length: float | None = None,
+    wraps: tuple[Any, ...] = (),
 ) -> ThreadLine:
-    """The `ThreadLine` of a cable through nodes at some places [m], shape (nodes, 3).
+    """The `ThreadLine` of a cable through nodes at some places [m], shape (nodes, 3), and over bodies by `wraps`.
 
     Raises
     ------
@@ -92,16 +105,14 @@ def thread_line(
     """
     vectors = np.diff(places, axis=0)
     distances = np.linalg.norm(vectors, axis=1)
+    for wrap in wraps:
+        distances[wrap.segment] = wrap.length
     total = float(distances.sum())
     if total == 0.0:
         raise InputError(f"nodes: all {len(rows)} are in one point, a thread needs a length")
     ends = [[0.0, 0.0, 0.0], [total, 0.0, 0.0]]
     web = Web(ends, [[0, 1]], None if length is None else [length])
-    return ThreadLine(name, rows, vectors, distances, discretisation.build(web, cable, explicit=True))
-
-
-def coincident_nodes(net: Net, x: NDArray[np.float64], supported: NDArray[np.bool_]) -> str | None:
-    """Text that names nodes that have come together on a thread, which pulls them so; None where none have.
+    return ThreadLine(name, rows, vectors, distances, discretisation.build(web, cable, explicit=True), wraps)
 
     ``x`` are displacements [m], shape (rows, 3), and ``supported`` is True for components that do not move.
     """

@@ -250,6 +250,11 @@ def _body(name):
         yield _page(f"body.{shape}", f'[[body]] shape = "{shape}"', load(reference))
 
 
+def _thread(name):
+    yield from _part(name)
+    yield _page(f"{name}.around", "[[thread.around]]", load("refweb.effects.around:Around"))
+
+
 def _observe(name):
     rows = []
     for quantity, reference in OBSERVABLES.items():
@@ -276,6 +281,7 @@ _PAGES = {
     "web": _web,
     "cable": _cable,
     "body": _body,
+    "thread": _thread,
     "observe": _observe,
     "solve": _solve,
     "study": _study,

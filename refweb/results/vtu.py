@@ -61,9 +61,9 @@ def web_mesh(state, shape=None):
 
 def _of_thread(state, thread):
     """Cell data of the segments of a thread by name; its natural length in the shares of their lengths."""
-    tension, stress, strain, length = state.threads[thread.name]
+    tension, stress, strain, _ = state.threads[thread.name]
     apart = np.linalg.norm(np.diff(state.position[thread.rows], axis=0), axis=1)
-    natural = apart * (thread.natural_length / length) if length > 0.0 else apart
+    natural = apart * (thread.natural_length / apart.sum()) if apart.any() else apart
     slack = float(strain <= thread.line.slackness[0])
     return dict(zip(CELL_DATA, (tension, stress, strain, natural, slack), strict=True))
 

@@ -24,9 +24,13 @@ def at_rest(system):
     Raises
     ------
     InputError
-        For a line that is broken.
+        For a line that is broken, and a free body that a thread runs over.
     """
     refuse_broken(system.net)
+    if any(thread.wraps for thread in system.net.threads):
+        from ..effects.around import refuse_free
+
+        refuse_free(system.net)
     free = [body for body in system.net.bodies if not body.prescribed]
     if (system.net.quasi_static or not free) and all(term.timing.at_rest for term in system.terms):
         return system

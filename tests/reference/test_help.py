@@ -47,6 +47,9 @@ AROUND = {
     "temperature.groups": {"temperature": {"expansion": 1e-6, "change": 0.0}},
     "link": {"solve": {**SCENE["solve"], "method": "ida"}},
     "motion": {"body": [{"name": "drum", "radius": 0.1, "position": [0, 0, -0.2]}]},
+    "thread.around": {
+        "body": [BALL | {"name": "pulley", "shape": "ring", "normal": [0, 1, 0]}],
+    },
     "bending": {"cable": {**SCENE["cable"], "subdivide": 2}},
     "fold": {"supports": {"nodes": []}},
     "control": {

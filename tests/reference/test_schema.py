@@ -81,7 +81,7 @@ LISTS_OF = [
     [1, 2, 3, 4],
 ]
 LISTS_OF += [[[0, 1]], [[0.0, 2.5], [1.0, 3.5]], [[0, -1]], [[0, 1, 2]], [[0, 1, 2], [1.5, 0, 0]], [[0, 1, 2, 3]], [[]]]
-LISTS_OF += [[1, 2, True], [[0, 1], 2]]
+LISTS_OF += [[1, 2, True], [[0, 1], 2], [{"body": "drum", "turns": 1}], [{"turns": 1}]]
 TABLES = [{}, {"a": 1}, {"a": []}, {"a": [1, 2]}, {"a": [-1]}, {"a": "x"}, {"a": {}}, {"a": {"b": 1}}]
 TABLES += [{"direction": [0.0, 0.0, 1.0]}, {"arms": [[1.0, 2.0]]}]
 VALUES = [*NUMBERS, *TEXTS, *LISTS_OF, *TABLES]
@@ -94,7 +94,8 @@ def classes():
     for kind in list(found):
         for f in dataclasses.fields(kind):
             own = getattr(f.metadata["read"], "accepts", None)
-            inner = own.get("additionalProperties") if isinstance(own, dict) else own
+            own = own() if callable(own) and not isinstance(own, type) else own
+            inner = own.get("additionalProperties", own.get("items")) if isinstance(own, dict) else own
             found |= {inner: None} if isinstance(inner, type) else {}
     return list(found)
 

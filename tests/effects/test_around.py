@@ -1,0 +1,357 @@
+"""Threads that run over bodies: closed forms of arcs, drums and pulleys, an independent program, and the balances."""
+
+import numpy as np
+import pytest
+from nets import METHODS
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
+
+import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
+
+G, EA, R = 9.81, 1e4, 0.2
+ROPE = {"name": "rope", "modulus": 1e9, "area": 1e-5, "density": 0.0}
+FAR = [[50.0, 0.0, 0.0], [51.0, 0.0, 0.0]]
+"""Ends of the one line that a web has, away from all else; both are supported, and stand behind the other points."""
+DRUM = {"name": "drum", "shape": "cylinder", "radius": R, "length": 0.5, "axis": [0.0, 1.0, 0.0], "position": [0, 0, 0]}
+ON_AXLE = DRUM | {"axle": {"direction": [0.0, 1.0, 0.0]}}
+BALL = {"name": "drum", "radius": R, "position": [0.0, 0.0, 0.0]}
+OVER = {"body": "drum", "side": [0.0, 0.0, 1.0]}
+
+
+def scene(points, supports, rope, body, solve, masses=(), **tables):
+    """A scene of points, some of them supported, with a thread over a body and point masses by node."""
+    far = len(points)
+    given = {
+        "web": {"kind": "inline", "points": [*points, *FAR], "lines": [[far, far + 1]]},
+        "supports": {"nodes": [*supports, far, far + 1]},
+        "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-5, "density": 0.0},
+        "gravity": {"acceleration": [0.0, 0.0, -G]},
+        "thread": [{**ROPE, **rope}],
+        "body": [body],
+        "point_mass": [{"node": node, "mass": mass} for node, mass in dict(masses).items()],
+        "observe": [{"name": "pull", "quantity": "tension", "thread": "rope"}],
+        "solve": solve,
+    }
+    return refweb.Scene.from_dict({name: value for name, value in {**given, **tables}.items() if value != []})
+
+
+def natural_length(points, body, **around):
+    """Natural length of a thread from the first point over a fixed body to the second."""
+    rope = {"nodes": [0, "drum", 1], "around": [{"body": "drum", **around}]}
+    given = scene(points, [0, 1], rope, body | {"fixed": True}, {"kind": "static"})
+    return given.build().net.threads[0].natural_length
+
+
+# Lengths
+
+
+@pytest.mark.parametrize(
+    "points, side, exact",
+    [
+        ([[-R, 0, -1.0], [R, 0, -1.5]], [0, 0, 1], 2.5 + np.pi * R),  # over the top
+        ([[-R, 0, -1.0], [R, 0, -1.5]], [0, 0, -1], np.hypot(2.0 * R, 0.5)),  # clear of it below
+        ([[-R, 0, -1.0], [1.0, 0, R]], [-1, 0, 1], 2.0 + 0.5 * np.pi * R),  # a quarter
+        ([[-1.0, 0, R], [1.0, 0, R]], [0, 0, 1], 2.0),  # along a tangent
+        ([[-R, 0.1, -1.0], [R, 0.4, -1.5]], [0, 0, 1], np.hypot(2.5 + np.pi * R, 0.3)),  # a helix
+    ],
+)
+def test_lengths_on_a_drum(points, side, exact):
+    assert natural_length(points, DRUM, side=side) == pytest.approx(exact, rel=1e-14)
+
+
+@pytest.mark.parametrize("turns", [0, 1, 7])
+def test_turns_on_a_drum(turns):
+    """A helix from point to point of the surface is straight where the surface is unrolled."""
+    points = [[R, 0.0, 0.0], [R * np.cos(1.0), 0.3, -R * np.sin(1.0)]]
+    exact = np.hypot(R * (1.0 + 2.0 * np.pi * turns), 0.3)
+    assert natural_length(points, DRUM, side=[1, 0, -0.5], turns=turns) == pytest.approx(exact, rel=1e-14)
+
+
+@pytest.mark.parametrize("angle, distance", [(3.0, 0.3), (2.5, 0.25), (0.5, 0.8)])
+def test_lengths_on_a_ball(angle, distance):
+    """Tangents and an arc of a great circle, or a chord where this is clear of the ball; anywhere in space."""
+    turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
+    points = distance * np.array([[1.0, 0.0, 0.0], [np.cos(angle), np.sin(angle), 0.0]]) @ turn.T
+    arc = angle - 2.0 * np.arccos(R / distance)
+    exact = 2.0 * (np.sqrt(distance**2 - R**2)) + R * arc if arc > 0.0 else 2.0 * distance * np.sin(0.5 * angle)
+    assert natural_length(points.tolist(), BALL) == pytest.approx(exact, rel=1e-14)
+
+
+@pytest.mark.parametrize("body, around", [(DRUM, {"side": [0, 0, 1]}), (BALL, {})])
+def test_force_is_continuous_at_lift_off(body, around):
+    """The node comes up from the tangent by a nanometre: the gradient is that of before but for this over R."""
+    rope = {"nodes": [0, "drum", 1], "around": [{"body": "drum", **around}], "prestrain": 0.1}
+    given = scene([[-1.0, 0, R], [1.0, 0, R]], [0], rope, body | {"fixed": True}, {"kind": "static"}, gravity=[])
+    system = given.build()
+    term = next(term for term in system.terms if term.name == "thread")
+    forces, wound = [], []
+    for height in (-1e-9, 1e-9):
+        x = np.zeros((system.rows, 3))
+        x[1, 2] = height
+        force = system.force_of(term, 0.0, x)
+        forces.append(force[:2])
+        wound.append(np.abs(force[system.net.bodies[0].row]).max() > 0.0)
+    assert wound == [True, False]
+    np.testing.assert_allclose(*forces, atol=1e-8 * EA)
+
+
+# Drums and pulleys
+
+
+def agrees(result, exact, size):
+    """± holds what is exact; its own rounding apart, over a ``size``."""
+    assert abs(result.value - exact) <= result.error + 1e-9 * size < 0.05 * size
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_atwood_over_a_drum(method):
+    heavy, light = 3.0, 1.0
+    pull, fall = 2.0 * heavy * light * G / (heavy + light), (heavy - light) / (heavy + light) * G
+    solve = {"kind": "dynamic", "duration": 0.3, **METHODS[method]}
+    rope = {"nodes": [0, "drum", 1], "around": [OVER], "prestrain": pull / EA}
+    seen = [{"name": f"z{n}", "quantity": "displacement", "node": n, "component": "z"} for n in (0, 1)]
+    seen += [{"name": "pull", "quantity": "tension", "thread": "rope"}]
+    run = refweb.run(
+        scene(
+            [[-R, 0.1, -1.0], [R, 0.1, -1.5]], [], rope, DRUM | {"fixed": True}, solve, {0: heavy, 1: light},
+            observe=seen, output={"interval": 0.1},
+        )
+    )  # fmt: skip
+    agrees(run.results["z0"], -0.5 * fall * 0.3**2, 1.0)
+    agrees(run.results["z1"], 0.5 * fall * 0.3**2, 1.0)
+    agrees(run.results["pull"], pull, pull)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_load_unwinds_a_drum(method):
+    """m g R = (I + m R²) α: a rope of three turns, whose end is on the drum."""
+    mass, inertia = 1.5, 0.04
+    fall = mass * G / (mass + inertia / R**2)
+    pull = mass * (G - fall)
+    body = ON_AXLE | {"mass": 2.0, "inertia": [1.0, 1.0, inertia]}
+    rope = {"nodes": [0, "drum", 1], "around": [OVER | {"side": [1, 0, -1], "turns": 3}], "prestrain": pull / EA}
+    seen = [{"name": "z", "quantity": "displacement", "node": 0, "component": "z"}]
+    seen += [{"name": "angle", "quantity": "axle_angle", "body": "drum"}]
+    run = refweb.run(
+        scene(
+            [[R, 0, -1.0], [R, 0, 0]], [], rope, body, {"kind": "dynamic", "duration": 0.6, **METHODS[method]},
+            {0: mass}, attach=[{"body": "drum", "node": 1}], observe=seen, output={"interval": 0.1},
+        )
+    )  # fmt: skip
+    agrees(run.results["z"], -0.5 * fall * 0.6**2, 1.0)
+    agrees(run.results["angle"], 0.5 * fall * 0.6**2 / R, 5.0)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize("axis", [1.0, -1.0])
+def test_a_drum_reels_in_a_rope(sense, axis):
+    """In statics: it rises by R θ of three turns, the moment is R m g and the force of the axle the weight."""
+    turned, mass, height, at = 6.0 * np.pi, 1.5, 6.0, 0.1
+    body = ON_AXLE | {"axis": [0.0, axis, 0.0]}
+    rope = {"nodes": [0, "drum", 1], "around": [{"body": "drum", "side": [sense, 0, -1]}]}
+    seen = [
+        {"name": "z", "quantity": "position", "node": 0, "component": "z"},
+        *({"name": f"M{c}", "quantity": "support_moment", "body": "drum", "component": c} for c in "xyz"),
+        {"name": "F", "quantity": "support_force", "body": "drum", "component": "z"},
+    ]
+    run = refweb.run(
+        scene(
+            [[sense * R, at, -height], [sense * R, at, 0]], [], rope, body,
+            {"kind": "static", "load_steps": [0.01, 0.5, 1.0]}, {0: mass}, attach=[{"body": "drum", "node": 1}],
+            motion=[{"body": "drum", "rotation": [[0, 0, 0, 0], [1, 0, -sense * turned, 0]]}], observe=seen,
+        )
+    )  # fmt: skip
+    weight = mass * G
+    assert run.results["z"].value == pytest.approx(R * turned - height * (1.0 + weight / EA), rel=1e-12)
+    assert run.results["F"].value == pytest.approx(weight, rel=1e-10)
+    for component, exact in zip("xyz", np.cross([sense * R, at, 0.0], [0, 0, weight]), strict=True):
+        assert run.results[f"M{component}"].value == pytest.approx(exact, abs=1e-9 * weight)
+
+
+def test_two_ropes_on_a_drum():
+    """A load unwinds its rope and winds up one that is held: both pull with the weight."""
+    weight = 1.5 * G
+    held = ROPE | {"name": "held", "nodes": [1, "drum", 2], "around": [OVER | {"side": [-0.4, 0, 0.5]}]}
+    rope = ROPE | {"nodes": [0, "drum", 2], "around": [OVER | {"side": [1, 0, -0.3], "turns": 2}]}
+    seen = [{"name": name, "quantity": "tension", "thread": name} for name in ("rope", "held")]
+    seen += [{"name": "angle", "quantity": "axle_angle", "body": "drum"}]
+    run = refweb.run(
+        scene(
+            [[R, 0, -1.0], [-R, 0, -1.0], [R, 0, 0]], [1], {}, ON_AXLE | {"mass": 2.0}, {"kind": "static"}, {0: 1.5},
+            thread=[held, rope], attach=[{"body": "drum", "node": 2}], observe=seen,
+        )
+    )  # fmt: skip
+    for name in ("rope", "held"):
+        assert run.results[name].value == pytest.approx(weight, rel=1e-9)
+    assert run.results["angle"].value == pytest.approx(weight / EA * (1.0 + np.pi * R) / R, rel=1e-9)
+
+
+def test_a_ring_is_a_movable_pulley():
+    """T = 3 m M g/(M + 4 m): the ring of mass M hangs in a bight of a rope whose other end carries m."""
+    mass, ring = 1.0, 3.0
+    pull = 3.0 * mass * ring * G / (ring + 4.0 * mass)
+    points = [[-R, 0, 1.0], [R, 0, 1.0], [2.0, 0.0, 1.0], [2.0, 0, 0.5]]
+    rope = {"nodes": [0, "drum", 1, 2, 3], "around": [OVER | {"side": [0, 0, -1]}], "prestrain": pull / EA}
+    body = {"name": "drum", "shape": "ring", "radius": R, "normal": [0, 1, 0], "mass": ring, "position": [0, 0, 0]}
+    seen = [{"name": "z", "quantity": "position", "body": "drum", "component": "z"}]
+    solve = {"kind": "dynamic", "duration": 0.3, "method": "explicit", "order": 4}
+    run = refweb.run(scene(points, [0, 1, 2], rope, body, solve, {3: mass}, observe=seen, output={"interval": 0.1}))
+    agrees(run.results["z"], 0.5 * (2.0 * pull / ring - G) * 0.3**2, 1.0)
+
+
+def test_the_hoist():
+    """The shipped scene: the load rises by R θ, the drum has R m g and the pulley the pull of both strands."""
+    run = refweb.run("hoist")
+    weight, radius, steps = 200.0 * G, 0.15, np.linspace(0.0, 1.0, 5)
+    rise = run.history["height"] - run.history["height"][0]
+    np.testing.assert_allclose(rise, radius * 4.0 * np.pi * steps, rtol=1e-6)
+    assert run.results["moment"].value == pytest.approx(radius * weight, rel=1e-10)
+    distance, pulley = 0.85, 0.1  # from the eye, level with the middle of the pulley
+    assert run.results["on_pulley"].value == pytest.approx(weight * (1.0 + pulley / distance), rel=1e-10)
+    assert [finding.code for finding in run.findings if finding.code == "body-not-felt"] == []
+
+
+# A ball that is caught
+
+
+@pytest.fixture(scope="module")
+def caught():
+    """(Places of ball and both ends, their velocities) after 0.5 s, by tangents from points and DOP853."""
+    masses = np.array([2.0, 1.0, 1.5])
+
+    def rate(t, y):
+        place = y[:9].reshape(3, 3)
+        p, q = place[1:] - place[0]
+        far = np.linalg.norm([p, q], axis=1)
+        plane = q - (q @ p) / (p @ p) * p
+        e = np.array([p / far[0], plane / np.linalg.norm(plane)])
+        end = np.arctan2(q @ e[1], q @ e[0])
+        leave = np.arccos(R / far[0]), end - np.arccos(R / far[1])  # azimuths of the points of contact
+        if leave[1] > leave[0]:
+            touch = [R * (np.cos(a) * e[0] + np.sin(a) * e[1]) for a in leave]
+            along = np.array([touch[0] - p, touch[1] - q])
+            length = np.linalg.norm(along, axis=1).sum() + R * (leave[1] - leave[0])
+        else:
+            along, length = np.array([q - p, p - q]), np.linalg.norm(q - p)
+        pull = SOFT * max(length / CAUGHT_LENGTH - 1.0, 0.0) * along / np.linalg.norm(along, axis=1)[:, None]
+        force = np.vstack([-pull.sum(axis=0), pull])
+        return np.concatenate([y[9:], (force / masses[:, None]).ravel()])
+
+    start = np.concatenate([np.ravel([BALL["position"], *CAUGHT]), THROWN, np.zeros(6)])
+    return solve_ivp(rate, (0.0, 0.5), start, "DOP853", rtol=1e-11, atol=1e-12, max_step=1e-3).y[:, -1].reshape(6, 3)
+
+
+CAUGHT, THROWN = [[-0.8, 0.0, 0.19], [0.8, 0.05, 0.21]], [0.3, 0.2, 3.0]
+CAUGHT_LENGTH, SOFT = 1.62, 200.0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_ball_is_caught(caught, method):
+    """All methods meet the program within ±, and keep energy, momentum and angular momentum."""
+    seen = [
+        {"name": f"{axis}{name}", "quantity": "position", "component": axis} | where
+        for name, where in (("ball", {"body": "drum"}), ("p", {"node": 0}), ("q", {"node": 1}))
+        for axis in "xyz"
+    ]
+    seen += [{"name": f"L{axis}", "quantity": "total_angular_momentum", "component": axis} for axis in "xyz"]
+    rope = {"nodes": [0, "drum", 1], "around": [{"body": "drum"}], "length": CAUGHT_LENGTH, "modulus": 1e5 * SOFT}
+    solve = {"kind": "dynamic", "duration": 0.5, **METHODS[method]}
+    solve |= (
+        {} if solve.get("method") in ("cvode", "ida") else {"safety": 0.1}
+    )  # the rope snaps taut: ± of few long steps is by chance
+    body = BALL | {"mass": 2.0, "velocity": THROWN}
+    run = refweb.run(
+        scene(CAUGHT, [], rope, body, solve, {0: 1.0, 1: 1.5}, gravity=[], observe=seen, output={"interval": 0.05})
+    )
+    for name, exact in zip((name for name in run.results if name[0] != "L"), caught[:3].ravel(), strict=True):
+        agrees(run.results[name], exact, 1.0)
+    history = run.history
+    assert np.ptp(history["total_energy"]) <= 1e-3 * history["total_energy"][0]
+    for axis in "xyz":
+        assert np.ptp(history[f"momentum_{axis}"]) <= 1e-12
+        assert (
+            np.ptp(history[f"L{axis}"]) <= 1e-6
+        )  # CVODE and IDA keep it to rtol^(2/3) of 1 kg m²/s, others to rounding
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-3, 0.3])
+@pytest.mark.parametrize("kind", ["ring", "sphere"])
+def test_bound_of_steps(kind, share):
+    """It is below 2/ω of the largest frequency, at any angle and strain, and close to the surface."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        points = rng.standard_normal((3, 3))
+        near = R * (1.0 + 10.0 ** rng.uniform(-6, 0, 3)) / np.linalg.norm(points[:, [0, 2]], axis=1)
+        points[:2] *= near[:2, None]  # short tangents as well
+        body = {"ring": BALL | {"shape": "ring", "normal": [0, 1, 0]}, "sphere": BALL}[kind]
+        around = OVER if kind == "ring" else {"body": "drum"}
+        rope = {"nodes": [0, "drum", 1, 2], "around": [around], "prestrain": share}
+        masses = dict(enumerate(10.0 ** rng.uniform(-2, 2, 3)))
+        given = scene(
+            points.tolist(), [], rope, body | {"mass": 10.0 ** rng.uniform(-2, 2)},
+            {"kind": "dynamic", "duration": 1.0}, masses, gravity=[],
+        )  # fmt: skip
+        system = given.build()
+        x = np.zeros((system.rows, 3))
+        K = system.pattern.matrix(system.stiffness(0.0, x)).toarray()
+        K = 0.5 * (K + K.T)
+        largest = eigh(K, np.diag(np.repeat(system.net.mass, 3)[system.free]), eigvals_only=True)[-1]
+        assert CentralDifference(system).bound(x) <= 2.0 / np.sqrt(max(largest, 1e-12))
+
+
+# Messages
+
+FIXED = DRUM | {"fixed": True}
+TWO = [[-R, 0, -1.0], [R, 0, -1.5]]
+FREE = {"kind": "dynamic", "duration": 0.1}
+
+
+@pytest.mark.parametrize(
+    "rope, body, text",
+    [
+        ({"around": []}, FIXED, r"around = \[\] must be a list of tables"),
+        ({"around": [{"body": "durm"}]}, FIXED, r'around\[0\].body = "durm" is not in nodes'),
+        ({"nodes": [0, "durm", 1], "around": [{"body": "durm"}]}, FIXED, r'is not a \[\[body\]\], did you mean "drum"'),
+        ({"around": [OVER, OVER]}, FIXED, r'around\[1\].body = "drum" is listed twice'),
+        ({"nodes": ["drum", 0, 1]}, FIXED, r'nodes\[0\] = "drum" is a body, which stands between two nodes'),
+        ({"nodes": [0, 1, "drum"]}, FIXED, r'nodes\[2\] = "drum" is a body'),
+        ({"nodes": [0, "drum", "drum", 1]}, FIXED, r'"drum" (follows itself|is a body)'),
+        ({"nodes": "ends"}, FIXED, r'nodes = "ends" must be a list'),
+        ({"around": [{"body": "drum"}]}, FIXED, r"around.side is missing: give the direction"),
+        (
+            {"around": [OVER | {"side": [0, 2, 0]}]},
+            FIXED,
+            r"around.side = \[0.0, 2.0, 0.0\] must not be along the axis",
+        ),
+        ({"around": [OVER | {"turns": -1}]}, FIXED, r"around\[0\] turns = -1 must be ≥ 0"),
+        ({"around": [OVER | {"turn": 1}]}, FIXED, r"around\[0\] turn = 1: unknown key, did you mean"),
+        ({}, BALL | {"fixed": True}, r"around.side has no meaning on a sphere"),
+        (
+            {"around": [{"body": "drum", "turns": 1}]},
+            BALL | {"fixed": True},
+            r"around.turns has no meaning on a sphere",
+        ),
+        (
+            {},
+            {"name": "drum", "shape": "box", "size": [1, 1, 1], "position": [0, 0, 0], "fixed": True},
+            r'around.body = "drum" is a box, must be a sphere',
+        ),
+        (
+            {},
+            FIXED | {"radius": 1.5},
+            r'node 0 is 1.0198 m from the middle of body "drum", must be ≥ its radius of 1.5 m',
+        ),
+        ({}, DRUM | {"mass": 1.0}, r"is a cylinder that turns; the axis under a thread keeps its direction"),
+        ({}, DRUM | {"mass": 1.0, "axle": {"direction": [1, 0, 0]}}, r"is a cylinder that turns"),
+        (
+            {},
+            DRUM | {"mass": 1.0, "axle": {"direction": [0, 1, 0], "point": [1, 0, 0]}},
+            r"has an axle beside its middle",
+        ),
+    ],
+)
+def test_messages(rope, body, text):
+    rope = {"nodes": [0, "drum", 1], "around": [OVER], **rope}
+    with pytest.raises(refweb.InputError, match=text):
+        scene(TWO, [0, 1], rope, body, FREE).build()
