@@ -36,7 +36,8 @@ class Around(Table):
     The thread lies on the surface along its shortest line, and leaves it where it does not touch. A cylinder or a ring
     counts as endless along its axis; on a sphere the thread goes the short way. The body is pressed by the thread. It
     may be fixed, moved, or on an axle; in dynamics a sphere or a ring may be free. The axis of a cylinder keeps its
-    direction. Mass of the thread stays at its nodes, and pictures draw it straight from node to node.
+    direction. Nodes of the thread begin outside of the body, and nothing keeps one off that is pulled into it. Mass of
+    the thread stays at its nodes, and pictures draw it straight from node to node.
 
     Each end of what runs over a cylinder stays within half a turn about the axis of where it is in the web, or, on a
     body that turns about its axle, of where this takes it: so all turns are counted, and a thread that has left the
