@@ -36,9 +36,12 @@ class Bars:
         Bars whose law is a curve.
     direction : ndarray, shape (bars, 3)
         Unit vectors, 0 of a bar without length.
+    matrix : csr_array, shape (bars, rows)
+        `refweb.net.net.Net.bars`.
     """
 
     def __init__(self, net, x):
+        self.matrix = net.bars
         axial = net.per_bar(net.line_data.ea)
         self._net, self.natural = net, net.bar_lengths
         self.stiffness = axial / self.natural
@@ -66,6 +69,17 @@ class Bars:
         if len(self.curved):
             energy[self.curved] = self.natural[self.curved] * self.evaluated("energy_density", self.strain)
         return energy
+
+    first = np.zeros(0, dtype=int)
+    """First bar of each thread, behind those of the lines."""
+
+    def shared(self, stretch):
+        """Change of force [N] by stretches of other bars [m]: none."""
+        return 0.0
+
+    def stretched(self, parts, size):
+        """Parts of the bars in the duality gap along themselves [J], for forces of that ``size`` [N]."""
+        return parts
 
     def evaluated(self, which, strain):
         """A kernel of the laws by name at strains of the curved bars."""

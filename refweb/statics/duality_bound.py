@@ -19,6 +19,9 @@ and this bound takes the place of the first two terms. The energy of these lines
 range of each tension. Of curved elements every quadrature point is such a line, a bar
 of natural length w L whose vector is w dx/dξ.
 
+A thread of the length l of all its segments has the tension τ, the largest of |s| along it, and beside W(l) + W*(τ) −
+τ l the part (τ − |s|) l_s of each segment.
+
 The computed forces are corrected until they balance the loads: s += D B p, where B p are changes of the vectors of the
 lines and Bᵀ D B p equals the unbalanced force. With the tangent, D = k t⊗t + (T/l)(1 − t⊗t), the correction has the
 least gap to second order. Newton's method leaves a factorization of this tangent or of a similar one. Where this
@@ -31,7 +34,7 @@ No term may fall below 0, else nothing is proven; `observables` read fields of `
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -62,6 +65,8 @@ class DualityBound:
         Bound on the error of the strain energy [J].
     sharp : bool
         True if the gap is at most `SHARP` times the least gap by rounding.
+    threads : ndarray, shape (threads,)
+        Bound on the error of the tension of each thread [N].
     """
 
     gap: float
@@ -69,6 +74,7 @@ class DualityBound:
     strain: np.ndarray
     strain_energy: float
     sharp: bool = False
+    threads: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 def duality_bound(system, equilibrium, factor=None):
@@ -77,17 +83,22 @@ def duality_bound(system, equilibrium, factor=None):
     Parameters
     ----------
     system : refweb.system.system.System
-        A system that is ``convex``.
+        A system that is ``bounded``.
     equilibrium : refweb.statics.equilibrium.Equilibrium
         Its state.
     factor : refweb.system.factorization.Factor, optional
         A factorization that is used again; if it holds a tangent, ``shift`` is its prestress τ [N].
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
-    bars = Bars(net, x)
     outer = sum(system.force_of(f, equilibrium.step, x) for f in system.terms if not f.balance.internal)
+    if net.threads:
+        from .thread_bars import ThreadBars
+
+        with_threads = ThreadBars(net, x)
+        balance = _Balance(system, with_threads, x, outer)
+        return balance.bound(*balance.by_tangent(with_threads.factor(system, equilibrium)))
+    balance = _Balance(system, Bars(net, x), x, outer)
     factor, bound = factor or Factor(system.pattern), None
-    balance = _Balance(system, bars, x, outer)
     if factor.shift is not None:
         bound = balance.bound(*balance.by_tangent(factor))
     if bound is None or not bound.sharp:
@@ -111,7 +122,7 @@ class _Balance:
     """
 
     def __init__(self, system, bars, x, outer):
-        self._system, self._bars, self._outer, self._of_bars = system, bars, outer, system.net.bars
+        self._system, self._bars, self._outer, self._of_bars = system, bars, outer, bars.matrix
         self._resultant = -self._of_bars.T.tocsc().astype(np.longdouble)
         self._force = bars.tension[:, None] * bars.direction
         self._reach = 2.0 * np.linalg.norm(x, axis=1).max()
@@ -141,7 +152,8 @@ class _Balance:
         down = self._of_bars.T.tocsr()
 
         def weigh(change):
-            return across * change + along * (change * bars.direction).sum(axis=1)[:, None]
+            stretch = (change * bars.direction).sum(axis=1)
+            return across * change + along * stretch[:, None] + bars.shared(stretch)
 
         def times(p):
             return (down @ weigh(self._of_bars @ self._rows(p))).ravel()[system.free]
@@ -176,9 +188,13 @@ class _Balance:
         if len(bars.curved):
             strain[bars.curved], energy_of_curved = _of_curved(bars, tension[bars.curved])
         straight = float(np.delete(self._energy, bars.curved).sum())
+        count = len(self._system.net.cells) * len(self._system.net.weights)
+        threads = tension[count:][bars.first]
         strain_energy = 2.0 * np.sqrt(straight * gap) + gap + energy_of_curved
-        tension, strain = (value.reshape(-1, len(self._system.net.weights)).max(axis=1) for value in (tension, strain))
-        return DualityBound(gap, tension, strain, strain_energy, bool(gap <= SHARP * self._least_gap))
+        tension, strain = (
+            value[:count].reshape(-1, len(self._system.net.weights)).max(axis=1) for value in (tension, strain)
+        )
+        return DualityBound(gap, tension, strain, strain_energy, bool(gap <= SHARP * self._least_gap), threads)
 
     def _rows(self, p):
         """Displacement of all rows, shape (rows, 3), from that of the unknowns."""
@@ -206,7 +222,7 @@ def _gaps(bars, force, size):
         strain = bars.strain_of(size[curved].astype(float))
         far = np.abs(strain - bars.strain) + 4.0 * np.finfo(float).eps * (1.0 + strain)
         stretched[curved] = np.abs(bars.tension - size)[curved] * bars.natural[curved] * far - apart[curved]
-    return stretched + turned
+    return bars.stretched(stretched, size) + turned
 
 
 def _of_curved(bars, error):

@@ -175,11 +175,13 @@ class Relaxation:
         if system.dead and not system.convex:
             stats["above_lowest"] = None if (per_cell.tension < 0.0).any() else 0.0
         state = Equilibrium(t, x, per_cell.tension.copy(), f, stats)
-        if system.convex:
+        if system.bounded:
             from .duality_bound import duality_bound
-            from .floating import between_slack_lines
 
             state.duality_bound = duality_bound(system, state)
+        if system.convex:
+            from .floating import between_slack_lines
+
             state.floating = between_slack_lines(system, state)
         elif system.net.law_is("plastic").any():
             from .monotone_loading import add_bounds

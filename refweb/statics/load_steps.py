@@ -69,11 +69,13 @@ def solve(system, load_steps, progress=None):
             solver, state = push.newton, push.equilibrium(t, x, error)
         if system.net.forming.any() or system.net.law_is("plastic").any():
             _refuse_far(system, t, state)
-        if system.convex:
+        if system.bounded:
             from .duality_bound import duality_bound
-            from .floating import between_slack_lines
 
             state.duality_bound = duality_bound(system, state, newton.factor)
+        if system.convex:
+            from .floating import between_slack_lines
+
             state.floating = between_slack_lines(system, state)
         elif system.net.law_is("plastic").any():
             from .monotone_loading import add_bounds

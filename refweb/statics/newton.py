@@ -366,7 +366,7 @@ class Newton:
         solve = self.factor.solve
         if (state.stability is None or state.stability.loose) and len(system.free):
             null = NullSpace(self.factor, self._tiny * system.pattern.matrix(self.geometric))
-            if state.duality_bound is None:
+            if not system.convex:
                 state.floating = null.floating(system, state.x)
             if state.floating is not None:
                 solve = null.solve

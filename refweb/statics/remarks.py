@@ -160,9 +160,9 @@ def _not_proven(state, equilibrium):
         name = state.system.resting[0].name
         text = f'body "{name}" is free: ± are estimates, as the proven bound asks for a web without free bodies'
         yield Finding("not-proven", text, "body")
-    if net.threads and proven.all():
-        text = f'thread "{net.threads[0].name}" runs through several nodes: ± are estimates, as the proven bound asks '
-        yield Finding("not-proven", text + "for lines between two nodes", "thread")
+    if net.threads and proven.all() and equilibrium.duality_bound is None:
+        text = f'thread "{net.threads[0].name}": ± are estimates, as the proven bound asks for threads with law = '
+        yield Finding("not-proven", text + '"tension-only" that run over no body, dead loads and no contact', "thread")
     if net.law_is("plastic").any():
         unseen = "a line that yields and turns back between two load steps is not seen; compare with more load_steps"
         start = 'lines can yield (law = "elastic-plastic"): ±'

@@ -559,18 +559,36 @@ class System:
 
         With free bodies it is False, since forces on carried nodes turn with them.
         """
-        if self.resting:
-            return False
+        return self._is_dead([f for f in self.terms if f.balance.internal])
+
+    def _is_dead(self, inner):
+        """Tell if all forces but those of the terms ``inner`` are dead loads, and these are the tensions of lines."""
         outer = [f for f in self.terms if not f.balance.internal]
-        inner = [f for f in self.terms if f.balance.internal]
-        return all(f.tangent.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
+        dead = all(f.tangent.stiffness is None and f.energy is not None for f in outer)
+        return not self.resting and dead and inner == [self.lines]
 
     @property
     def convex(self) -> bool:
-        """True if the potential is convex and the loads are dead: `refweb.statics.duality_bound` then bounds errors."""
+        """True if the potential of lines alone is convex and the loads are dead."""
+        return self._pulls and self.dead
+
+    @property
+    def _pulls(self):
+        """True if the potential of the lines is convex."""
         net = self.net
         negative = net.forming & (net.line_data.ea <= 0.0)
-        return bool((net.law_is("convex") & ~negative).all()) and self.dead
+        return bool((net.law_is("convex") & ~negative).all())
+
+    @property
+    def bounded(self) -> bool:
+        """True if `refweb.statics.duality_bound` bounds errors: the potential is convex and the loads are dead.
+
+        Beside lines there may be threads of the law of tension alone that run over no bodies.
+        """
+        if not self.net.threads:
+            return self.convex
+        plain = all(not thread.wraps and thread.line.law_is("cone").all() for thread in self.net.threads)
+        return plain and self._pulls and self._is_dead([f for f in self.terms if f.balance.internal and not f.observed])
 
     @property
     def contact(self) -> bool:

@@ -74,10 +74,23 @@ class OfThread(Observable):
         return NOT_NEGATIVE if pulls else ANY
 
     def error(self, state: State, equilibrium: Equilibrium) -> float | None:
-        """The estimate by deviations, and the rounding of the strain, which no node balances where all are held."""
-        error = super().error(state, equilibrium)
-        line = self._thread(state.system)[1].line
-        return None if error is None else error + ROUNDING * self.scale(line)
+        """The proven bound of duality, or else the estimate by deviations; and the rounding of the strain.
+
+        None if the thread may be slack within the bound and the value is no tension, which then is not unique.
+        """
+        net, line, bound = state.system.net, self._thread(state.system)[1].line, equilibrium.duality_bound
+        if bound is None:
+            error = super().error(state, equilibrium)
+            return None if error is None else error + ROUNDING * self.scale(line)
+        names = [thread.name for thread in net.threads]
+        error = float(bound.threads[names.index(self.observe.thread)])
+        if not self.pull and state.threads[self.observe.thread][0] <= error:
+            return None
+        return (error / float(line.axial[0]) + ROUNDING) * self.scale(line)
+
+    def proven(self, equilibrium: Equilibrium) -> bool:
+        """True if there is a bound from duality."""
+        return equilibrium.duality_bound is not None
 
 
 class Tension(OfThread):
