@@ -169,6 +169,26 @@ def test_a_drum_reels_in_a_rope(sense, axis):
         assert run.results[f"M{component}"].value == pytest.approx(exact, abs=1e-9 * weight)
 
 
+HUNG = [[-R, 0, -1.0], [R, 0, -1.5]], [0], {"nodes": [0, "drum", 1], "around": [OVER]}, DRUM | {"fixed": True}
+
+
+@pytest.mark.parametrize("method", ["newton", "relaxation"])
+def test_a_load_hangs_over_a_drum(method):
+    seen = [{"name": "z", "quantity": "displacement", "node": 1, "component": "z"}]
+    run = refweb.run(scene(*HUNG, {"kind": "static", "method": method}, {1: 3.0}, observe=seen))
+    assert run.results["z"].value == pytest.approx(-3.0 * G / EA * (2.5 + np.pi * R), rel=1e-9)
+
+
+def test_modes_of_a_load_over_a_drum():
+    """Up and down by EA/L, across by T/t of the hanging part t, along the axis by T/l of the whole, a helix."""
+    mass, natural = 3.0, 2.5 + np.pi * R
+    stretch = mass * G / EA * natural
+    stiffness = np.array([mass * G / (natural + stretch), mass * G / (1.5 + stretch), EA / natural])
+    frequencies = np.sqrt(stiffness / mass) / (2.0 * np.pi)
+    modes = refweb.modes(scene(*HUNG, {"kind": "static"}, {1: mass}), number=3)
+    np.testing.assert_allclose(modes.frequency, frequencies, rtol=1e-9)
+
+
 def test_two_ropes_on_a_drum():
     """A load unwinds its rope and winds up one that is held: both pull with the weight."""
     weight = 1.5 * G
