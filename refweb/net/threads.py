@@ -22,8 +22,6 @@ COLUMNS = 4
 """Numbers that the force observes: tension [N], stress [Pa], strain [1] and length [m]."""
 TAUT = 0.01
 """Strain up to which bounds of steps hold for tensions that are not there yet."""
-
-
 NEAR = 1e-3
 """Distance of rings that have come together, over the length of their thread."""
 
@@ -113,6 +111,10 @@ def thread_line(
     ends = [[0.0, 0.0, 0.0], [total, 0.0, 0.0]]
     web = Web(ends, [[0, 1]], None if length is None else [length])
     return ThreadLine(name, rows, vectors, distances, discretisation.build(web, cable, explicit=True), wraps)
+
+
+def coincident_nodes(net: Net, x: NDArray[np.float64], supported: NDArray[np.bool_]) -> str | None:
+    """Text that names nodes that have come together on a thread, which pulls them so; None where none have.
 
     ``x`` are displacements [m], shape (rows, 3), and ``supported`` is True for components that do not move.
     """

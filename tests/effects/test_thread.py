@@ -168,6 +168,8 @@ def test_heat_of_lines_leaves_threads_and_says_so():
     assert hot.results["pull"].value == cold.results["pull"].value
     (text,) = (text for text in hot.warnings if "[temperature]" in text)
     assert 'thread "rope" keeps its natural length' in text
+
+
 # Proven bounds
 
 
