@@ -4,6 +4,7 @@ The error of results and of the times of events is the difference of both runs, 
 method, times `SPREAD`. The second run takes place beside the first or after it.
 
 `sweeps.case` sets `THREADS`, rows are those of `Watch.compared`, and a changed factor changes ± of all results.
+`accuracy_loop._throw` repeats the factor of `add_errors`, `SPREAD`/(1 − `error_share`).
 """
 
 from __future__ import annotations

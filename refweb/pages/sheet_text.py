@@ -2,7 +2,8 @@
 
 The input is the content of ``run.json`` and of ``scene.toml``.
 
-Keys are those of ``web``, ``margin`` and ``utilisation`` in `run.json`; sentences are free.
+Keys are those of ``web``, ``margin`` and ``utilisation`` in `run.json`; sentences are free. The value of `PACKING`
+stands in the help of `commands.report` as well.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ step, a rotation vector. A node that it carries at the arm a moves by δ + θ ×
 moment of the force on it, |f| |a|.
 
 `registry.STATICS` names `solve`, `studies.trials` gives it ``tolerance``, and `stats` has the keys of Newton's method.
+The system is not changed: plastic strains are part of x, and `taken_on` returns another x between load steps.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ Therefore the energy balance is checked at every row: the run ends if ``|ΔE −
 energy.
 
 `splitting` derives from it and sets `kicks`, `drifts`, `stretch` and `_keys`; `Scheme` and `Running` get fields by
-position, and `SHARED` is the first part of `CLOCK`.
+position, and `SHARED` is the first part of `CLOCK`. `budget.steps_with_twin` repeats `TWIN_STEPS` as √2.
 """
 
 from __future__ import annotations

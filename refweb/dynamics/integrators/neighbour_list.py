@@ -13,7 +13,8 @@ A list is deep enough for the next `LASTS` steps, and for the bound on the steps
 `LONGEST` steps. Thus a list is made once in several rows, by a search over all lines.
 
 Places behind the terms in `records.ForceTerms` are in the order of `near_of`, for `contacts`, `step_bound` and
-`implicit_contacts` as well; no change may miss a contact.
+`implicit_contacts` as well; no change may miss a contact. `ccd` leaves out cells and checks by `depth`, `used`, `last`
+and `steps` of `SKIN`: their meaning stays, or a passage is missed.
 """
 
 from __future__ import annotations

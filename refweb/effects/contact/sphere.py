@@ -6,6 +6,7 @@ Contact is thus the same for any number of elements. Let p be the vector from th
 on the element, p' = ∂p/∂ξ, and m = ∂(p·p')/∂q. Then the Hessian of ½ d² is BᵀB − m mᵀ/(|p'|² + p·p'') while 0 < ξ < 1.
 
 Force, energy and stiffness change together, ``out`` is a `TOUCH`, and the order of sums decides the bits of impacts.
+`friction` computes the push of spheres by kernels of its own: a change of the law is made in both.
 """
 
 from __future__ import annotations

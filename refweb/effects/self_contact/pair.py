@@ -4,6 +4,7 @@ Cells of a term are pairs, of the nodes of one element and of another, or elemen
 `refweb.effects.self_contact.search` makes pairs of them.
 
 `table` and `search.paired` write these fields by name; an element with the ``scale`` 0 is broken.
+`line_line_ccd.neighbours` writes `PAIR` as well, and only `touch`, `scale` and `vectors`.
 """
 
 from __future__ import annotations
