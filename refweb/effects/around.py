@@ -1,4 +1,7 @@
-"""Bodies that a thread runs over: spheres, cylinders and rings, and how it lies on them in the web's position."""
+"""Bodies that a thread runs over: spheres, cylinders and rings, and how it lies on them in the web's position.
+
+Keys of `Around` are the scene format, and its docstring is help; `winding` reads `Wrap` and the numbers of kinds.
+"""
 
 from __future__ import annotations
 

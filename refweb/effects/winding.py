@@ -15,6 +15,9 @@ plane. The body takes minus the sum, and the moment of both pulls about its base
 The angle θ follows from the azimuths of both ends. Each is within half a turn of that in the web's position; that of a
 node on a body that turns about its axle, within half a turn of the one that it turns to. So any number of turns is
 counted, and nothing is remembered from step to step.
+
+Columns of ``out`` are those of `net.threads.COLUMNS`; length, gradient and tangent change together, and the bound may
+be too large, never too small.
 """
 
 from __future__ import annotations

@@ -8,6 +8,8 @@ has the derivative
 λ has the form of a displacement, and λ·f is the virtual work of the forces. That of an element is −Σ w T t·λ' with λ' =
 dλ/dξ, so that its derivatives are those of the tension: by EA, T/EA; by natural length, −(1 + ε) T'/L. Of masses they
 are the accelerations of gravity and of rotating axes, of loads λ itself, and of positions of supports −Kᵀ λ there.
+
+`gradients` and `responses` read its sensitivities by line; what it leaves out, `gradients` must refuse.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 By line and group they follow from the adjoint of the equilibrium alone, see `refweb.statics.adjoint`. By one number of
 the scene, at a path such as ``cable.area`` or ``load.0.force.2``, J + λ·f is differentiated at the displacement of the
 equilibrium, by systems that are built with other values of the number: no equilibrium is solved again.
+
+`solution.gradient` and `commands.gradient` are its faces; paths are those of `--set`.
 """
 
 from __future__ import annotations

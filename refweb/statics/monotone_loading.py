@@ -4,6 +4,8 @@ As long as a line that yields is not let go, its tension is a function of strain
 then along the slope of hardening over the elastic and the plastic strain together (Hencky's deformation theory). So the
 equilibrium is that of lines with a curve, whatever the path has been, and `refweb.statics.duality_bound` proves it. It
 has no bound where a line yields without hardening, since its tension then tells nothing of its strain.
+
+`load_steps` and `dynamic_relaxation` add its bounds, and `gradients` differentiates its system.
 """
 
 from __future__ import annotations

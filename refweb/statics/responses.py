@@ -2,6 +2,8 @@
 
 A largest or smallest value is that of one line, node or element; where others have the same value within ±, the result
 has one derivative to each side, and there is a `Response` for each of these.
+
+A new quantity needs a branch here, or `gradients` refuses it by name.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Bars of a net with threads: those of its lines, and a bar for each segment of a thread, which share one tension."""
+"""Bars of a net with threads: those of its lines, and a bar for each segment of a thread, which share one tension.
+
+`duality_bound` uses it in place of `bars` and calls the same methods.
+"""
 
 from __future__ import annotations
 

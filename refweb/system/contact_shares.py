@@ -3,6 +3,8 @@
 Contact with a sphere acts once a line, at the element that comes deepest, so that its energy is the largest of those of
 the elements, max e_c. With shares α_c ≥ 0 that add up to 1 the energy is Σ α_c e_c and the force Σ α_c f_c, as of
 elements that each have a contact of stiffness α_c k.
+
+`results.folder` keeps shares in checkpoints under their name, and `solution` reads them back.
 """
 
 from __future__ import annotations

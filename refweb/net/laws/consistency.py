@@ -3,6 +3,8 @@
 Over a short interval of strain, the rise of the energy over that of strain lies between the smallest and the largest
 stress of the interval, and the rise of the stress between the smallest and the largest tangent. This holds at kinks
 too, so that the smoothness of a law does not matter.
+
+`net.discretisation` asks it for laws of other packages alone; strains and the tolerance are free.
 """
 
 from __future__ import annotations
