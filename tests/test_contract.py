@@ -90,6 +90,13 @@ EXAMPLES = {
         | dict(modulus=1e5, area=2e-4, density=0.0),
         dict(name="rope", nodes=[0, "drum", 5, "hoop", 2], modulus=1e5, area=2e-4, density=0.0, prestrain=0.1)
         | dict(around=[dict(body="drum", side=(0.0, 0.0, 1.0), turns=1), dict(body="hoop", side=(-1.0, 0.0, 0.0))]),
+        dict(name="rope", nodes=[0, 4, 2, 3], modulus=1e5, area=2e-4, density=0.0, prestrain=0.3, friction=[0.05, 0.2]),
+        dict(name="rope", nodes=[5, 1, 4, 1, 3], closed=True, modulus=1e5, area=2e-4, density=0.0, friction=0.1)
+        | dict(prestrain=0.2),
+    ],
+    "Winch": [
+        dict(thread="rope", end="first", tension=10.0, speed_limit=0.02),
+        dict(thread="rope", end="last", speed=[(0.0, 0.1), (1.0, 0.05)], limit=4.0),
     ],
     "Reel": [
         dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
@@ -151,7 +158,8 @@ def make(name, i, law, tensionless=False):
     net = discretisation.build(web, replace(nets.skew_cable(law), subdivide=pieces))
     touched = name in ("Contact", "Attach", "Damping") or "around" in EXAMPLES[name][i]
     bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if touched else []
-    system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
+    threads = [example("Thread", 7)] if name == "Winch" else []
+    system = System(net, [*bodies, *threads, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
     return system.net, system
 
 
@@ -346,6 +354,7 @@ def test_extension(name, i):
     net = skew_net()
     for number in range(5) if "around" in EXAMPLES[name][i] else [1] if name == "Attach" else []:
         net = example("Body", number).extend(net)
+    net = example("Thread", 0).extend(net) if name == "Winch" else net
     before = net.points.copy(), net.mass.copy()
     effect = example(name, i)
     longer = effect.extend(net)

@@ -148,10 +148,20 @@ EFFECTS = {
             density=ANY,
             optional={
                 "prestrain": SIGNED,
+                "friction": ANY,
                 "around": st.lists(
                     table(body=st.just("ball"), optional={"side": VECTOR, "turns": st.integers(-1, 3)}), max_size=1
                 ),
             },
+        ),
+        min_size=1,
+        max_size=1,
+    ),
+    "winch": st.lists(
+        table(
+            thread=st.just("rope"),
+            end=st.sampled_from(["first", "last"]),
+            optional={"speed": SIGNED, "limit": ANY, "tension": ANY, "speed_limit": ANY},
         ),
         min_size=1,
         max_size=1,

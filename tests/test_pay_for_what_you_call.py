@@ -298,6 +298,7 @@ TABLES = {
     "bending": {"stiffness": 1e-3},
     "self_contact": {"radius": 1e-3},
     "reel": {"lines": [2, 3], "factor": [[0.0, 1.0], [1.0, 0.9]]},
+    "winch": {"thread": "rope", "end": "last", "tension": 10.0},
     "temperature": {"expansion": 1e-5, "change": 10.0},
     "rupture": {"strength": 1e9},
     "fold": {"ratio": 0.5, "gap": 0.0},
@@ -317,6 +318,7 @@ KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1} 
 KERNELS["orbit"] = KERNELS["frame"]
 KERNELS["rupture"] = TERM
 KERNELS["drag"] = {**TERM, **dict.fromkeys(SOLVED, 1)}
+KERNELS["winch"] = {**dict.fromkeys(TERM, 3), "relax": 1}  # beside the thread: what it stores, loses and winds
 KERNELS |= {name: {} for name in ("reel", "temperature", "point_mass", "velocity", "body", "fold")}
 """Kernels that each effect adds to the lists of the compiled loop, which takes no links."""
 
@@ -329,6 +331,8 @@ def scene_of(*effects):
         given["body"] = [BALL]
     if "attach" in effects:
         given["body"] = [*given.get("body", []), WALL]
+    if "winch" in effects:
+        given["thread"] = [TABLES["thread"]]
     if "fold" in effects:
         given["supports"] = {"nodes": []}
     if "link" in effects:
@@ -380,7 +384,7 @@ def expected(*effects):
         held = set()
     if "bending" in effects:
         pairs = pairs + continued(web)
-    if "thread" in effects:  # every node of it with every other
+    if {"thread", "winch"} & set(effects):  # every node of it with every other
         pairs = pairs + list(itertools.combinations(TABLES["thread"]["nodes"], 2))
     if "self_contact" in effects:  # every line with every other
         pairs = pairs + [(one, other) for one in range(rows) for other in range(one) if apart(web, one, other)]
@@ -454,6 +458,8 @@ def summed(*effects):
     for name in effects:
         for which, number in KERNELS[name].items():
             total[which] += number * (2 if name == "drag" and {"body", "contact"} & set(effects) else 1)
+    for which in TERM if "winch" in effects and "thread" not in effects else ():
+        total[which] += 1  # its thread
     total["work of lengths"] = int(bool({"reel", "temperature"} & set(effects)))
     for which in TERM if "damping" in effects and total["work of lengths"] else ():
         total[which] += 1  # the work of lengths against damping

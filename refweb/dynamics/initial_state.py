@@ -265,4 +265,6 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
         )
         if (len(rows_there) == 2) != (body.turn is not None) or not all(alike):
             _turn(body, bearings[body.name], rows_there, x, v)
+    for thread in net.threads:
+        thread.rewind(x)
     return Start(x if set(net.internal_names) <= set(row) else system.settled(x), v)

@@ -280,8 +280,9 @@ class InternalVariables(NamedTuple):
     title : str
         Table or key of a scene that brings them, for messages.
     follower : object, optional
-        Has ``taken_on(net, x)``, the displacement of all rows with variables that follow at once and are no unknowns,
-        and ``plastic_strain(net, x)`` and ``strain(net, x)`` at each point; None where all are unknowns.
+        Has ``taken_on(net, x, t)``, the displacement of all rows with variables that follow at once and are no
+        unknowns; ``grown(net, x, t)``, numbers that fall where one of them would turn back; and ``drive(net, x, t)``,
+        numbers of as many that are largest there. None where all are unknowns.
     """
 
     components: np.ndarray
@@ -293,6 +294,18 @@ class InternalVariables(NamedTuple):
     follower: Any = None
 
 
+def with_rows(net: Net, count: int) -> Net:
+    """The net with rows of internal variables behind all others."""
+    more = np.zeros((count, 3))
+    return replace(
+        net,
+        points=np.vstack([net.points, more]),
+        mass=np.append(net.mass, more[:, 0]),
+        spins=net.spins + count,
+        internal=net.internal + count,
+    )
+
+
 def with_internal(net: Net, name: str, each: int, length_force: Callable[[Net], Any]) -> Net:
     """The net with rows for ``each`` internal variables of every element behind all others, three to a row.
 
@@ -300,23 +313,17 @@ def with_internal(net: Net, name: str, each: int, length_force: Callable[[Net], 
     of the net, internal variables included.
     """
     count, width = len(net.cells), -(-each // 3)
-    more = np.zeros((width * count, 3))
-    return replace(
-        net.with_column(name, float(len(net.points)) + width * np.arange(count)),
-        points=np.vstack([net.points, more]),
-        mass=np.append(net.mass, more[:, 0]),
-        spins=net.spins + len(more),
-        internal=len(more),
-        length_force=length_force,
-    )
+    first = float(len(net.points)) + width * np.arange(count)
+    return replace(with_rows(net.with_column(name, first), width * count), length_force=length_force)
 
 
 def with_numbers(net: Net, x: NDArray[np.float64] | None, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     """Displacement of all rows, by default 0, with other internal variables, shape (elements, each)."""
     x = np.zeros(net.points.shape) if x is None else x.copy()
-    rows = np.zeros((len(net.cells), 3 * (net.internal // len(net.cells))))
+    first = len(x) - net.internal
+    rows = x[first : first + net.rows_of_elements].reshape(len(net.cells), -1)
+    rows[:] = 0.0
     rows[:, : numbers.shape[1]] = numbers
-    x[len(x) - net.internal :] = rows.reshape(-1, 3)
     return x
 
 

@@ -261,7 +261,7 @@ class Damping(Table):
         terms, free = [], [body.row for body in net.bodies if not body.prescribed]
         if self.bodies and not free:
             raise InputError(f"bodies = {self.bodies:g} [1/s]: the scene has no free [[body]], leave it out")
-        if self.time and net.internal:
+        if self.time and net.rows_of_elements:
             from .viscous import refuse_beside
 
             refuse_beside(net, f"time = {self.time:g} [s]")

@@ -290,18 +290,18 @@ class PlasticLines:
         )
         return [tension, lost]
 
-    def plastic_strain(self, net, x):
+    def grown(self, net, x, t):
         """Plastic strain at each quadrature point of each element, see `plastic_strain`."""
         return plastic_strain(net, x)
 
-    def strain(self, net, x):
+    def drive(self, net, x, t):
         """Strain at each quadrature point of each element, shape (cells, points)."""
         return elasticity.strains(net, x)
 
-    def taken_on(self, net, x):
+    def taken_on(self, net, x, t):
         """Displacement of all rows with the plastic strains that it asks for, from those of before in x."""
         return with_numbers(net, x, states(net, x))
 
     def settled(self, net, x):
         """Displacement of all rows with the plastic strains of new lines there."""
-        return self.taken_on(net, with_numbers(net, x, np.zeros((len(net.cells), 0))))
+        return self.taken_on(net, with_numbers(net, x, np.zeros((len(net.cells), 0))), 0.0)

@@ -1,4 +1,6 @@
-"""Threads: lines of one material that run through a list of nodes in order, and slide there without friction.
+"""Threads: lines of one material that run through a list of nodes in order, and slide there.
+
+With friction at the nodes see `refweb.effects.thread_friction`. Without, as follows.
 
 One tension rules a whole thread. With the lengths l_s of its segments, its natural length L and a unit vector t_s along
 each segment, from its first node to its second,
@@ -19,13 +21,12 @@ Kernels count columns of data from ``width``, observables read ``out`` by positi
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..accepted import accepts, array
+from ..accepted import accepts, any_of, array
 from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
@@ -34,9 +35,10 @@ from ..net.law_keys import points
 from ..net.materials import MATERIALS
 from ..net.threads import COLUMNS, TAUT, ThreadLine
 from ..registry import LAWS
-from ..tables import Several, Table, boolean, choice, field, nodes, numbers_by_name, real, table, text
+from ..tables import Several, Table, boolean, checked, choice, field, nodes, numbers_by_name, real, table, text
 from .base import Balance, ForceTerm, Tangent
 from .line_kernels import line_at
+from .thread_segments import segment_kernel
 
 if TYPE_CHECKING:
     from ..net.net import Net
@@ -75,18 +77,7 @@ def kernels(law, record, width):
         Columns of a cell ahead of 1/A and of the vector and distance of each segment in the web's position.
     """
     stress, tangent, energy_density = law.stress, law.tangent, law.energy_density
-
-    @kernel(forceinline=True)
-    def segment(x, cells, data, c, s):
-        """(Vector, 1/length or 0, length, length less that in the web's position) of segment s of cell c."""
-        i, j, k = cells[c, s], cells[c, s + 1], width + 1 + 4 * s
-        r0, r1, r2, distance = data[c, k], data[c, k + 1], data[c, k + 2], data[c, k + 3]
-        u0, u1, u2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-        p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
-        length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
-        square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2
-        both = length + distance
-        return p0, p1, p2, 1.0 / length if length > 0.0 else 0.0, length, square / both if both > 0.0 else 0.0
+    segment = segment_kernel(width)
 
     @kernel()
     def strain_of(x, cells, data, c):
@@ -168,15 +159,35 @@ def kernels(law, record, width):
     return force, energy, stiffness, bound
 
 
+_number = real(at_least=0.0)
+_coefficient = _number.metadata["read"].accepts
+
+
+@accepts(any_of(_coefficient, array(_coefficient, 1)))
+def _coefficients(name, value):
+    """Read a number ≥ 0, or a list of such."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if not isinstance(value, (list, tuple)):
+        return checked(name, value, _number)
+    if not value:
+        raise InputError(f"{name} = [] must be a number for each ring, or one for all")
+    return tuple(checked(f"{name}[{i}]", coefficient, _number) for i, coefficient in enumerate(value))
+
+
 @table
 class Thread(Table):
-    """A thread of one material through a list of nodes, on which it slides without friction.
+    """A thread of one material through a list of nodes, its rings, on which it slides, with friction or without.
 
-    A drawstring, a rope over pulleys or a line with rings on it: one tension rules all of it, by the sum of the
-    distances of neighbours in the list. Nodes may be free, supported, moved, or on a body by ``[[attach]]``. A thread
-    may pass a node several times, as a tackle does. It touches the bodies of ``around`` alone, and no lines, and does
-    not break; where it may touch others, let a chain of lines do so by ``[contact]``. Rings that nothing keeps apart
-    slide together; statics finds no equilibrium there, where the thread has no direction.
+    A drawstring, a rope over pulleys or a line with rings on it. Without ``friction`` one tension rules all of it, by
+    the sum of the distances of neighbours in the list. With it each segment has a tension and a share of the material
+    of its own, at first in proportion to the distances. Material goes over a ring when the tension on one side is
+    above e^(μθ) times that on the other, θ the angle by which the thread turns there, as on a capstan. Energy that is
+    lost so is ``dissipated_energy``. Statics finds what slips between load steps as if each ring went one way.
+
+    Nodes may be free, supported, moved, or on a body by ``[[attach]]``. A thread may pass a node several times, as a
+    tackle does. It touches the bodies of ``around`` alone, and no lines, and does not break; where it may touch others,
+    let a chain of lines do so by ``[contact]``. Rings that nothing keeps apart slide together; statics finds no
+    equilibrium there, where the thread has no direction.
 
     Its mass is shared by its nodes, half of each segment to either end as it lies in the web's position, and stays
     there: material that slides through a ring brings no mass along. Where masses of a thread count beside those of its
@@ -200,9 +211,13 @@ class Thread(Table):
         Strain in the web's position [1], > −1; negative is slack.
     around : list of tables, optional
         Bodies that the thread runs over between two nodes, ``[{ body = ..., side = ..., turns = ... }]``.
+    friction : float or list of float, optional
+        Friction coefficient μ of the rings [1], ≥ 0: one for all, or one for each in the order of ``nodes``, without
+        the ends of an open thread. A large one, 1e3, ties the thread to the ring. The thread has shares of segments,
+        and an observable ``slip``, also where it is 0. Not beside ``around``.
     law : {"tension-only", "smooth", "table"}
         Tension law, as in ``[cable]``; or that of another package, unless it is one of bars or of form finding, or
-        yields.
+        yields. With ``friction`` one that does not push: not "smooth".
     material, modulus, area, density, slackness, smoothing, stress, tension, parameters
         As in ``[cable]``.
 
@@ -210,8 +225,9 @@ class Thread(Table):
     ------
     InputError
         For fewer than two nodes, a node that follows itself, ``length`` beside ``prestrain``, a law of bars, of form
-        finding or that yields, and what ``[cable]`` refuses. From ``extend``, for a name that is listed twice, one that
-        is not one node of the web, and nodes that are all in one point.
+        finding or that yields, one that pushes beside ``friction``, and what ``[cable]`` refuses. From ``extend``, for
+        a name that is listed twice, one that is not one node of the web, nodes that are all in one point, and with
+        ``friction`` for another number of coefficients than of rings, and for neighbours in one point.
 
     Examples
     --------
@@ -232,6 +248,7 @@ class Thread(Table):
     length: float | None = real(default=None, above=0.0, unit="m")
     prestrain: float = real(default=0.0, above=-1, unit="1")
     around: Any = field(_around, default=None)
+    friction: Any = field(_coefficients, default=None, unit="1")
     law: str = choice(LAWS, default="tension-only")
     material: str | None = choice(*MATERIALS, default=None)
     modulus: Any = real(default=None, above=0, unit="Pa")
@@ -264,6 +281,10 @@ class Thread(Table):
         if law.bar or law.forming or law.plastic:
             why = "is one of bars, which push" if law.bar else "is for form finding" if law.forming else "yields"
             raise InputError(f'law = "{self.law}" {why}: a thread takes "tension-only", "smooth" or "table"')
+        if self.friction is not None and self.around:
+            raise InputError("friction and around exclude each other: bodies of a thread have no friction yet")
+        if self.friction is not None and law.pushes:
+            raise InputError(f'law = "{self.law}" pushes: with friction a thread takes "tension-only" or "table"')
         self._cable()
 
     def _refuse_repeated(self, listed):
@@ -289,10 +310,27 @@ class Thread(Table):
         rows, over = self._rows(net.web)
         wraps = tuple(around.wrap(net, at, rows[at], rows[at + 1]) for at, around in over)
         thread = thread_line(self.name, net.web.points[rows], rows, self._cable(), self.length, wraps)
+        thread = thread._replace(closed=self.closed, friction=self._friction(thread))
         mass = net.mass.copy()
         np.add.at(mass, rows[:-1], 0.5 * thread.masses)
         np.add.at(mass, rows[1:], 0.5 * thread.masses)
         return replace(net, mass=mass, threads=(*net.threads, thread), kept=(*net.kept, *thread.line.kept))
+
+    def _friction(self, thread):
+        """Coefficient of each ring in the order of segments, see `refweb.net.threads.ThreadLine`."""
+        given, rings = self.friction, len(thread.distances) - (not self.closed)
+        if given is None:
+            return ()
+        if isinstance(given, tuple) and len(given) != rings:
+            raise InputError(
+                f"friction has {len(given)} numbers, must have {rings}, one for each ring, or be one number"
+            )
+        for first, second in thread.segments[thread.distances == 0.0][:1]:
+            raise InputError(
+                f"nodes {first} and {second} follow each other in one point: with friction move them apart"
+            )
+        by_ring = given if isinstance(given, tuple) else (given,) * rings
+        return by_ring[1:] + by_ring[:1] if self.closed else by_ring
 
     def _rows(self, web):
         """(Numbers of its nodes in order, the first again at the end if it is closed, int32, `Around` by segment)."""
@@ -314,26 +352,51 @@ class Thread(Table):
         self._refuse_repeated(rows)
         return np.array([*rows, rows[0]] if self.closed else rows, dtype=np.int32), over
 
-    def on(self, net: Net) -> ForceTerm:
-        """The term of one cell, whose ``out`` is tension, stress, strain and length."""
-        thread = next(thread for thread in net.threads if thread.name == self.name)
+    def add_internal(self, net: Net) -> Net:
+        """The net with rows for the slips at rings with friction."""
+        if not self._in(net).rings:
+            return net
+        from .thread_friction import with_slips
+
+        return with_slips(net, self.name)
+
+    def settled(self, net: Net, x: Any) -> Any:
+        """Displacement of all rows as a run begins from, None as it is given, with slips at rings with friction."""
+        if x is None or not self._in(net).rings:
+            return x
+        from .thread_friction import settled
+
+        return settled(self._in(net), net, x)
+
+    def _in(self, net):
+        """The `ThreadLine` of a net."""
+        return next(thread for thread in net.threads if thread.name == self.name)
+
+    def on(self, net: Net) -> ForceTerm | list[ForceTerm]:
+        """The terms of one cell; ``out`` of the first is tension, stress, strain and length.
+
+        With friction tensions of segments and slips of rings follow these.
+        """
+        thread = self._in(net)
         if thread.wraps:
             from .winding import term
 
             return term(net, thread)
-        return _term(thread)
+        if not thread.rings:
+            return _term(thread)
+        from .thread_friction import terms
+
+        return terms(thread)
 
 
 def _term(thread: ThreadLine):
     """The term of a thread."""
     line = thread.line
-    numbers = line.line_data.matrix
-    force, energy, stiffness, bound = kernels(line.law, line.law_record, numbers.shape[1])
-    segments = np.column_stack([thread.vectors, thread.distances])
+    force, energy, stiffness, bound = kernels(line.law, line.law_record, line.line_data.matrix.shape[1])
     return ForceTerm(
         name="thread",
         cells=thread.rows[None, :],
-        data=np.concatenate([numbers[0], 1.0 / line.area, segments.ravel()])[None, :],
+        data=thread.numbers[None, :],
         force=force,
         energy=energy,
         tangent=Tangent(stiffness, bound, across=thread.across),

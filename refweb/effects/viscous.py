@@ -295,8 +295,7 @@ class ViscousArms:
         """Terms of the springs of the arms, with the tension of lines and arms, and of their dashpots."""
         force, energy, stiffness, bound, power, relax, _ = of(net)
         first = len(net.points) - net.internal
-        width = net.internal // len(net.cells)
-        rows = first + np.arange(net.internal, dtype=np.int32).reshape(len(net.cells), width)
+        rows = first + np.arange(net.rows_of_elements, dtype=np.int32).reshape(len(net.cells), -1)
         cells = np.hstack([net.cells, rows.astype(np.int32)])
         resistance = np.array([net.line_data[f"arm_ea_{k}"] * tau for k, (_, tau) in enumerate(self.viscous.arms)])
         by_component = (resistance.T[:, None, :] * net.weights[:, None]).reshape(len(net.cells), -1)
@@ -344,5 +343,5 @@ def refuse_beside(net, what):
     """Refuse ``what`` beside arms or lines that yield; `InputError`."""
     if ROW in net.line_data.dtype.names:
         raise InputError(f"{what} cannot stand beside [cable.viscous]: give it one more arm, of a short time, instead")
-    if net.internal:
+    if net.rows_of_elements:
         raise InputError(f'{what} cannot stand beside law = "elastic-plastic": damp with rate = ... [1/s]')

@@ -178,8 +178,14 @@ class Net:
     @property
     def internal_names(self) -> list[str]:
         """Names of the rows of internal variables, by element and number, a list."""
-        width = self.internal // max(len(self.cells), 1)
-        return [f".{width}.{number}" for number in range(self.internal)]
+        width = self.rows_of_elements // max(len(self.cells), 1)
+        names = [f".{width}.{number}" for number in range(self.rows_of_elements)]
+        return names + [f".slips.{thread.name}.{n}" for thread in self.threads for n in range(thread.rows_of_slips)]
+
+    @property
+    def rows_of_elements(self) -> int:
+        """Number of rows of internal variables of elements, which stand before those of threads."""
+        return self.internal - sum(thread.rows_of_slips for thread in self.threads if thread.first >= 0)
 
     @property
     def carried(self) -> list[int]:

@@ -41,6 +41,17 @@ class ThreadLine(NamedTuple):
         The same material as one line from end to end of the sum of the distances, which has its law and numbers.
     wraps : tuple of refweb.effects.around.Wrap
         Segments on bodies; their ``distances`` are along these.
+    closed : bool
+        True if it runs on from its last segment to the first.
+    friction : tuple of float
+        Friction coefficient of each ring [1]: of the node between segments r and r + 1, in a closed thread last of that
+        between the last segment and the first; empty without friction.
+    first : int
+        First row of the numbers of its rings, see `refweb.effects.thread_friction`; −1 without friction.
+    winch : tuple of float
+        Numbers of a winch at an end, see `refweb.effects.winch`; empty without one.
+    at_last : bool
+        True if the winch is at its last node.
     """
 
     name: str
@@ -49,6 +60,11 @@ class ThreadLine(NamedTuple):
     distances: NDArray[np.float64]
     line: Net
     wraps: tuple[Any, ...] = ()
+    closed: bool = False
+    friction: tuple[float, ...] = ()
+    first: int = -1
+    winch: tuple[float, ...] = ()
+    at_last: bool = False
 
     @property
     def title(self) -> str:
@@ -69,6 +85,60 @@ class ThreadLine(NamedTuple):
     def masses(self) -> NDArray[np.float64]:
         """Mass of each segment by its share of the distances [kg], shape (segments,)."""
         return self.line.element_mass[0] * self.distances / self.distances.sum()
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """Numbers of its cell: of the line, 1/A, and the vector and distance of each segment, shape (columns,)."""
+        segments = np.column_stack([self.vectors, self.distances])
+        return np.concatenate([self.line.line_data.matrix[0], 1.0 / self.line.area, segments.ravel()])
+
+    @property
+    def ends(self) -> int:
+        """Kind of its ends: 0 if both are at nodes, 1 if they are one, 2 with a winch at the first, 3 at the last."""
+        return int(self.closed) if not self.winch else 3 if self.at_last else 2
+
+    @property
+    def rings(self) -> int:
+        """Number of its rings with friction, and of its winch."""
+        return len(self.friction) + bool(self.winch)
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times at which the speed of its winch has a corner [s]."""
+        return self.winch[5::2]
+
+    @property
+    def rows_of_slips(self) -> int:
+        """Number of rows of the numbers of its rings."""
+        return -(-(2 * self.rings + 1 + 2 * bool(self.winch)) // 3) if self.rings else 0
+
+    def slips(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Length that has gone over each ring with friction [m] in displacements of all rows, shape (rings,)."""
+        return x[self.first : self.first + self.rows_of_slips].ravel()[: self.rings]
+
+    def wound_until(self, x: NDArray[np.float64]) -> float:
+        """Time until which its winch has wound [s], in displacements of all rows."""
+        return float(x[self.first : self.first + self.rows_of_slips].ravel()[2 * self.rings + 1])
+
+    def rewind(self, x: NDArray[np.float64]) -> None:
+        """Let the time of its winch begin at 0 in displacements of all rows, where it has one."""
+        if self.winch:
+            x[self.first : self.first + self.rows_of_slips].reshape(-1)[2 * self.rings + 1] = 0.0
+
+    def natural_lengths(self, slips: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Natural length of each segment [m], shape (segments,), by the slips of its rings."""
+        over = np.append(slips, 0.0)[: len(self.distances)]
+        gained = np.roll(over, 1) - over
+        if self.winch and self.at_last:
+            gained[0] -= over[-1]
+        elif self.winch:
+            gained[-1] += over[-1]
+        return self.natural_length * self.distances / self.distances.sum() + gained
+
+    def tensions(self, observed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Tension of each segment [N], shape (segments,), by what its force observes."""
+        count = len(self.distances)
+        return observed[COLUMNS : COLUMNS + count] if self.rings else np.full(count, observed[0])
 
     @property
     def segments(self) -> NDArray[np.int32]:

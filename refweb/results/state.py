@@ -58,7 +58,11 @@ class State:
 
     @property
     def threads(self) -> dict[str, NDArray[np.float64]]:
-        """Tension [N], stress [Pa], strain [1] and length [m] of each thread by name."""
+        """Tension [N], stress [Pa], strain [1] and length [m] of each thread by name.
+
+        With friction the first three are those of the segment with the largest tension, and the tension of each segment
+        and the slip over each ring [m] follow.
+        """
         return self._forces[4]
 
     def overlap(self, body: Any) -> NDArray[np.float64]:
@@ -144,7 +148,7 @@ class State:
         fixed[net.web.bare] = True  # by a link
         fixed[net.cells[net.law_is("bar") | ~self.element_slack].ravel()] = True
         for thread in net.threads:
-            fixed[thread.rows] |= self.threads[thread.name][0] > 0.0
+            fixed[thread.segments[thread.tensions(self.threads[thread.name]) > 0.0].ravel()] = True
         return np.flatnonzero(~fixed[: net.nodes])
 
     @cached_property
@@ -184,7 +188,8 @@ class State:
             energy = float(self.system.energy_of(term, self.time, self.x).sum())
             book[term.balance.column] = book.get(term.balance.column, 0.0) + energy
         work = -book.pop("work", 0.0)
-        book |= {"total_energy": sum(book.values()), "work": work}
+        stored = sum(energy for name, energy in book.items() if name != "dissipated_energy")
+        book |= {"total_energy": stored, "work": work}
         return {name: book[name] for name in static_energies(self.system)}
 
 

@@ -9,6 +9,7 @@ import functools
 
 import numpy as np
 
+from ..net.threads import COLUMNS
 from .files import write_atomically
 
 POINT_DATA: tuple[str, ...] = ("displacement", "velocity", "reaction", "mass", "support")
@@ -60,11 +61,16 @@ def web_mesh(state, shape=None):
 
 
 def _of_thread(state, thread):
-    """Cell data of the segments of a thread by name; its natural length in the shares of their lengths."""
-    tension, stress, strain, _ = state.threads[thread.name]
+    """Cell data of the segments of a thread by name; without friction its natural length in the shares of lengths."""
+    tension, stress, strain, _ = state.threads[thread.name][:COLUMNS]
     apart = np.linalg.norm(np.diff(state.position[thread.rows], axis=0), axis=1)
-    natural = apart * (thread.natural_length / apart.sum()) if apart.any() else apart
-    slack = float(strain <= thread.line.slackness[0])
+    if thread.rings:
+        tension, slips = np.split(state.threads[thread.name][COLUMNS:], [len(apart)])
+        natural = thread.natural_lengths(slips)
+        stress, strain = tension / thread.line.area[0], apart / natural - 1.0
+    else:
+        natural = apart * (thread.natural_length / apart.sum()) if apart.any() else apart
+    slack = np.asarray(strain <= thread.line.slackness[0], dtype=float)
     return dict(zip(CELL_DATA, (tension, stress, strain, natural, slack), strict=True))
 
 

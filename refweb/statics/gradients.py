@@ -117,6 +117,8 @@ class Gradients:
         if state is None or not state.system.net.quasi_static:
             raise InputError('gradients are those of equilibria: [solve] kind = "static", with a solution')
         system = at_rest(state.system)
+        for thread in (thread for thread in system.net.threads if thread.rings):
+            raise InputError(f"gradients take no friction or winch, as of {thread.title}: it depends on the path")
         self._yields = state.plastic_strain is not None
         self._yielded = self._yields and state.plastic_strain.any()
         if self._yields:

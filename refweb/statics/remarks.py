@@ -160,7 +160,15 @@ def _not_proven(state, equilibrium):
         name = state.system.resting[0].name
         text = f'body "{name}" is free: ± are estimates, as the proven bound asks for a web without free bodies'
         yield Finding("not-proven", text, "body")
-    if net.threads and proven.all() and equilibrium.duality_bound is None:
+    if any(thread.rings for thread in net.threads) and proven.all():
+        text = "threads have friction or a winch: ± are estimates for these load steps, no proven bounds, and a thread "
+        yield Finding(
+            "not-proven",
+            text + "that slips over a ring and turns back between two of them is not seen; "
+            "compare with more load_steps",
+            "thread",
+        )
+    elif net.threads and proven.all() and equilibrium.duality_bound is None:
         text = f'thread "{net.threads[0].name}": ± are estimates, as the proven bound asks for threads with law = '
         yield Finding("not-proven", text + '"tension-only" that run over no body, dead loads and no contact', "thread")
     if net.law_is("plastic").any():

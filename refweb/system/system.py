@@ -84,7 +84,9 @@ class System:
     carried : ndarray of bool, shape (rows,)
         True for nodes that free bodies carry and that move with them.
     internal : refweb.effects.base.InternalVariables or None
-        Internal variables of lines.
+        Internal variables that are unknowns.
+    followers : list
+        Followers of the others, see `refweb.effects.base.InternalVariables`.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     angles : bool
@@ -123,12 +125,15 @@ class System:
         powers = [term.balance.power for term in self.terms if term.over_lines and term.balance.power is not None]
         if len(set(powers)) < len(powers):
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
-        self.internal: Any = next((term.internal for term in self.terms if term.internal), None)
+        internal = [term.internal for term in self.terms if term.internal]
+        self.internal: Any = next((variables for variables in internal if not variables.follower), None)
+        self.followers: list[Any] = [variables.follower for variables in internal if variables.follower]
         self.supported: NDArray[np.bool_] = np.vstack(
             [supported, np.zeros((self.rows - len(supported), 3), dtype=bool)]
         )
-        if self.internal is not None:
+        if internal:
             self.supported[self.rows - net.internal :] = True
+        if self.internal is not None:
             self.supported.ravel()[self.internal.components] = False
         for body in net.bodies:
             self.supported[body.row] = self.supported[body.base] = body.fixed or bool(body.axle)
@@ -181,13 +186,16 @@ class System:
 
     def settled(self, x: Any) -> Any:
         """A state, x or None as it is given, with internal variables as they are after all time at rest, or new."""
-        settling = [effect for effect in self.effects if hasattr(effect, "settled")]
-        return settling[0].settled(self.at(0.0).net, x) if settling else x
+        for effect in self.effects:
+            if hasattr(effect, "settled"):
+                x = effect.settled(self.at(0.0).net, x)
+        return x
 
     def taken_on(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A state with plastic strains that it asks for at time t, x itself where no line can yield."""
-        follower = self.internal and self.internal.follower
-        return follower.taken_on(self.at(t).net, x) if follower else x
+        """A state with internal variables that follow at once as it asks for at time t, x itself where none do."""
+        for follower in self.followers:
+            x = follower.taken_on(self.at(t).net, x, t)
+        return x
 
     @cached_property
     def laid(self) -> NDArray[np.float64] | None:
@@ -491,7 +499,8 @@ class System:
     def row_name(self, row: int) -> str:
         """Name of a row in messages: a node by its number, a body by its name."""
         if row >= self.rows - self.net.internal:
-            return f"arms of line {self.net.line[(row - self.rows) // (self.net.internal // len(self.net.cells))]}"
+            row -= self.rows - self.net.internal
+            return f"arms of line {self.net.line[row // (self.net.rows_of_elements // len(self.net.cells))]}"
         return f"node {row}" if row < self.net.nodes else f'body "{row_names(self.net.bodies)[row - self.net.nodes]}"'
 
     def energy_of(self, term: ForceTerm, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:

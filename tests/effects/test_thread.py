@@ -476,7 +476,6 @@ def test_results_of_a_thread(tmp_path):
         ({"nodes": [0, 2, 1], "law": "force-density"}, r'law = "force-density" is for form finding'),
         ({"nodes": [0, 2, 1], "law": "elastic-plastic"}, r'law = "elastic-plastic" yields'),
         ({"nodes": [0, 2, 1], "smoothing": 0.1}, r'smoothing = 0.1 has no meaning with law = "tension-only"'),
-        ({"nodes": [0, 2, 1], "friction": 0.1}, r"friction"),
         ({"nodes": [0, 2, 1], "modulus": None}, r"modulus is missing"),
     ],
 )

@@ -46,6 +46,7 @@ NUMBERS = [
 ]
 NUMBERS += [1e100, 2e100, -2e100, 10_000, 10_001, 2**63 - 1, True, False]
 TEXTS = [
+    "last",
     "long",
     "full",
     "star",

@@ -169,6 +169,7 @@ class CentralDifference(Integrator):
         v = system.initial_velocity() if v is None else np.array(v, dtype=float, order="C")
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
+        x = system.taken_on(0.0, x)
         extremes = Extremes.at_start(np.zeros(len(self._observed.signs)))
         work, total = np.zeros(len(system.terms) + 1), np.zeros(len(system.terms) + 3)
         where = np.zeros(2, dtype=np.int64)

@@ -145,7 +145,7 @@ class StepObserver(Integrator):
         self._per_cell, self._blocks = system.per_cell(), system.blocks()
         if not self.takes_massless:
             refuse_massless(system, self.method)
-        if system.internal and not system.internal.follower and not self.takes_internal:
+        if system.internal and not self.takes_internal:
             others = 'method = "central-difference", "cvode" or "ida"'
             raise InputError(f"{system.internal.title} needs {others}, not {self.method}")
         if system.constraints and not self.takes_links:
@@ -168,7 +168,7 @@ class StepObserver(Integrator):
         self.tolerances: dict[str, float] = {"m": self.atol_position, "m/s": self.atol_velocity}
         self.stats: dict[str, int] = dict(nfev=0, njev=0, nlu=0)
         self._events = event_rows(events)
-        by_path = bool(system.net.factors and system.internal and system.internal.follower)
+        by_path = bool(system.net.factors and system.followers)
         self._halvings = HALVINGS_BY_PATH if by_path else HALVINGS
         even = {"uneven": min(rtol, UNEVEN)} if by_path else {}
         self._book = SimpsonBalance(system, self.hold, max(fast, self.atol_velocity / rtol), **even)
@@ -176,7 +176,7 @@ class StepObserver(Integrator):
         self._limits = StepLimits(system, self.rotations, lambda t: self.state(t, *self.interpolated(t))[0])
         self._monitors = self._measurements, self._limits.passages
         self._yielding = None
-        if system.internal and system.internal.follower:
+        if system.followers:
             from .yielding import Yielding
 
             self._yielding = Yielding(system, rtol)

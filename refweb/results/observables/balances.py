@@ -145,13 +145,20 @@ class PlasticEnergy(StrainEnergy):
     needs = 'law = "elastic-plastic"'
 
 
+class WinchEnergy(Booked):
+    """Energy that winches have taken from the web: the negative of their work."""
+
+    needs = "[[winch]]"
+
+
 class DissipatedEnergy(Booked):
     """Energy lost by damping and friction."""
 
     signed = False
     dynamic = True
     needs = (
-        "[damping], [cable.viscous], [drag] in a fluid at rest, or damping or friction in [contact] or [self_contact],"
+        "[damping], [cable.viscous], [drag] in a fluid at rest, [[thread]] friction, or damping or friction in "
+        "[contact] or [self_contact],"
     )
 
 

@@ -11,7 +11,7 @@ from ...accepted import accepts, any_of, array
 from ...errors import InputError
 from ...messages import nearest, quote
 from ...registry import OBSERVABLES, known, load, possible
-from ...tables import Several, Table, choice, component, field, nodes, real, table, text
+from ...tables import Several, Table, choice, component, field, integer, nodes, real, table, text
 
 if TYPE_CHECKING:
     from ...statics.equilibrium import Equilibrium
@@ -66,7 +66,13 @@ class Observe(Table):
     line : int, str or list, optional
         Lines of a line quantity, by number or group, see `refweb.net.groups`; without ``line`` all.
     thread : str, optional
-        Thread of a tension, stress, strain or length, which is that of the whole thread.
+        Thread of a length, which is that of the whole thread, or of a tension, stress or strain, which with friction
+        at its rings is that of the segment with the largest tension.
+    segment : int, optional
+        Segment of a thread whose tension it is: 0 is that between the first two of its nodes.
+    ring : int, optional
+        Ring of a ``slip``, the length of thread that has gone over it since the start: its number in the list ``nodes``
+        of the thread, from 0 on. It is positive where material goes in the order of the list.
     part : {"start", "middle", "end"}, optional
         Element of each line that a line quantity is looked at in: that at its first node, that at its middle or behind
         it, or that at its last node; without it all elements. A value of an element of order 1 is that of its middle;
@@ -116,6 +122,8 @@ class Observe(Table):
     to: str | None = text(default=None)
     line: Several = nodes(default=None, what="line")
     thread: str | None = text(default=None, limit=80)
+    segment: int | None = integer(default=None, at_least=0)
+    ring: int | None = integer(default=None, at_least=0)
     part: str | None = choice("start", "middle", "end", default=None)
     select: str | None = choice("max", "min", "abs", default=None)
     component: int | None = component(default=None, axes="xyzw")
@@ -128,7 +136,7 @@ class Observe(Table):
             raise InputError(
                 f"name = {quote(self.name)} must have no commas and no quotes: it heads a column of history.csv"
             )
-        for key in ("node", "body", "to", "component", "line", "thread", "part", "select"):
+        for key in ("node", "body", "to", "component", "line", "thread", "segment", "ring", "part", "select"):
             if getattr(self, key) is not None and key not in self.observable.keys:
                 value = quote(getattr(self, key))
                 beside = " of a thread" if self.thread is not None and key != "thread" else ""

@@ -1,4 +1,4 @@
-"""Tension, stress, strain and length of a thread.
+"""Tension, stress, strain and length of a thread, and the slip over its rings.
 
 `column` counts what `effects.thread` writes; `Observe` finds classes by the capitalised name of a quantity.
 """
@@ -12,11 +12,13 @@ import numpy as np
 from ...errors import InputError
 from ...kernels import kernel
 from ...messages import nearest, quote
+from ...net.threads import COLUMNS
 from ..probes import PROBE, Probe
 from .observable import ANY, NOT_NEGATIVE, ROUNDING, Observable, Value
 
 if TYPE_CHECKING:
     from ...net.net import Net
+    from ...net.threads import ThreadLine
     from ...statics.equilibrium import Equilibrium
     from ...system.system import System
     from ..state import State
@@ -60,13 +62,19 @@ class OfThread(Observable):
         """(Number of the term, the thread)."""
         return next(item for item in system.threads.items() if item[1].name == self.observe.thread)
 
+    def column_in(self, thread: ThreadLine) -> int:
+        """Column of the value in what the force of a thread observes."""
+        return self.column
+
     def of(self, state: State) -> Value:
         """The value of the thread."""
-        return Value(float(state.threads[self._thread(state.system)[1].name][self.column]), None)
+        thread = self._thread(state.system)[1]
+        return Value(float(state.threads[thread.name][self.column_in(thread)]), None)
 
     def probe(self, system: System) -> Probe:
         """Make the probe of the thread."""
-        return Probe(of_cell, [self.column], np.zeros((0, 0)), term=self._thread(system)[0])
+        number, thread = self._thread(system)
+        return Probe(of_cell, [self.column_in(thread)], np.zeros((0, 0)), term=number)
 
     def bounds(self, system: System | None) -> tuple[float, float]:
         """A thread that only pulls has a tension that is not negative."""
@@ -94,10 +102,22 @@ class OfThread(Observable):
 
 
 class Tension(OfThread):
-    """Tension of a thread."""
+    """Tension of a thread, with friction the largest, or that of a segment."""
 
+    keys = "thread", "segment"
     unit = "N"
     pull = True
+
+    def on(self, system: System) -> None:
+        """Refuse a segment that the thread does not have."""
+        super().on(system)
+        count, segment = len(self._thread(system)[1].distances), self.observe.segment
+        if segment is not None and segment >= count:
+            raise InputError(f"segment = {segment} must be < {count}, the number of segments of the thread")
+
+    def column_in(self, thread: ThreadLine) -> int:
+        """Column of the tension of the segment; without friction all have the same."""
+        return COLUMNS + self.observe.segment if thread.rings and self.observe.segment is not None else 0
 
     def scale(self, line: Net) -> float:
         """EA."""
@@ -119,6 +139,33 @@ class Strain(OfThread):
     """Engineering strain of a thread."""
 
     column = 2
+
+
+class Slip(OfThread):
+    """Length of a thread that has gone over a ring with friction, or a winch, in the order of its nodes."""
+
+    keys = "thread", "ring"
+    unit = "m"
+
+    def on(self, system: System) -> None:
+        """Refuse a thread without friction, a missing ring, and a node that is no ring."""
+        super().on(system)
+        thread, ring = self._thread(system)[1], self.observe.ring
+        if not thread.rings:
+            raise InputError(f'quantity = "slip" needs friction of {thread.title}: give it 0.0 there, or more')
+        first, last = (0, len(thread.friction) - 1) if thread.closed else (1, len(thread.friction))
+        first, last = first - (thread.ends == 2), last + (thread.ends == 3)
+        if ring is None or not first <= ring <= last:
+            given = "ring is missing" if ring is None else f"ring = {ring}"
+            raise InputError(f"{given}: it must be from {first} to {last}, a number in the list of nodes of the thread")
+
+    def column_in(self, thread: ThreadLine) -> int:
+        """Column of the slip."""
+        return COLUMNS + len(thread.distances) + (self.observe.ring - 1) % thread.rings
+
+    def scale(self, line: Net) -> float:
+        """Natural length."""
+        return float(line.natural_length[0])
 
 
 class Length(OfThread):

@@ -1,0 +1,378 @@
+"""Threads with friction at their rings: tensions on both sides of a ring differ by a factor of up to e^(μθ).
+
+The state of a thread is the slip δ_r of each ring r, the length of material that has gone over it in the order of the
+thread. Segment s has the natural length L_s = L_s⁰ + δ_(s−1) − δ_s and a tension T_s = A σ(l_s/L_s − 1) of its own. A
+ring at which the thread turns by θ_r bears, with κ_r = e^(−μ_r θ_r),
+
+    κ T_(r+1) ≤ T_r  and  κ T_r ≤ T_(r+1);      material goes to a side only where that has T/κ of the other.
+
+Slips at the end of a step follow from those of before and from the positions there (return mapping): rings that stay
+within their limits stick, and all others are at their limit. With rates T'_s = −∂T_s/∂L_s the limits of rings are a
+system of equations with a tridiagonal M-matrix, cyclic in a closed thread, which Newton's method with an active set
+solves. It may go round in circles where segments get slack or taut; bisection along the thread then does not, see
+`refweb.effects.thread_slips`. The tension of a side that is slack goes on as EA times its strain there, so that no more
+material goes to it than makes it taut.
+
+A ring that slips in one direction has a slip that follows from positions, not from the way to them. So states of steps
+in which no ring turns back need no history within the step. A step loses Σ ∫ (Y_to − Y_from) d|δ| ≥ 0, by the
+trapezoidal rule, with the configurational force Y = T (1 + ε) − W of each side, which is T but for the strain.
+
+The tangent follows from the derivatives of the limits. It is not symmetric, since the limit of one segment is the
+tension of another (non-associated flow), and there is no potential. Gershgorin's bound takes column sums, in which it
+is at most that of separate lines: Σ_s ∂T_s/∂l_j ≤ max EA/L_s.
+
+Numbers of a thread stand in rows behind all places, see `refweb.effects.base.InternalVariables`: slip [m] of each ring;
+Y_to − Y_from over EA where it slipped last, with the sign of the slip; the energy lost over EA [m].
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..compiled.rows import record_at
+from ..kernels import BOUND, ENERGY, FORCE, RELAX, STIFFNESS, kernel
+from ..net.threads import COLUMNS, TAUT
+from .base import Balance, ForceTerm, InternalVariables, Tangent, Timing, no_force, with_rows
+from .line_kernels import internal_number, line_at
+from .thread_segments import segment_kernel
+from .thread_slips import (
+    BEFORE,
+    HEAD,
+    KAPPA,
+    MODE,
+    RATE,
+    ROWS,
+    SLIP,
+    SLOPE,
+    TAIL,
+    TENSION,
+    choose,
+    eliminate,
+    layout_kernels,
+    matrix,
+    natural,
+    return_mapping,
+    sides,
+    strain_of,
+)
+
+LEAST = 1e-300
+"""Least time of a step in which slips are found [s]."""
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..net.net import Net
+    from ..net.threads import ThreadLine
+
+
+@functools.cache
+def kernels(law, record, width):
+    """Force, strain energy, stiffness, bound, lost energy and relaxation kernels.
+
+    Parameters
+    ----------
+    law, record, width
+        As in `refweb.effects.thread.kernels`.
+    """
+    energy_density, segment = law.energy_density, segment_kernel(width)
+    find_slips = return_mapping(law, record, width)
+    first_of, _, turn_of = layout_kernels(width)
+
+    @kernel()
+    def gap(data, c, w, rings, r):
+        """Y behind ring r less Y before it, for the direction in which it has slipped; 0 where it has not."""
+        moved = w[SLIP, r] - w[BEFORE, r]
+        if moved == 0.0:
+            return 0.0
+        line, total = record_at(record, data, c, 0), 0.0
+        for s, sign in (((r + 1) % w.shape[1], 1.0), (r, -1.0)):
+            strain = strain_of(w, s)
+            total += sign * (w[TENSION, s] * (1.0 + strain) - energy_density(strain, line))
+        return max(total, 0.0) if moved > 0.0 else min(total, 0.0)
+
+    @kernel()
+    def ordinary_of(cells, data, c, rings):
+        """Number of rings of cell c that are no winch."""
+        return rings - (data[c, first_of(cells) + 1] > 1.0)
+
+    @kernel()
+    def pulled_over(data, c, w):
+        """Configurational force Y at a winch."""
+        s, line = 0 if w[HEAD, 0] > 0.0 else w.shape[1] - 1, record_at(record, data, c, 0)
+        strain = strain_of(w, s)
+        return w[TENSION, s] * (1.0 + strain) - energy_density(strain, line)
+
+    @kernel()
+    def taken_now(x, cells, data, c, w, rings):
+        """Energy that the winch of cell c has taken, over EA."""
+        row, last, ea = int(data[c, first_of(cells)]), rings - 1, line_at(data, c).ea
+        paid_out = (w[SLIP, last] - internal_number(x, row, last)) * (w[HEAD, 0] - w[TAIL, 0])
+        now, before = pulled_over(data, c, w) / ea, internal_number(x, row, 2 * rings - 1)
+        mean = now if before == 0.0 else 0.5 * (now + before)
+        return internal_number(x, row, 2 * rings + 2) + mean * paid_out
+
+    @kernel()
+    def lost_now(x, cells, data, c, w, rings):
+        """Energy lost by cell c, over EA."""
+        row, ea = int(data[c, first_of(cells)]), line_at(data, c).ea
+        total = internal_number(x, row, 2 * rings)
+        for r in range(ordinary_of(cells, data, c, rings)):
+            now, before = gap(data, c, w, rings, r) / ea, internal_number(x, row, rings + r)
+            if now * before <= 0.0:
+                before = now
+            total += 0.5 * (before + now) * (w[SLIP, r] - w[BEFORE, r])
+        return total
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        w = np.empty((ROWS, cells.shape[1] - 1))
+        for c in range(cells.shape[0]):
+            rings, count, largest, total = find_slips(t, x, cells, data, c, w), w.shape[1], 0, 0.0
+            for s in range(count):
+                p0, p1, p2, inverse, length, _ = segment(x, cells, data, c, s)
+                i, j, scale = cells[c, s], cells[c, s + 1], w[TENSION, s] * inverse
+                f[i, 0] += scale * p0
+                f[i, 1] += scale * p1
+                f[i, 2] += scale * p2
+                f[j, 0] -= scale * p0
+                f[j, 1] -= scale * p1
+                f[j, 2] -= scale * p2
+                total += length
+                largest = s if w[TENSION, s] > w[TENSION, largest] else largest
+                out[c, COLUMNS + s] = w[TENSION, s]
+            for r in range(rings):
+                out[c, COLUMNS + count + r] = w[SLIP, r]
+            out[c, 0], out[c, 1] = w[TENSION, largest], w[TENSION, largest] * data[c, width]
+            out[c, 2], out[c, 3] = strain_of(w, largest), total
+
+    @kernel(ENERGY)
+    def kept(t, x, cells, data, out):
+        w = np.empty((ROWS, cells.shape[1] - 1))
+        for c in range(cells.shape[0]):
+            find_slips(t, x, cells, data, c, w)
+            line, out[c] = record_at(record, data, c, 0), 0.0
+            for s in range(w.shape[1]):
+                out[c] += natural(w, s) * energy_density(strain_of(w, s), line)
+
+    @kernel(ENERGY)
+    def gone(t, x, cells, data, out):
+        w = np.empty((ROWS, cells.shape[1] - 1))
+        for c in range(cells.shape[0]):
+            rings = find_slips(t, x, cells, data, c, w)
+            out[c] = lost_now(x, cells, data, c, w, rings) * line_at(data, c).ea
+
+    @kernel(ENERGY)
+    def taken(t, x, cells, data, out):
+        w = np.empty((ROWS, cells.shape[1] - 1))
+        for c in range(cells.shape[0]):
+            rings = find_slips(t, x, cells, data, c, w)
+            out[c] = taken_now(x, cells, data, c, w, rings) * line_at(data, c).ea
+
+    @kernel(RELAX)
+    def relax(h, x, cells, data, before, lost):
+        w = np.empty((ROWS, cells.shape[1] - 1))
+        for c in range(cells.shape[0]):
+            lost[c], row, winch = 0.0, int(data[c, first_of(cells)]), data[c, first_of(cells) + 1] > 1.0
+            if h > 0.0:
+                n = 2 * (cells.shape[1] - 1) + 1
+                t = h + internal_number(x, row, n) if winch else h
+                rings = find_slips(t, x, cells, data, c, w)
+                total, ea = lost_now(x, cells, data, c, w, rings), line_at(data, c).ea
+                if winch:
+                    energy = taken_now(x, cells, data, c, w, rings)
+                    x[row + n // 3, n % 3] = t
+                    x[row + (n + 1) // 3, (n + 1) % 3] = energy
+                    x[row + (n - 2) // 3, (n - 2) % 3] = pulled_over(data, c, w) / ea
+                for r in range(rings):
+                    n = rings + r
+                    if r < ordinary_of(cells, data, c, rings):
+                        x[row + n // 3, n % 3] = gap(data, c, w, rings, r) / ea
+                    x[row + r // 3, r % 3] = w[SLIP, r]
+                x[row + 2 * rings // 3, 2 * rings % 3] = total
+
+    @kernel()
+    def turn_slopes(x, cells, data, c, r, w, scale, b):
+        """Add ``scale`` ∂θ/∂x of ring r to row r of b, by the three components of each node."""
+        count = cells.shape[1] - 1
+        q = (r + 1) % count
+        a0, a1, a2, first, _, _ = segment(x, cells, data, c, r)
+        b0, b1, b2, second, _, _ = segment(x, cells, data, c, q)
+        u, v = (a0 * first, a1 * first, a2 * first), (b0 * second, b1 * second, b2 * second)
+        cosine = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+        sine = math.sin(turn_of(x, cells, data, c, r))
+        if sine > 1e-12:
+            for k in range(3):
+                by_first = -scale * first * (v[k] - cosine * u[k]) / sine
+                by_second = -scale * second * (u[k] - cosine * v[k]) / sine
+                b[r, 3 * r + k] -= by_first
+                b[r, 3 * r + 3 + k] += by_first
+                b[r, 3 * q + k] -= by_second
+                b[r, 3 * q + 3 + k] += by_second
+
+    @kernel()
+    def slip_slopes(x, cells, data, c, w, rings, a, b):
+        """Write ∂δ/∂x of each ring to b."""
+        choose(w, rings, True)
+        matrix(w, rings, a)
+        for r in range(rings):
+            for m in range(b.shape[1]):
+                b[r, m] = 0.0
+            if abs(w[MODE, r]) != 1.0:
+                continue
+            low, high = sides(w, r)
+            if w[MODE, r] < 0.0:
+                low, high = high, low
+            for s, part in ((high, w[KAPPA, r] * w[SLOPE, high]), (low, -w[SLOPE, low])):
+                if s < 0:
+                    continue
+                p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
+                p = (p0 * inverse, p1 * inverse, p2 * inverse)
+                for k in range(3):
+                    b[r, 3 * s + k] -= w[MODE, r] * part * p[k]
+                    b[r, 3 * s + 3 + k] += w[MODE, r] * part * p[k]
+            if min(low, high) < 0:
+                continue
+            friction = data[c, first_of(cells) + 2 + r]
+            turn_slopes(x, cells, data, c, r, w, -w[MODE, r] * friction * w[KAPPA, r] * w[TENSION, high], b)
+        eliminate(a, b)
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        count, size = cells.shape[1] - 1, 3 * cells.shape[1]
+        w = np.empty((ROWS, count))
+        for c in range(cells.shape[0]):
+            rings = find_slips(t, x, cells, data, c, w)
+            a, b = np.zeros((rings, rings)), np.zeros((count, size))
+            if not definite:  # else that of rings that stick, which is symmetric
+                slip_slopes(x, cells, data, c, w, rings, a, b)
+            for i in range(size):
+                for j in range(size):
+                    blocks[c, i, j] = 0.0
+            for s in range(count):
+                p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
+                p, tension = (p0 * inverse, p1 * inverse, p2 * inverse), w[TENSION, s]
+                for m in range(size):
+                    before = b[s - 1, m] if s > 0 else b[count - 1, m] * w[HEAD, 0]
+                    behind = b[s, m] if s < count - 1 else b[count - 1, m] * w[TAIL, 0]
+                    change = -w[RATE, s] * (before - behind)
+                    if 3 * s <= m < 3 * s + 6:
+                        change += w[SLOPE, s] * p[m % 3] * (-1.0 if m < 3 * s + 3 else 1.0)
+                    for k in range(3):
+                        blocks[c, 3 * s + k, m] -= p[k] * change
+                        blocks[c, 3 * s + 3 + k, m] += p[k] * change
+                for k in range(3):
+                    for m in range(3):
+                        across = tension * inverse * ((1.0 if k == m else 0.0) - p[k] * p[m])
+                        first, second = 3 * s + k, 3 * s + m
+                        blocks[c, first, second] += across
+                        blocks[c, first + 3, second + 3] += across
+                        blocks[c, first, second + 3] -= across
+                        blocks[c, first + 3, second] -= across
+
+    @kernel(BOUND)
+    def bound(reach, speed, x, mass, rates, cells, data):
+        w = np.empty((ROWS, cells.shape[1] - 1))
+        for c in range(cells.shape[0]):
+            rings, ea, first, turned = (
+                find_slips(0.0, x, cells, data, c, w),
+                abs(line_at(data, c).ea),
+                first_of(cells),
+                1.0,
+            )
+            shortest = natural(w, 0)
+            for s in range(1, w.shape[1]):
+                shortest = min(shortest, natural(w, s))
+            for r in range(ordinary_of(cells, data, c, rings)):
+                turned += data[c, first + 2 + r]
+            for s in range(w.shape[1]):
+                inverse, distance = segment(x, cells, data, c, s)[3], data[c, width + 4 + 4 * s]
+                soon = TAUT * ea / max(distance, TAUT * line_at(data, c).natural_length)
+                total = 2.0 * (ea / shortest + turned * max(w[TENSION, s] * inverse, soon))
+                rates[cells[c, s]] += total
+                rates[cells[c, s + 1]] += total
+
+    return force, kept, stiffness, bound, gone, relax, taken
+
+
+def with_slips(net: Net, name: str) -> Net:
+    """The net with rows for the numbers of a thread behind all others."""
+    number = [thread.name for thread in net.threads].index(name)
+    thread = net.threads[number]._replace(first=len(net.points))
+    threads = *net.threads[:number], thread, *net.threads[number + 1 :]
+    return replace(with_rows(net, thread.rows_of_slips), threads=threads)
+
+
+def terms(thread: ThreadLine) -> list[ForceTerm]:
+    """Terms of the tensions, of the energy that is stored and of that which is lost."""
+    line, numbers = thread.line, thread.numbers
+    force, kept, stiffness, bound, gone, relax, taken = kernels(
+        line.law, line.law_record, line.line_data.matrix.shape[1]
+    )
+    friction = np.array([thread.first, thread.ends, *thread.friction, *thread.winch], dtype=float)
+    of_thread = {"name": "thread", "cells": thread.rows[None, :], "data": np.append(numbers, friction)[None, :]}
+    tension = ForceTerm(
+        **of_thread,
+        force=force,
+        tangent=Tangent(stiffness, bound, symmetric=False, across=thread.across),
+        balance=Balance("strain_energy", internal=True),
+        timing=Timing(thread.corners),
+        observed=COLUMNS + len(thread.distances) + thread.rings,
+    )
+    stored = ForceTerm(**of_thread, force=no_force, energy=kept, balance=Balance("strain_energy", internal=True))
+    none = np.zeros(0, dtype=np.int64)
+    slips = Slips(thread, relax, of_thread["cells"], of_thread["data"])
+    lost = ForceTerm(
+        **of_thread,
+        force=no_force,
+        energy=gone,
+        balance=Balance("dissipated_energy", internal=True),
+        internal=InternalVariables(none, none, np.zeros(0), relax, 0, "[[thread]] friction", slips),
+    )
+    if not thread.winch:
+        return [tension, stored, lost]
+    wound = ForceTerm(**of_thread, force=no_force, energy=taken, balance=Balance("winch_energy", internal=True))
+    return [tension, stored, lost, wound]
+
+
+class Slips:
+    """Slips of a thread, which follow at once, see `refweb.effects.base.InternalVariables`."""
+
+    def __init__(self, thread, relax, cells, data):
+        self._thread, self._relax, self._cells, self._data = thread, relax, cells, data
+
+    def taken_on(self, net: Net, x: NDArray[np.float64], t: float) -> NDArray[np.float64]:
+        """Displacement of all rows with the slips that it asks for at time t, from those of before in x."""
+        x, lost, thread = x.copy(), np.zeros(1), self._thread
+        span = t - thread.wound_until(x) if thread.winch else 1.0
+        self._relax(max(span, LEAST), x, self._cells, self._data, lost, lost)
+        return x
+
+    def grown(self, net: Net, x: NDArray[np.float64], t: float) -> NDArray[np.float64]:
+        """Material that goes over each ring in a step, and what a winch may wind more, over that of the thread [1].
+
+        The last falls from where the winch would be faster than it can.
+        """
+        thread = self._thread
+        grown = np.abs(thread.slips(self.taken_on(net, x, t)) - thread.slips(x)) / thread.natural_length
+        if thread.winch and 0.0 < thread.winch[2] < np.inf:
+            reach = thread.winch[2] * (t - thread.wound_until(x)) / thread.natural_length
+            return np.append(grown, reach - grown[-1])
+        return grown
+
+    drive = grown
+
+
+def settled(thread: ThreadLine, net: Net, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Displacement of all rows as a run begins from: with the slips that it asks for, and no energy lost or taken."""
+    x = x.copy()
+    numbers = x[thread.first : thread.first + thread.rows_of_slips].reshape(-1)[thread.rings :]
+    numbers[:] = 0.0
+    x = next(term.internal for term in terms(thread) if term.internal).follower.taken_on(net, x, 0.0)
+    x[thread.first : thread.first + thread.rows_of_slips].reshape(-1)[thread.rings :] = 0.0
+    return x

@@ -1,0 +1,521 @@
+"""Slips of the rings of a thread with friction: the return mapping of a step, see `refweb.effects.thread_friction`.
+
+Numbers of a thread stand in a matrix w, a row for each kind and a column for each segment or ring. Ring r is between
+segment r and the next; there is one ring less than segments, in a closed thread as many.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+from ..compiled.rows import record_at
+from ..kernels import kernel
+from .line_kernels import internal_number, line_at
+from .thread_segments import segment_kernel
+
+ROWS = 20
+LONGER, LENGTH, TENSION, PULL, SLOPE, RATE, PULL_RATE, SLIP, BEFORE, KAPPA, MODE, CHANGE, OLD, LOW, HIGH = range(15)
+HEAD, TAIL, HOLDS_IN, HOLDS_OUT, REACH = range(15, ROWS)
+"""Rows of the numbers of a thread, by segment or ring: elongation with the natural length as built, length, tension;
+tension that goes on below 0; slopes ∂T/∂l, −∂T/∂L and that of the pull; slip, slip before; κ; the direction in which a
+ring slips, 0 where it sticks; what Newton's method changes; what segments have gained before; what goes over the rings
+of a chain at two pulls. In the first column alone: 1 where the last ring has a segment behind it, and one before it;
+the tensions up to which a winch hauls in and from which it pays out, and its largest slip in the step."""
+ROUNDING = 1e-15
+"""Share of elongations and slips of a segment up to which its tension is rounding."""
+STEPS = 12
+"""Largest number of Newton steps, by which next to all steps of a run are solved."""
+BISECTIONS = 200
+"""Largest number of bisections."""
+DOUBLINGS = 1000
+"""Largest number of doublings."""
+POLISH = 4
+"""Largest number of Newton steps behind bisections."""
+DENORMAL = 1e-200
+"""Tension over EA up to which a pull is none: strains by it have no digits."""
+LARGEST = 1e6
+"""Largest strain at which a ring that never slips is looked at."""
+SINGULAR = 1e-9
+"""Least slope of the side that material comes from, where it is slack, over that of the other."""
+SAME = 1e-10
+"""Time over that of a run that is none."""
+NEAR = 1e-6
+"""Share of its largest slip by which a winch is at it."""
+SHRINK = 0.5
+"""Largest share of its natural length that a segment loses in a Newton step."""
+
+
+@kernel()
+def gained(w, s, row):
+    """Sum of a row of rings over what segment s gains: that of the ring before it, less that of its own."""
+    last = w.shape[1] - 1
+    before = w[row, s - 1] if s > 0 else w[row, last] * w[HEAD, 0]
+    return before - (w[row, s] if s < last else w[row, last] * w[TAIL, 0])
+
+
+@kernel()
+def natural(w, s):
+    """Natural length of segment s."""
+    return w[LENGTH, s] - w[LONGER, s] + gained(w, s, SLIP)
+
+
+@kernel()
+def strain_of(w, s):
+    """Strain of segment s."""
+    return (w[LONGER, s] - gained(w, s, SLIP)) / natural(w, s)
+
+
+@kernel()
+def rounding(w, s):
+    """Tension of segment s by rounding."""
+    size = abs(w[LONGER, s]) + abs(gained(w, s, SLIP)) + abs(w[SLIP, s - 1]) + abs(w[SLIP, s])
+    return ROUNDING * (size * max(w[SLOPE, s], w[PULL_RATE, s]) + abs(w[TENSION, s]))
+
+
+@kernel()
+def sides(w, r):
+    """Segments before and behind ring r; −1 for the drum of a winch."""
+    last = w.shape[1] - 1
+    before = -1 if r == last and w[TAIL, 0] == 0.0 else r
+    behind = r + 1 if r < last else 0 if w[HEAD, 0] > 0.0 else -1
+    return before, behind
+
+
+@kernel()
+def little(w, r):
+    """Tension at ring r by rounding."""
+    a, b = sides(w, r)
+    return (rounding(w, a) if a >= 0 else 0.0) + (rounding(w, b) if b >= 0 else 0.0)
+
+
+@kernel()
+def side_in(w, r, s):
+    """(κ times the pull, its slope) on the side of ring r that material goes to."""
+    return (w[KAPPA, r] * w[PULL, s], w[KAPPA, r] * w[PULL_RATE, s]) if s >= 0 else (w[HOLDS_IN, 0], 0.0)
+
+
+@kernel()
+def side_out(w, s, target):
+    """(Tension, its slope) on the side that material comes from; it goes on below 0 where a drum is the other."""
+    if s < 0:
+        return w[HOLDS_OUT, 0], 0.0
+    return (w[TENSION, s], w[RATE, s]) if target >= 0 else (w[PULL, s], w[PULL_RATE, s])
+
+
+@kernel()
+def beyond(w, r, forward):
+    """Pull at ring r beyond its limit, towards the segment behind it or, not ``forward``, before it."""
+    a, b = sides(w, r)
+    if not forward:
+        a, b = b, a
+    return side_in(w, r, b)[0] - side_out(w, a, b)[0]
+
+
+@kernel()
+def reach_of(w, r):
+    """Largest slip of ring r in a step: that of a winch at its speed limit."""
+    return w[REACH, 0] if min(sides(w, r)[0], sides(w, r)[1]) < 0 else math.inf
+
+
+@kernel()
+def miss(w, rings):
+    """Largest distance of a ring from where its slip asks it to be, over what rounding allows."""
+    worst = 0.0
+    for r in range(rings):
+        moved, ahead, back, reach = w[SLIP, r] - w[BEFORE, r], beyond(w, r, True), beyond(w, r, False), reach_of(w, r)
+        if abs(moved) >= reach * (1.0 - NEAR):
+            error = 0.0 if reach == 0.0 else max(-ahead, 0.0) if moved > 0.0 else max(-back, 0.0)
+        else:
+            error = abs(ahead) if moved > 0.0 else abs(back) if moved < 0.0 else max(ahead, back, 0.0)
+        if w[KAPPA, r] > 0.0 and error > worst * little(w, r):
+            worst = error / little(w, r)
+    return worst
+
+
+@kernel()
+def choose(w, rings, at_limit):
+    """Write the direction in which each ring slips, ±2 where a winch is at its largest speed.
+
+    With ``at_limit`` a ring that is at its limit slips. In a closed thread one ring sticks: material that goes round
+    changes nothing.
+    """
+    pinned = 0
+    for r in range(rings):
+        (a, b), moved, edge, reach = sides(w, r), w[SLIP, r] - w[BEFORE, r], 0.0, reach_of(w, r)
+        ahead, back = beyond(w, r, True), beyond(w, r, False)
+        if moved == 0.0:
+            edge = -little(w, r) if at_limit else little(w, r)
+        w[MODE, r] = 0.0
+        if w[KAPPA, r] > 0.0 and reach > 0.0:
+            if ahead + (side_in(w, r, b)[1] + side_out(w, a, b)[1]) * moved > edge:
+                w[MODE, r] = 1.0
+            elif back - (side_in(w, r, a)[1] + side_out(w, b, a)[1]) * moved > edge:
+                w[MODE, r] = -1.0
+            if abs(moved) >= reach * (1.0 - NEAR) and w[MODE, r] * (ahead if moved > 0.0 else -back) >= 0.0:
+                w[MODE, r] *= 2.0
+        if w[MODE, r] == 0.0 or w[MODE, pinned] != 0.0 and abs(moved) < abs(w[SLIP, pinned] - w[BEFORE, pinned]):
+            pinned = r
+    if w[HEAD, 0] * w[TAIL, 0] > 0.0:
+        w[MODE, pinned] = 0.0
+
+
+@kernel()
+def matrix(w, rings, a):
+    """Write the matrix of the changes of slips; a ring that sticks has 1."""
+    for r in range(rings):
+        for q in range(rings):
+            a[r, q] = 0.0
+        if abs(w[MODE, r]) != 1.0:
+            a[r, r] = 1.0
+            continue
+        before, behind = sides(w, r)
+        low, high = side_in(w, r, before)[1], side_in(w, r, behind)[1]
+        if w[MODE, r] > 0.0:
+            low = max(side_out(w, before, behind)[1], SINGULAR * high)
+        else:
+            high = max(side_out(w, behind, before)[1], SINGULAR * low)
+        a[r, r] = low + high
+        if before >= 0 and (before > 0 or w[HEAD, 0] > 0.0):
+            a[r, before - 1] -= low
+        if behind >= 0 and (behind < w.shape[1] - 1 or w[TAIL, 0] > 0.0):
+            a[r, behind] -= high
+
+
+@kernel()
+def eliminate(a, b):
+    """Solve a y = b in place, for each column of b; a is diagonally dominant, and tridiagonal but for its corners."""
+    last = a.shape[0] - 1
+    for i in range(last):
+        for j in (i + 1, last):
+            share = a[j, i] / a[i, i]
+            if share != 0.0:
+                a[j, i] = 0.0
+                a[j, i + 1] -= share * a[i, i + 1]
+                if last > i + 1:
+                    a[j, last] -= share * a[i, last]
+                for m in range(b.shape[1]):
+                    b[j, m] -= share * b[i, m]
+    for i in range(last, -1, -1):
+        for m in range(b.shape[1]):
+            if last > i:
+                b[i, m] -= a[i, i + 1] * b[i + 1, m]
+            if last > i + 1:
+                b[i, m] -= a[i, last] * b[last, m]
+            b[i, m] /= a[i, i]
+
+
+@kernel()
+def hauled_until(t, data, c, column):
+    """Length that a winch is asked to haul in from 0 to t, by the number of rows of its table of speeds, and these."""
+    total, count = 0.0, int(data[c, column])
+    for i in range(count + 1):
+        before = -math.inf if i == 0 else data[c, column + 2 * i - 1]
+        behind = math.inf if i == count else data[c, column + 2 * i + 1]
+        low, high = max(before, 0.0), min(behind, t)
+        if high > low:
+            first = data[c, column + 2 * (i if i > 0 else 1)]
+            second = data[c, column + 2 * (i + 1 if i < count else count)]
+            slope = (second - first) / (behind - before) if 0 < i < count else 0.0
+            middle = 0.5 * (low + high) - before if 0 < i < count else 0.0
+            total += (high - low) * (first + slope * middle)
+    return total
+
+
+@functools.cache
+def layout_kernels(width):
+    """Kernels of the column with the first row of slips, of the number of rings, and of the turn at a ring.
+
+    ``width`` is that of `refweb.effects.thread.kernels`. Behind the numbers of segments stand the first row of internal
+    variables, the kind of the ends, see `refweb.net.threads.ThreadLine.ends`, the friction coefficient of each ring,
+    and the numbers of a winch, see `refweb.effects.winch`.
+    """
+    segment = segment_kernel(width)
+
+    @kernel()
+    def first_of(cells):
+        """Column of the first row of internal variables."""
+        return width + 1 + 4 * (cells.shape[1] - 1)
+
+    @kernel()
+    def rings_of(cells, data, c):
+        """Number of rings of cell c, with that of a winch."""
+        return cells.shape[1] - 2 + (data[c, first_of(cells) + 1] > 0.0)
+
+    @kernel()
+    def turn_of(x, cells, data, c, r):
+        """Angle by which the thread turns at ring r [rad]."""
+        a0, a1, a2, first, _, _ = segment(x, cells, data, c, r)
+        b0, b1, b2, second, _, _ = segment(x, cells, data, c, (r + 1) % (cells.shape[1] - 1))
+        x0, x1, x2 = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+        sine = math.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
+        return math.atan2(sine, a0 * b0 + a1 * b1 + a2 * b2) if first * second > 0.0 else 0.0
+
+    return first_of, rings_of, turn_of
+
+
+@functools.cache
+def return_mapping(law, record, width):
+    """The kernel that finds slips, of the parameters of `refweb.effects.thread.kernels`."""
+    stress, tangent, segment = law.stress, law.tangent, segment_kernel(width)
+    first_of, rings_of, turn_of = layout_kernels(width)
+
+    @kernel()
+    def pull_of(strain, length, data, c):
+        """(Tension that goes on below 0, its slope −∂/∂L) of a segment by its strain and natural length."""
+        line, plain = record_at(record, data, c, 0), line_at(data, c)
+        slack = strain < plain.slackness
+        slope = plain.ea if slack else tangent(strain, line)
+        pull = plain.ea * (strain - plain.slackness) if slack else stress(strain, line)
+        return pull, slope * (1.0 + strain) / length
+
+    @kernel()
+    def pull_all(w, data, c):
+        """Write the tensions at the slips, and their slopes."""
+        line = record_at(record, data, c, 0)
+        for s in range(w.shape[1]):
+            length, strain = natural(w, s), strain_of(w, s)
+            tension, slope = stress(strain, line), tangent(strain, line)
+            w[TENSION, s], w[SLOPE, s] = tension, slope / length
+            w[RATE, s] = w[SLOPE, s] * (1.0 + strain)
+            w[PULL, s], w[PULL_RATE, s] = pull_of(strain, length, data, c)
+
+    @kernel()
+    def newton(w, rings, data, c, a, b):
+        """Change the slips by a Newton step, as far as segments keep their share of material; the largest miss."""
+        for r in range(rings):
+            b[r, 0] = w[BEFORE, r] - w[SLIP, r]
+            if abs(w[MODE, r]) == 1.0:
+                b[r, 0] = w[MODE, r] * beyond(w, r, w[MODE, r] > 0.0)
+            elif w[MODE, r] != 0.0:
+                b[r, 0] += 0.5 * w[MODE, r] * reach_of(w, r)
+        matrix(w, rings, a)
+        eliminate(a, b)
+        share = 1.0
+        for r in range(rings):
+            w[CHANGE, r] = b[r, 0]
+        for s in range(w.shape[1]):
+            loss = -gained(w, s, CHANGE)
+            if loss * share > SHRINK * natural(w, s):
+                share = SHRINK * natural(w, s) / loss
+        for r in range(rings):
+            w[SLIP, r] += share * w[CHANGE, r]
+            moved, reach = w[SLIP, r] - w[BEFORE, r], reach_of(w, r)
+            if w[MODE, r] == 0.0 and share == 1.0:
+                w[SLIP, r] = w[BEFORE, r]
+            elif abs(moved) > reach:
+                w[SLIP, r] = w[BEFORE, r] + math.copysign(reach, moved)
+        pull_all(w, data, c)
+        return miss(w, rings)
+
+    @kernel()
+    def length_at(pull, w, data, c, s):
+        """Natural length that segment s has at a pull."""
+        line, plain = record_at(record, data, c, 0), line_at(data, c)
+        low = plain.slackness + pull / plain.ea  # no slope is above EA
+        if pull > DENORMAL * plain.ea and stress(low, line) < pull * (1.0 - ROUNDING):
+            high = 2.0 * low
+            for _ in range(DOUBLINGS):
+                if stress(high, line) >= pull:
+                    break
+                high *= 2.0
+            for _ in range(BISECTIONS):
+                middle = 0.5 * (low + high)
+                if stress(middle, line) < pull:
+                    low = middle
+                else:
+                    high = middle
+        return w[LENGTH, s] / (1.0 + low)
+
+    @kernel()
+    def shoot(pull, incoming, w, data, c, start, first, row):
+        """Material that is left at the end of the chain, where segment ``first`` of it has a pull; −∞ if it is too low.
+
+        The chain begins at segment ``start``. Slips of rings are written to a row, and −∞ behind a slack segment that
+        would take more.
+        """
+        count, moved = w.shape[1], incoming
+        for i in range(first, count):
+            s = (start + i) % count
+            if moved > -math.inf:
+                moved += w[LENGTH, s] - w[LONGER, s] + w[OLD, s] - length_at(pull, w, data, c, s)
+            w[row, i] = moved
+            if moved > 0.0:
+                pull = max(pull, 0.0) / w[KAPPA, s] if w[KAPPA, s] > 0.0 else math.inf
+            elif pull > 0.0:
+                pull *= w[KAPPA, s]
+            else:
+                moved = -math.inf
+        return w[row, count - 1]
+
+    @kernel()
+    def chain(w, data, c, start):
+        """Write the slips of a chain of all segments from ``start`` on, whose ends keep their material.
+
+        Material that is left at the end grows with the pull on a segment. It jumps where a ring on the way turns from
+        one direction to the other: there that ring sticks, and the chain begins anew behind it.
+        """
+        count, first, incoming, ea = w.shape[1], 0, 0.0, line_at(data, c).ea
+        low, high = -ea, ea
+        for _ in range(DOUBLINGS):
+            if shoot(high, incoming, w, data, c, start, first, HIGH) >= 0.0:
+                break
+            high *= 2.0
+        while first < count:
+            w[LOW, first] = -math.inf
+            for _ in range(BISECTIONS):
+                pull = 0.5 * (low + high)
+                if low < 0.0 < high:
+                    pull = 0.0
+                elif low == 0.0:
+                    pull = 1e-3 * high if high > ROUNDING**2 * ea else 0.0
+                elif high > 2.0 * low > 0.0:
+                    pull = math.sqrt(low * high)
+                if pull == low or pull == high:
+                    break
+                if shoot(pull, incoming, w, data, c, start, first, HIGH) < 0.0:
+                    low = pull
+                else:
+                    high = pull
+            shoot(low, incoming, w, data, c, start, first, LOW)
+            shoot(high, incoming, w, data, c, start, first, HIGH)
+            pull_low, pull_high = low, high
+            for i in range(first, count):
+                s = (start + i) % count
+                first = i + 1
+                if i == count - 1:
+                    break
+                down, up = w[LOW, i], w[HIGH, i]
+                incoming = up
+                if down <= 0.0 < up:  # it sticks
+                    incoming = 0.0
+                    low = w[KAPPA, s] * pull_low if w[KAPPA, s] * pull_low > 0.0 else -ea
+                    high = max(pull_high, 0.0) / w[KAPPA, s] if w[KAPPA, s] > 0.0 else LARGEST * ea
+                elif down <= 0.0 and pull_low <= 0.0:  # it goes to a segment that gets just taut, from a slack one
+                    low, high = -ea, 0.0
+                w[SLIP, s] = w[BEFORE, s] + incoming
+                if down <= 0.0 and (up > 0.0 or pull_low <= 0.0):
+                    break
+                if up > 0.0:
+                    pull_low, pull_high = max(pull_low, 0.0) / w[KAPPA, s], max(pull_high, 0.0) / w[KAPPA, s]
+                else:
+                    pull_low, pull_high = pull_low * w[KAPPA, s], pull_high * w[KAPPA, s]
+
+    @kernel()
+    def find_chain(w, data, c, start, moved):
+        """Write the slips of a chain where a winch has slipped by ``moved``; its pull beyond its limit, with a sign."""
+        count = w.shape[1]
+        for r in range(count):
+            w[SLIP, r] = w[BEFORE, r]
+        if w[HEAD, 0] != w[TAIL, 0]:
+            w[SLIP, count - 1] += moved
+        for s in range(count):
+            w[OLD, s] = gained(w, s, SLIP)
+        chain(w, data, c, start)
+        pull_all(w, data, c)
+        if w[HEAD, 0] == w[TAIL, 0]:
+            return 0.0
+        ahead, back = beyond(w, count - 1, True), beyond(w, count - 1, False)
+        if moved != 0.0:
+            return ahead if moved > 0.0 else -back
+        return ahead if ahead > 0.0 else -back if back > 0.0 else 0.0
+
+    @kernel()
+    def find_with_winch(w, data, c):
+        """Write all slips by `chain`, with that of a winch by bisection."""
+        first = find_chain(w, data, c, 0, 0.0)
+        if first == 0.0 or w[REACH, 0] == 0.0:
+            return
+        sign, low, high = math.copysign(1.0, first), 0.0, min(w[REACH, 0], w[LENGTH, 0])
+        for _ in range(DOUBLINGS):
+            if find_chain(w, data, c, 0, sign * high) * sign <= 0.0 or high >= w[REACH, 0]:
+                break
+            high = min(2.0 * high, w[REACH, 0])
+        if find_chain(w, data, c, 0, sign * high) * sign >= 0.0:
+            return
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            if middle == low or middle == high:
+                break
+            if find_chain(w, data, c, 0, sign * middle) * sign > 0.0:
+                low = middle
+            else:
+                high = middle
+
+    @kernel()
+    def find_all(w, rings, data, c, a, b):
+        """Write all slips by `chain`; a closed thread has a ring that sticks, at which it begins."""
+        count, best, best_error = w.shape[1], 0, math.inf
+        closed = w[HEAD, 0] * w[TAIL, 0] > 0.0
+        for start in range(count + 1 if closed else 1):
+            if start == count:
+                start = best
+            if w[HEAD, 0] != w[TAIL, 0]:
+                find_with_winch(w, data, c)
+            else:
+                find_chain(w, data, c, start, 0.0)
+            error = miss(w, rings)
+            for _ in range(POLISH):
+                if error <= 1.0:
+                    return
+                for r in range(rings):
+                    moved, nothing = w[SLIP, r] - w[BEFORE, r], 8.0 * ROUNDING * (abs(w[SLIP, r]) + w[LENGTH, r])
+                    w[MODE, r] = 1.0 if moved > nothing else -1.0 if moved < -nothing else 0.0
+                    if abs(moved) >= reach_of(w, r) * (1.0 - NEAR):
+                        w[MODE, r] *= 2.0
+                error = newton(w, rings, data, c, a, b)
+            if error < best_error:
+                best, best_error = start, error
+
+    @kernel()
+    def wind(t, x, data, c, w, winch, row):
+        """Write what a winch holds and asks for at time t, by its numbers from a column on."""
+        last, rings = w.shape[1] - 1, w.shape[1]
+        begin = internal_number(x, row, 2 * rings + 1)
+        span, fixed = t - begin, data[c, winch + 3] > 0.0
+        if span < SAME * t:  # times of steps are sums
+            span = 0.0
+        w[HOLDS_IN, 0], w[HOLDS_OUT, 0], w[KAPPA, last] = data[c, winch], data[c, winch + 1], 1.0
+        w[REACH, 0] = math.inf if fixed or math.isinf(data[c, winch + 2]) else span * data[c, winch + 2]
+        if not fixed:
+            hauled = hauled_until(begin + span, data, c, winch + 4) - hauled_until(begin, data, c, winch + 4)
+            w[BEFORE, last] += hauled * (w[TAIL, 0] - w[HEAD, 0])
+            w[SLIP, last] = w[BEFORE, last]
+
+    @kernel()
+    def find_slips(t, x, cells, data, c, w):
+        """Write the numbers of cell c where its slips are those that positions ask for; the number of its rings.
+
+        A winch has wound until the time t.
+        """
+        line, first, rings = record_at(record, data, c, 0), first_of(cells), rings_of(cells, data, c)
+        share, ends, count = 1.0 - line.natural_length / line.distance, data[c, first + 1], cells.shape[1] - 1
+        ordinary = rings - (ends > 1.0)
+        w[:] = 0.0
+        w[HEAD, 0], w[TAIL, 0] = 1.0 if ends == 1.0 or ends == 2.0 else 0.0, 1.0 if ends == 1.0 or ends == 3.0 else 0.0
+        for s in range(count):
+            _, _, _, _, length, longer = segment(x, cells, data, c, s)
+            w[LENGTH, s], w[LONGER, s] = length, longer + share * data[c, width + 4 + 4 * s]
+        for r in range(rings):
+            w[BEFORE, r] = w[SLIP, r] = internal_number(x, int(data[c, first]), r)
+        for r in range(ordinary):
+            w[KAPPA, r] = math.exp(-data[c, first + 2 + r] * turn_of(x, cells, data, c, r))
+        if ends > 1.0:
+            wind(t, x, data, c, w, first + 2 + ordinary, int(data[c, first]))
+        pull_all(w, data, c)
+        empty = min(natural(w, 0), natural(w, count - 1)) <= 0.0  # by a winch
+        if empty or miss(w, rings) > 1.0:
+            a, b = np.empty((rings, rings)), np.empty((rings, 1))
+            error = math.inf
+            for _ in range(0 if empty else STEPS):
+                choose(w, rings, False)
+                error = newton(w, rings, data, c, a, b)
+                if error <= 1.0:
+                    break
+            if not error <= 1.0:
+                find_all(w, rings, data, c, a, b)
+        return rings
+
+    return find_slips

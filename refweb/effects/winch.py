@@ -1,0 +1,163 @@
+"""Winches: the end of a thread on a drum, which hauls material in and pays it out.
+
+A winch is one more ring of its thread, behind which is any amount of material. Its slip in a step follows with those of
+the other rings, see `refweb.effects.thread_slips`: it hauls in up to a tension, pays out from a tension
+on, and stays between the two, all that beside what its speed asks for and within its largest speed.
+
+Numbers of a winch: the tensions up to which it hauls in and from which it pays out [N], its largest speed beside the
+one that is asked for [m/s], 1 in statics, where time does not pass, the number of rows of its table of speeds, and
+these rows, of time [s] and speed [m/s].
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..accepted import accepts, any_of
+from ..errors import InputError
+from ..messages import nearest, quote
+from ..tables import Table, checked, choice, field, real, rows, table, text
+
+if TYPE_CHECKING:
+    from ..net.net import Net
+
+_speed, _speeds = real(unit="m/s"), rows(2, increasing=True, unit="m/s")
+
+
+@accepts(any_of(_speed.metadata["read"].accepts, _speeds.metadata["read"].accepts))
+def _one_or_table(name, value):
+    """Read a speed, or a table of (t, speed)."""
+    listed = hasattr(value, "tolist") or isinstance(value, (list, tuple))
+    return checked(name, value, _speeds if listed else _speed)
+
+
+@table
+class Winch(Table):
+    """A winch at an end of a thread, whose node is its drum: it hauls material in and pays it out.
+
+    ``speed`` or ``tension`` says how. A line on a winch is a thread of two nodes. Energy that the winch takes from the
+    web is ``winch_energy``: heat of a brake is positive, work of a motor negative. Mass of the thread stays at its
+    nodes. For lines whose mass follows, or many of which change alike, see ``[[reel]]``. A ``slip`` whose ``ring`` is
+    the node of the drum is the length that has gone over it. Explicit steps are of order 1 where a winch at its
+    ``speed_limit`` turns round, and of order 2 else.
+
+    Parameters
+    ----------
+    thread : str
+        Name of the thread, which is open. It has one winch.
+    end : {"first", "last"}
+        End of the thread at the drum: its first node or its last.
+    speed : float or list of (t, speed), optional
+        Speed [m/s] at which material is hauled in, negative to pay out; or a table, linear between the times and
+        constant before and after them. In statics the winch stays as it is at the start.
+    limit : float, optional
+        Tension at which a winch with ``speed`` slips and pays out [N], as a brake does. A brake alone is a winch of
+        ``speed = 0``.
+    tension : float, optional
+        Tension that the winch holds [N], at any speed up to ``speed_limit``. In statics it holds it whatever length of
+        thread that takes; with ``start = "equilibrium"`` as well, but for one with a ``speed_limit``, which begins as
+        the web is.
+    speed_limit : float, optional
+        Largest speed with ``tension`` [m/s], in and out; by default none. At it the tension is lower or higher.
+
+    Raises
+    ------
+    InputError
+        For none or both of ``speed`` and ``tension``, a ``limit`` without ``speed``, and a ``speed_limit`` with it.
+        From ``extend``, for a thread that the scene does not have, that is closed, has a winch already, a law that
+        pushes, neighbours in one point or no more material for a speed.
+
+    Examples
+    --------
+        [[winch]]
+        thread = "rope"
+        end = "last"
+        tension = 50.0
+        speed_limit = 2.0
+    """
+
+    several = True
+    either = ("speed",), ("tension",)
+
+    thread: str = text(limit=80)
+    end: str = choice("first", "last")
+    speed: Any = field(_one_or_table, default=None, unit="m/s")
+    limit: float | None = real(default=None, above=0.0, unit="N")
+    tension: float | None = real(default=None, above=0.0, unit="N")
+    speed_limit: float | None = real(default=None, above=0.0, unit="m/s")
+
+    def check(self) -> None:
+        """Refuse two ways to wind, and limits that have no meaning."""
+        if (self.speed is None) == (self.tension is None):
+            both = "exclude each other: leave one of them out" if self.speed is not None else "are missing: give one"
+            raise InputError(f"speed and tension {both}")
+        if self.limit is not None and self.speed is None:
+            raise InputError(f"limit = {self.limit:g} has no meaning with tension: it needs speed")
+        if self.speed_limit is not None and self.speed is not None:
+            raise InputError(f"speed_limit = {self.speed_limit:g} has no meaning with speed: leave it out")
+
+    def extend(self, net: Net) -> Net:
+        """The net whose thread has the winch."""
+        names = [thread.name for thread in net.threads]
+        if self.thread not in names:
+            hint = nearest(self.thread, names) if names else "the scene has no [[thread]]"
+            raise InputError(f"thread = {quote(self.thread)} is not a thread, {hint}")
+        number = names.index(self.thread)
+        thread = net.threads[number]
+        for refused, why in (
+            (thread.closed, "is closed, and has no end"),
+            (thread.winch, "has a winch already"),
+            (thread.wraps, "runs over a body, and takes no winch: let the body turn about an axle"),
+            (not thread.distances.all(), "has neighbours in one point: with a winch move them apart"),
+            (
+                thread.line.law.pushes,
+                f'has law = "{thread.line.law.name}", which pushes: take "tension-only" or "table"',
+            ),
+        ):
+            if refused:
+                raise InputError(f"thread = {quote(self.thread)} {why}")
+        if net.end < math.inf and not net.quasi_static:
+            self._refuse_empty(thread, net.end)
+        friction = thread.friction or (0.0,) * (len(thread.distances) - 1)
+        wound = thread._replace(winch=self._numbers(net.quasi_static), at_last=self.end == "last", friction=friction)
+        return replace(net, threads=(*net.threads[:number], wound, *net.threads[number + 1 :]))
+
+    def _speeds(self):
+        """Rows of time [s] and speed [m/s]."""
+        return self.speed if isinstance(self.speed, tuple) else ((0.0, self.speed or 0.0),)
+
+    def _refuse_empty(self, thread, end):
+        """Refuse speeds that haul in all material of a thread until the end of a run [s]."""
+        times, speeds = np.array(self._speeds()).T
+        at = np.unique(np.clip([0.0, end, *times], 0.0, end))
+        for before, behind in zip(times[:-1], times[1:], strict=True):  # where a speed passes through zero
+            first, second = np.interp([before, behind], times, speeds)
+            if first > 0.0 > second:
+                at = np.append(at, np.clip(before + (behind - before) * first / (first - second), 0.0, end))
+        at = np.unique(at)
+        speed = np.interp(at, times, speeds)
+        hauled = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(at) * (speed[1:] + speed[:-1]))])
+        if self.limit is None and hauled.max() >= thread.natural_length:
+            raise InputError(
+                f"speed hauls in {hauled.max():.4g} m until t = {at[hauled.argmax()]:.4g} s, must be below the natural "
+                f"length of {thread.title}, {thread.natural_length:.4g} m"
+            )
+
+    def _numbers(self, quasi_static):
+        """Its numbers, see the module."""
+        if self.tension is not None:
+            holds = self.tension, self.tension
+        else:
+            holds = -math.inf, math.inf if self.limit is None else self.limit
+        largest = 0.0 if self.limit is None and self.speed is not None else self.speed_limit or math.inf
+        speeds = self._speeds()
+        flat = [value for row in speeds for value in row]
+        return (*holds, largest, float(quasi_static), float(len(speeds)), *flat)
+
+    def on(self, net: Net) -> list[Any]:
+        """No term: its thread has them."""
+        return []

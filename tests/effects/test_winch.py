@@ -1,0 +1,276 @@
+"""Winches at the ends of threads: closed forms of tension, brake and power, reels of lines, and the balances."""
+
+import numpy as np
+import pytest
+from nets import METHODS
+
+import refweb
+
+G, EA = 9.81, 1e5
+ROPE = {"name": "rope", "modulus": 1e10, "area": 1e-5, "density": 0.0}
+FAR = [[50.0, 0.0, 0.0], [51.0, 0.0, 0.0]]
+"""Ends of the one line that a web has, away from all else."""
+STEPS = {name: keys for name, keys in METHODS.items() if keys.get("method") != "explicit"}
+TIGHT = {
+    "central-difference": {"step_size": 1e-4},
+    "bdf": {"rtol": 1e-7},
+    "adams": {"rtol": 1e-8},
+    "ida": {"rtol": 1e-7},
+}
+
+
+def scene(points, supports, winch, solve, masses=(), rope=None, **tables):
+    """A scene of points, some of them supported, with a thread, a winch at an end of it, and point masses by node."""
+    far = len(points)
+    given = {
+        "web": {"kind": "inline", "points": [*points, *FAR], "lines": [[far, far + 1]]},
+        "supports": {"nodes": [*supports, far, far + 1]},
+        "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-5, "density": 0.0},
+        "thread": [{**ROPE, **(rope or {})}],
+        "winch": [{"thread": "rope", **winch}],
+        "point_mass": [{"node": node, "mass": mass} for node, mass in dict(masses).items()],
+        "accuracy": {"error": "none"},
+        "solve": solve,
+    }
+    return refweb.Scene.from_dict({name: value for name, value in {**given, **tables}.items() if value != []})
+
+
+def lifted(winch, solve, start=0.0, pull=0.0, gravity=G, **tables):
+    """History of a mass of 2 kg on 3 m of rope below a winch, at a velocity and a tension at the start."""
+    at_first = winch.get("end", "first") == "first"
+    seen = [{"name": "z", "quantity": "displacement", "node": 1, "component": "z"}]
+    seen += [{"name": "u", "quantity": "velocity", "node": 1, "component": "z"}]
+    seen += [{"name": "pull", "quantity": "tension", "thread": "rope"}]
+    seen += [{"name": "wound", "quantity": "slip", "thread": "rope", "ring": 0 if at_first else 1}]
+    given = {
+        "gravity": {"acceleration": [0.0, 0.0, -gravity]} if gravity else [],
+        "velocity": [{"node": 1, "value": [0.0, 0.0, start]}] if start else [],
+        "observe": seen,
+        "output": {"interval": 0.05},
+    }
+    rope = {"nodes": [0, 1] if at_first else [1, 0], "prestrain": pull / EA}
+    points = [[0, 0, 0], [0, 0, -3.0]]
+    solve = {"kind": "dynamic", "duration": 0.4, **solve}
+    return refweb.run(
+        scene(points, [0], {"end": "first", **winch}, solve, {1: 2.0}, rope, **{**given, **tables})
+    ).history
+
+
+def closed(history, size):
+    """The balance of energy with what the winch has taken."""
+    energy = history["total_energy"] + history["dissipated_energy"]
+    np.testing.assert_allclose(energy, energy[0], atol=size)
+
+
+@pytest.mark.parametrize("end", ["first", "last"])
+@pytest.mark.parametrize("method", STEPS)
+def test_constant_tension(method, end):
+    """m a = T − m g until the speed limit v; behind it the rope is hauled in at v, and the load swings about that."""
+    pull, limit = 30.0, 1.2
+    solve = {**STEPS[method], **TIGHT[method]}
+    history = lifted({"tension": pull, "speed_limit": limit, "end": end}, solve, pull=pull)
+    rise, time = pull / 2.0 - G, history["time"]
+    fast = limit * (1.0 + pull / EA)  # of the load, while the tension stays
+    before = time < fast / rise
+    assert 3 < before.sum() < len(time)
+    np.testing.assert_allclose(history["z"][before], 0.5 * rise * time[before] ** 2, atol=2e-5)
+    np.testing.assert_allclose(history["pull"][before], pull, rtol=2e-3)
+    at = fast / rise
+    swing = 3.0 * 2.0 * rise / EA  # of the load, by the change of the tension to its weight
+    np.testing.assert_allclose(
+        history["z"][~before], 0.5 * rise * at**2 + fast * (time[~before] - at), atol=2.0 * swing + 1e-4
+    )
+    sign = 1.0 if end == "last" else -1.0
+    hauled = sign * history["wound"]
+    assert hauled[-1] == pytest.approx(history["z"][-1] / (1.0 + pull / EA), abs=3.0 * swing)
+    np.testing.assert_allclose(history["winch_energy"][before], -pull * hauled[before], rtol=1e-3, atol=1e-6)
+    closed(history, 2e-3)
+
+
+@pytest.mark.parametrize("method", STEPS)
+def test_brake(method):
+    """A load at v comes to rest m v²/2F and half an elastic stretch further; its energy is in brake and rope."""
+    force, speed = 50.0, 1.5
+    top = {"name": "low", "quantity": "displacement", "node": 1, "component": "z", "reduce": "min"}
+    run_keys = {**STEPS[method], **TIGHT[method]}
+    points, rope = [[0, 0, 0], [0, 0, -3.0]], {"nodes": [0, 1]}
+    run = refweb.run(
+        scene(
+            points,
+            [0],
+            {"end": "first", "speed": 0.0, "limit": force},
+            {"kind": "dynamic", "duration": 0.1, **run_keys},
+            {1: 2.0},
+            rope,
+            velocity=[{"node": 1, "value": [0.0, 0.0, -speed]}],
+            observe=[top, {"name": "wound", "quantity": "slip", "thread": "rope", "ring": 0}],
+            output={"interval": 0.05},
+        )
+    )
+    energy, stretch = 0.5 * 2.0 * speed**2, force * 3.0 / EA
+    assert run.results["low"].value == pytest.approx(-(energy / force + 0.5 * stretch), rel=2e-4)
+    paid = run.results["wound"].value
+    assert paid == pytest.approx((energy / force - 0.5 * stretch) / (1.0 + force / EA), rel=2e-3)
+    taken = paid * (force * (1.0 + force / EA) - 0.5 * force**2 / EA)  # Y = T (1 + ε) − W
+    assert run.history["winch_energy"][-1] == pytest.approx(taken, rel=1e-3)
+    closed(run.history, 2e-3 * energy)
+
+
+SPEEDS = [[0.0, 0.0], [0.1, 0.6], [0.3, -0.4]]
+
+
+@pytest.mark.parametrize("method", ["central-difference", "adams"])
+def test_speed_is_a_reel(method):
+    """The same as a line whose natural length a reel changes by the integral of these speeds."""
+    solve = {**STEPS[method], **TIGHT[method]}
+    weight = 2.0 * G
+    history = lifted({"speed": SPEEDS}, solve, pull=weight)
+    times = np.linspace(0.0, 0.4, 201)
+    speeds = np.interp(times, *np.transpose(SPEEDS))
+    hauled = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(times) * (speeds[1:] + speeds[:-1]))])
+    natural = 3.0 / (1.0 + weight / EA)
+    factor = [[t, 1.0 - by / natural] for t, by in zip(times.tolist(), hauled.tolist(), strict=True)]
+    tables = {
+        "web": {"kind": "inline", "points": [[0, 0, 0], [0, 0, -3.0]], "lines": [[0, 1]]},
+        "supports": {"nodes": [0]},
+        "cable": {"law": "tension-only", "modulus": 1e10, "area": 1e-5, "density": 0.0, "prestrain": weight / EA},
+        "reel": [{"lines": [0], "factor": factor}],
+        "gravity": {"acceleration": [0.0, 0.0, -G]},
+        "point_mass": [{"node": 1, "mass": 2.0}],
+        "observe": [{"name": "z", "quantity": "displacement", "node": 1, "component": "z"}],
+        "output": {"interval": 0.05},
+        "accuracy": {"error": "none"},
+        "solve": {"kind": "dynamic", "duration": 0.4, **solve},
+    }
+    exact = refweb.run(refweb.Scene.from_dict(tables)).history
+    np.testing.assert_allclose(history["z"], exact["z"], atol=2e-5)  # the factor is linear between its 200 points
+    assert -history["wound"][-1] == pytest.approx(hauled[-1], rel=1e-9)
+    np.testing.assert_allclose(-history["winch_energy"], exact["work"], atol=2e-3 * np.abs(exact["work"]).max())
+    closed(history, 5e-3)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_statics_at_a_tension(friction):
+    """A heavy ring between a support and a winch: 2 T sin α = W; with friction the support has T e^(−μθ) or more."""
+    pull, weight = 60.0, 40.0
+    run = refweb.run(
+        scene(
+            [[0, 0, 0], [2.0, 0, 0], [1.0, 0.0, -1.2]],
+            [0, 1],
+            {"end": "last", "tension": pull},
+            {"kind": "static", "load_steps": [0.5, 1.0]},
+            rope={"nodes": [0, 2, 1], "friction": friction},
+            load=[{"node": 2, "force": [0.0, 0.0, -weight]}],
+            observe=[{"name": f"t{s}", "quantity": "tension", "thread": "rope", "segment": s} for s in (0, 1)],
+        )
+    )
+    first, second = (run.results[name].value for name in ("t0", "t1"))
+    assert second == pytest.approx(pull, rel=1e-9)
+    place = run.positions[2]
+    u, v = -place, np.array([2.0, 0.0, 0.0]) - place
+    angle = np.pi - np.arccos(u @ v / np.linalg.norm(u) / np.linalg.norm(v))
+    assert np.exp(-friction * angle) * (1.0 - 1e-9) <= first / pull <= np.exp(friction * angle) * (1.0 + 1e-9)
+    balance = first * u / np.linalg.norm(u) + second * v / np.linalg.norm(v)
+    np.testing.assert_allclose(balance, [0.0, 0.0, weight], atol=1e-6)
+    if not friction:
+        assert place[2] == pytest.approx(-np.tan(np.arcsin(weight / (2.0 * pull))), rel=1e-8)
+
+
+def test_speed_in_statics():
+    """A winch with a speed is at its starting length: W = EA (l/L − 1)."""
+    run = refweb.run(
+        scene(
+            [[0, 0, 0], [0, 0, -3.0]],
+            [0],
+            {"end": "first", "speed": 0.7},
+            {"kind": "static"},
+            rope={"nodes": [0, 1]},
+            load=[{"node": 1, "force": [0.0, 0.0, -40.0]}],
+        )
+    )
+    assert run.positions[1][2] == pytest.approx(-3.0 * (1.0 + 40.0 / EA), rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["central-difference", "bdf"])
+def test_a_run_goes_on(tmp_path, method):
+    """A winch at a constant tension goes on from a folder as it would have without a stop."""
+    solve, keys = {**STEPS[method], **TIGHT[method]}, {"end": "first", "tension": 30.0, "speed_limit": 0.8}
+    whole = lifted(keys, solve)
+    seen = [{"name": "z", "quantity": "displacement", "node": 1, "component": "z"}]
+    seen += [{"name": "wound", "quantity": "slip", "thread": "rope", "ring": 0}]
+    given = {"gravity": {"acceleration": [0.0, 0.0, -G]}, "observe": seen, "output": {"interval": 0.05}}
+    parts = [([[0, 0, 0], [0, 0, -3.0]], [0], keys), ({1: 2.0}, {"nodes": [0, 1]})]
+    refweb.run(scene(*parts[0], {"kind": "dynamic", "duration": 0.2, **solve}, *parts[1], **given), tmp_path / "first")
+    from_there = {"kind": "dynamic", "duration": 0.2, "start": str(tmp_path / "first"), **solve}
+    run = refweb.run(scene(*parts[0], from_there, *parts[1], **given))
+    for name in ("z", "wound", "winch_energy"):
+        assert run.history[name][-1] == pytest.approx(whole[name][-1], rel=2e-3)
+
+
+def test_order_of_explicit_steps():
+    """A winch and friction at a ring at once: order 2, and 1 of positions where a winch at its limit turns round."""
+    points, masses = [[0, 0, 0], [1.0, 0.0, 0.4], [1.6, 0.2, -0.5]], {2: 0.3}
+    given = {
+        "gravity": {"acceleration": [0.0, 0.0, -G]},
+        "velocity": [{"node": 2, "value": [0.3, 0.2, -1.0]}],
+        "observe": [{"name": "z", "quantity": "displacement", "node": 2, "component": "z"}],
+        "output": {"interval": 0.05},
+    }
+    rope = {"nodes": [0, 1, 2], "friction": 0.2, "modulus": 1e8}
+    for winch, order in (
+        ({"speed": 0.0, "limit": 5.0}, 2.0),
+        ({"tension": 5.0}, 2.0),
+        ({"tension": 5.0, "speed_limit": 0.3}, 1.0),
+    ):
+        parts = points, [0, 1], {"end": "first", **winch}
+
+        def history(solve, parts=parts):
+            return refweb.run(
+                scene(*parts, {"kind": "dynamic", "duration": 0.3, **solve}, masses, rope, **given)
+            ).history
+
+        exact, errors = history({"method": "cvode", "family": "adams", "rtol": 1e-9}), []
+        for count in (750, 3000, 12000):
+            found = history({"step_size": 0.3 / count})
+            energy = found["total_energy"] + found["dissipated_energy"]
+            errors.append([np.abs(found["z"] - exact["z"]).max(), np.abs(energy - energy[0]).max()])
+        slopes = np.log(np.array(errors[0]) / errors[2]) / np.log(16.0)
+        assert slopes[0] > 0.85 * order and slopes[1] > 1.7
+        assert np.ptp(exact["winch_energy"]) > 0.01
+
+
+@pytest.mark.parametrize(
+    "winch, text",
+    [
+        ({}, r"speed and tension are missing: give one"),
+        ({"speed": 1.0, "tension": 1.0}, r"speed and tension exclude each other"),
+        ({"tension": 1.0, "limit": 2.0}, r"limit = 2 has no meaning with tension"),
+        ({"speed": 1.0, "speed_limit": 2.0}, r"speed_limit = 2 has no meaning with speed"),
+        ({"speed": [[0.0, 1.0], [0.0, 2.0]]}, r"speed\[1\]\[0\] = 0.0 must be > 0"),
+        ({"speed": 3.0}, r'hauls in 3 m until t = 1 s, must be below the natural length of thread "rope", 2 m'),
+        ({"speed": 1.0, "thread": "rop"}, r'thread = "rop" is not a thread, did you mean "rope"'),
+        ({"speed": 1.0, "end": "middle"}, r'end = "middle" must be one of "first", "last"'),
+    ],
+)
+def test_refused(winch, text):
+    with pytest.raises(refweb.InputError, match=text):
+        scene(
+            [[0, 0, 0], [1, 0, 0], [2, 0, 0]],
+            [0, 2],
+            {"end": "first", **winch},
+            {"kind": "dynamic", "duration": 1.0},
+            {1: 1.0},
+            {"nodes": [0, 1, 2]},
+        ).build()
+
+
+def test_refused_threads():
+    for rope, text in (({"closed": True}, "is closed"), ({"law": "smooth", "smoothing": 1e-3}, "which pushes")):
+        with pytest.raises(refweb.InputError, match=text):
+            scene(
+                [[0, 0, 0], [1, 0, 0], [2, 0, 1]],
+                [0, 2],
+                {"end": "first", "speed": 0.0},
+                {"kind": "static"},
+                rope={"nodes": [0, 1, 2], **rope},
+            ).build()
