@@ -93,10 +93,18 @@ def test_an_integral_takes_away_what_a_steady_load_leaves():
     law = {"law": "pid", "parameters": {"proportional": 40.0, "derivative": 12.0, "integral": 30.0}}
     none = refweb.run(scene(target_of(0.0), law=law, **steady)).history["x"][-1]
     assert abs(none) < 1e-4
-    limited = refweb.run(scene({"target": 50.0, "limit": 5.0}, law=law, duration=1.0))
-    x, _, _ = held(lambda x, v, n: 5.0, 20)
-    np.testing.assert_allclose(limited.history["x"], x, atol=1e-12)
-    assert limited.controls[0]["largest"] == 5.0
+    limited = refweb.run(scene({"target": 1.0, "limit": 3.0}, law=law, duration=3.0))
+    state = {"sum": 0.0, "limited": False}
+
+    def act(x, v, n):
+        force = 40.0 * (1.0 - x) + 30.0 * state["sum"] - 12.0 * v
+        state["sum"] += 0.0 if state["limited"] else 0.05 * (1.0 - x)
+        state["limited"] = abs(force) > 3.0
+        return float(np.clip(force, -3.0, 3.0))
+
+    x, _, forces = held(act, 60)
+    np.testing.assert_allclose(limited.history["x"], x, atol=1e-11)
+    assert limited.controls[0]["largest"] == 3.0 and np.abs(forces).min() < 3.0
 
 
 def target_of(value):
