@@ -34,11 +34,14 @@ class Start(NamedTuple):
         Velocity [m/s], None for those of the scene.
     broken : ndarray of int, optional
         Broken elements, None if there are none.
+    contact_shares : ndarray, optional
+        Shares of elements in the push of a body, see `refweb.statics.shared_push`.
     """
 
     x: np.ndarray | None = None
     v: np.ndarray | None = None
     broken: np.ndarray | None = None
+    contact_shares: np.ndarray | None = None
 
     @property
     def motion(self):
@@ -168,7 +171,7 @@ def stored(system, folder):
     broken = given.get("broken", np.zeros(0, dtype=np.int64))
     bearings = _bearings(system, given, bodies, name)
     start = _start_at(system, positions, displacements, velocities, bodies, bearings)
-    start = start._replace(broken=broken if len(broken) else None)
+    start = start._replace(broken=broken if len(broken) else None, contact_shares=given.get("contact_shares"))
     _refuse_jumps(system, start.x, name)
     x, v = (given.get(f"twin_{key}") for key in ("displacements", "velocities"))
     if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):

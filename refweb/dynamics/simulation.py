@@ -121,6 +121,7 @@ class Simulation:
             solution.findings += remarks_on_corners(scene, system)
         if scene.solve.start != "equilibrium" and kept is None:
             solution.findings += remarks_on(self.begin, system)
+            self._note_jumps(self.begin.contact_shares, self.begin.x)
 
     @property
     def columns(self):
@@ -190,7 +191,7 @@ class Simulation:
         if self.scene.solve.start != "equilibrium" or self._kept is not None:
             return
         from ..statics.remarks import on_stability, remark_on_open
-        from ..system.static_system import at_rest, waiting
+        from ..system.static_system import waiting
 
         equilibrium_ = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
         x = self.system.settled(equilibrium_.x)
@@ -199,11 +200,7 @@ class Simulation:
             text = f"of the equilibrium it starts from: {finding.text}"
             self.solution.findings.append(finding._replace(text=text))
         self.solution.findings += on_stability(state, equilibrium_, "the equilibrium it starts from")
-        if equilibrium_.contact_shares is not None:
-            from ..statics.contact_kinks import jumps
-
-            self._jumps = jumps(at_rest(self.system), equilibrium_)
-            self.solution.findings.append(Finding("shared-push", self._jumps, "contact"))
+        self._note_jumps(equilibrium_.contact_shares, x)
         self.solution.findings += remarks_on(self.begin, self.system)
         absent = waiting(self.system)
         if names := [body.name for body in absent if body.carried]:
@@ -216,6 +213,17 @@ class Simulation:
             passage = Passage(self.scene, self.system)
             passage.record(State(self.system, 0.0, equilibrium_.x), equilibrium_.path)
             passage.overlaps.refuse()
+
+    def _note_jumps(self, shares, x):
+        """Note that elements share the push of a body at the start x, between which it jumps in dynamics."""
+        if shares is None:
+            return
+        from ..statics.contact_kinks import jumps
+        from ..system.static_system import at_rest
+
+        self._jumps = jumps(at_rest(self.system), shares, x)
+        if self._jumps:
+            self.solution.findings.append(Finding("shared-push", self._jumps, "contact"))
 
     def run(self, folder, tell):
         """Run once from start to end and return a `RunResult`.

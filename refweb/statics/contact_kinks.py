@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..findings import Finding
-from ..system.contact_shares import sharing_terms
+from ..system.contact_shares import sharing_terms, with_shares
 
 ALIKE = 1e-2
 """Largest difference of two depths, over the larger one, that counts as none: iterations go to and fro about a kink."""
@@ -61,9 +61,12 @@ def no_modes(system, equilibrium):
     )
 
 
-def jumps(system, equilibrium):
-    """Text on dynamics that starts from an equilibrium in which elements share a push."""
-    body, line = _first(system, equilibrium)
+def jumps(system, shares, x):
+    """Text on dynamics that starts at x, an equilibrium in which elements share a push; None where none do."""
+    first = next(iter(shared_by(with_shares(system, shares), 0.0, x)), None)
+    if first is None:
+        return None
+    body, line = first
     return (
         f'body "{body.name}" touches line {line} with several elements alike in the equilibrium it starts from: '
         "contact with a sphere acts once a line, and the push goes to and fro between these elements, by the way of a "

@@ -96,7 +96,7 @@ def test_damped_dynamics_comes_to_the_same_rest():
     assert moved.results["height"].value == pytest.approx(rest, abs=1e-4)
 
 
-def test_what_begins_at_such_a_rest():
+def test_what_begins_at_such_a_rest(tmp_path):
     """Explicit steps stay there, with a warning; natural frequencies and implicit steps are refused with the reason."""
     start = {"kind": "dynamic", "duration": 0.02, "start": "equilibrium"}
     stays = refweb.run(crossed(**DAMPED, solve=start))
@@ -104,6 +104,12 @@ def test_what_begins_at_such_a_rest():
     assert any("the push goes to and fro between these elements" in text for text in stays.warnings)
     with pytest.raises(refweb.SolverError, match='line 0 with several elements alike.*method = "central-difference"'):
         refweb.run(crossed(**DAMPED, solve={**start, "method": "cvode"}))
+    refweb.run(crossed(cable=DAMPED["cable"]), tmp_path / "rest")
+    start["start"] = str(tmp_path / "rest")
+    stays = refweb.run(crossed(**DAMPED, solve=start))
+    assert stays.results["height"].value == pytest.approx(closed_form()[0], abs=1e-4)
+    with pytest.raises(refweb.SolverError, match='line 0 with several elements alike.*method = "central-difference"'):
+        refweb.run(crossed(**DAMPED, solve={**start, "method": "ida"}))
     capsule = {"shape": "capsule", "axis": [0, 0, 1], "length": 0.0002}
     with pytest.raises(refweb.SolverError, match='no natural frequencies.*"ball" touches line 0.*length = 0.0002'):
         refweb.modes(crossed(cable=DAMPED["cable"]))
