@@ -113,6 +113,7 @@ def print_scene(scene, system):
             ("effects", ", ".join(counted) or "none"),
             *((f'body "{body.name}"', text) for body in system.net.bodies for text in body.shape.texts()),
             *_stiffness(scene, system),
+            *((f'control "{c.name}"', f"{c.law} sets {c.sets} each {c.period:g} s") for c in scene.control),
             ("solve", how),
             *steps,
             *rows,
