@@ -32,6 +32,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .effects.thread import Thread as Thread
     from .effects.thrust import Thrust as Thrust
     from .effects.velocity import Velocity as Velocity
+    from .effects.winch import Winch as Winch
     from .errors import InputError as InputError
     from .errors import SolverError as SolverError
     from .net.cable import Cable as Cable

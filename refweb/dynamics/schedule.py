@@ -133,14 +133,19 @@ class Block(NamedTuple):
     compared: History
 
 
-def block_of(integrator, course, schedule, first, stop):
-    """Advance a course through the rows from ``first`` to ``stop`` − 1, and return their `Block`."""
+def times_of(schedule, time, first, stop):
+    """Times to which an integrator goes for the rows from ``first`` to ``stop`` − 1 from a time on [s]."""
     rows = schedule.times[first:stop]
-    between = schedule.between[(schedule.between > course.time) & (schedule.between < rows[-1])]
-    history = compared = integrator.advance(course, np.sort(np.concatenate([rows, between])))
-    if len(between):
+    between = schedule.between[(schedule.between > time) & (schedule.between < rows[-1])]
+    return np.sort(np.concatenate([rows, between]))
+
+
+def block_of(schedule, first, stop, compared):
+    """The `Block` of the rows from ``first`` to ``stop`` − 1, from the `History` at their `times_of`."""
+    rows, history = schedule.times[first:stop], compared
+    if len(compared) > len(rows) or len(schedule.between):
         selected = np.isin(compared.time, rows)
-        selected[-1] = True  # where an event ends the run, its row is that of the event
+        selected[-1:] = True  # where an event ends the run, its row is that of the event
         history = compared[selected]
     return Block(first, history, compared)
 
@@ -175,7 +180,8 @@ def blocks(integrator, course, schedule, first=0):
         if commands is not None:
             stop = min(stop, commands.until(first))
         count, began = min(size, stop + 1 - first), time.perf_counter()
-        block = block_of(integrator, course, schedule, first, first + count)
+        compared = integrator.advance(course, times_of(schedule, course.time, first, first + count))
+        block = block_of(schedule, first, first + count, compared)
         yield block
         first += count
         if commands is not None:

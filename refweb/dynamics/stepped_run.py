@@ -17,7 +17,7 @@ from ..results.provenance import versions, web_of
 from ..results.solution import as_history
 from ..scene import Scene
 from .commands import NEAR, Command, Inputs, row_at, widened
-from .schedule import Schedule, block_of
+from .schedule import Schedule, block_of, times_of
 from .simulation import Simulation
 
 if TYPE_CHECKING:
@@ -87,7 +87,9 @@ class SteppedRun:
         simulation, commands = self._simulation, self._schedule.commands
         while self._row < stop and not self._course.stopped:
             end = stop if commands is None else min(stop, commands.until(self._row) + 1)
-            block = block_of(simulation.integrator, self._course, self._schedule, self._row, end)
+            times = times_of(self._schedule, self.time, self._row, end)
+            compared = simulation.integrator.advance(self._course, times)
+            block = block_of(self._schedule, self._row, end, compared)
             table = simulation.watch.table(block.history)
             simulation.inspect(self._course)
             self._tables.append(table)

@@ -41,10 +41,18 @@ def as_toml(given):
     for key, value in sorted(given.items(), key=lambda item: isinstance(item[1], (dict, list))):
         if isinstance(value, list):
             for entry in value:
-                below = {name: inner for name, inner in entry.items() if isinstance(inner, dict)}
+                below = {name: inner for name, inner in entry.items() if _holds_tables(inner)}
                 plain = {name: inner for name, inner in entry.items() if name not in below}
                 parts.append(f"[[{key}]]\n{tomli_w.dumps(plain)}")
-                parts += [tomli_w.dumps({key: {name: inner}}) for name, inner in below.items()]
+                for name, inner in below.items():
+                    header, tables = f"[{key}.{name}]", inner if isinstance(inner, list) else [inner]
+                    header = f"[{header}]" if isinstance(inner, list) else header
+                    parts += [f"{header}\n{tomli_w.dumps(table)}" for table in tables]
         else:
             parts.append(tomli_w.dumps({key: value}))
     return "\n".join(parts)
+
+
+def _holds_tables(value):
+    """True for a table, and for a list of tables."""
+    return isinstance(value, dict) or isinstance(value, list) and any(isinstance(item, dict) for item in value)

@@ -66,6 +66,10 @@ MORE = {
             {"name": "rope", "nodes": [5, 6, 10, 9], "closed": True, "modulus": 1e6, "area": 1e-5, "density": 100.0},
         ],
     },
+    "winch": {
+        "thread": [{"name": "rope", "nodes": [5, 6, 10, 9], "modulus": 1e6, "area": 1e-5, "density": 100.0}],
+        "winch": [{"thread": "rope", "end": "last", "speed": 0.0}],
+    },
     "frame": {"frame": {"angular_velocity": [0.1, 0.2, 1.0]}},
     "orbit": {"orbit": {"mean_motion": 0.5}},
     "pressure": {"pressure": [{"lines": [8, 9], "normal": [0.0, 0.0, 1.0], "value": 3.0}]},
@@ -120,6 +124,7 @@ LOOKED_AT = {
     "stress": [{}],
     "strain": [{}, {"select": "min"}, {"line": [3, 20], "select": "abs"}],
     "length": [{"thread": "rope"}],
+    "slip": [{"thread": "rope", "ring": 9}],
     **{quantity: [{}] for quantity in KINDS},
     "work": [{}],
     "overlap": [{"body": "ball"}, {"body": "box"}],
@@ -282,6 +287,7 @@ def numbers(frame, spin, effect, static):
     pull = frame.pull if effect == "damping" else frame.tension
     found = {
         "displacement 0": sizes(frame.u),
+        "winch_energy 0": 0.0,
         "displacement 1": frame.x[5, 2] - POINTS[5][2],
         "position 0": frame.x[10, 2],
         "position 1": frame.places[0][0],

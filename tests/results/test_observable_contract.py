@@ -39,6 +39,7 @@ WHERE = {
     "body": [{"body": "ball"}, {"body": "wall"}, {"body": ["wall", "ball"]}],
     "line": [{}, {"line": 0}, {"line": 7}],
     "thread": [{"thread": "rope"}],
+    "ring": [{"ring": 4}],
     "component": [{}, *({"component": axis} for axis in "xyz")],
     "to": [{"to": "ball"}],
     "select": [{}, *({"select": choice} for choice in ("max", "min", "abs"))],
@@ -79,8 +80,8 @@ def random_state(law, seed, pieces=2, turning=False):
 
 STATES = [random_state(law, seed) for law in LAWS for seed in range(3)]
 STATES += [random_state("smooth", 3, pieces=3), random_state("tension-only", 4, turning=True)]
-BY_PROBE = ("support_force", "support_moment", "axle_angle")
-"""Quantities whose value in a state is that of their probe, of bodies that these scenes do not have."""
+BY_PROBE = ("support_force", "support_moment", "axle_angle", "slip")
+"""Quantities whose value in a state is that of their probe, of bodies and rings that these scenes do not have."""
 BOOKED = [name for name in OBSERVABLES if refweb.Observe(name="_", quantity=name).observable.booked]
 PROBED = [name for name in OBSERVABLES if name not in (*BOOKED, *BY_PROBE)]
 
@@ -120,6 +121,7 @@ UNKNOWN = (
     "body_contact_energy",
     "self_contact_energy",
     "plastic_energy",
+    "winch_energy",
 )
 """Energies that a state of these scenes does not know."""
 
