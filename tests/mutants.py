@@ -437,6 +437,8 @@ MUTANTS = [
     Mutant("effects/thread_slips", "total += (high - low) * (first + slope * middle)", "total += (high - low) * first"),
     Mutant("effects/thread_slips", "w[SLIP, r] = w[BEFORE, r] + math.copysign(reach, moved)", "w[SLIP, r] += 0.0"),
     Mutant("effects/winch", "holds = self.tension, self.tension", "holds = -math.inf, self.tension"),
+    Mutant("effects/winch", "(thread.friction[start:] + thread.friction[:start])[:-1]", "thread.friction[:-1]"),
+    Mutant("effects/winch", "vectors=np.roll(thread.vectors, -start, axis=0)", "vectors=thread.vectors"),
     Mutant("effects/thread_friction", "mean = now if before == 0.0 else 0.5 * (now + before)", "mean = 0.5 * now"),
     Mutant("effects/thread_friction", "total += 0.5 * (before + now) *", "total += now *"),
     Mutant(

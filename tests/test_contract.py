@@ -97,6 +97,7 @@ EXAMPLES = {
     "Winch": [
         dict(thread="rope", end="first", tension=10.0, speed_limit=0.02),
         dict(thread="rope", end="last", speed=[(0.0, 0.1), (1.0, 0.05)], limit=4.0),
+        dict(thread="rope", at=4, tension=10.0, speed_limit=0.02),
     ],
     "Reel": [
         dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
@@ -158,7 +159,7 @@ def make(name, i, law, tensionless=False):
     net = discretisation.build(web, replace(nets.skew_cable(law), subdivide=pieces))
     touched = name in ("Contact", "Attach", "Damping") or "around" in EXAMPLES[name][i]
     bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if touched else []
-    threads = [example("Thread", 7)] if name == "Winch" else []
+    threads = [example("Thread", 8 if "at" in EXAMPLES[name][i] else 7)] if name == "Winch" else []
     system = System(net, [*bodies, *threads, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
     return system.net, system
 
@@ -354,7 +355,7 @@ def test_extension(name, i):
     net = skew_net()
     for number in range(5) if "around" in EXAMPLES[name][i] else [1] if name == "Attach" else []:
         net = example("Body", number).extend(net)
-    net = example("Thread", 0).extend(net) if name == "Winch" else net
+    net = example("Thread", 8 if "at" in EXAMPLES[name][i] else 0).extend(net) if name == "Winch" else net
     before = net.points.copy(), net.mass.copy()
     effect = example(name, i)
     longer = effect.extend(net)

@@ -160,8 +160,14 @@ EFFECTS = {
     "winch": st.lists(
         table(
             thread=st.just("rope"),
-            end=st.sampled_from(["first", "last"]),
-            optional={"speed": SIGNED, "limit": ANY, "tension": ANY, "speed_limit": ANY},
+            optional={
+                "end": st.sampled_from(["first", "last"]),
+                "at": NODE,
+                "speed": SIGNED,
+                "limit": ANY,
+                "tension": ANY,
+                "speed_limit": ANY,
+            },
         ),
         min_size=1,
         max_size=1,

@@ -194,7 +194,7 @@ class Thread(Table):
     nodes, use lines. Explicit steps are as short as with lines of the same material from node to node; in matrices a
     thread of n nodes is a dense block of 9 n² numbers. In statics bounds of errors are proven as with lines alone, if
     threads have the law of tension alone and run over no body. Reels, heat, material damping and ``[rupture]`` are of
-    lines alone: to pull a thread in, move its end.
+    lines alone: to pull a thread in, move its end, or take a ``[[winch]]``.
 
     Parameters
     ----------

@@ -1,5 +1,7 @@
 """Winches: the end of a thread on a drum, which hauls material in and pays it out.
 
+A closed thread with a winch is one that begins and ends at the drum: one end is tied to it, the other wound on it.
+
 A winch is one more ring of its thread, behind which is any amount of material. Its slip in a step follows with those of
 the other rings, see `refweb.effects.thread_slips`: it hauls in up to a tension, pays out from a tension
 on, and stays between the two, all that beside what its speed asks for and within its largest speed.
@@ -20,7 +22,7 @@ import numpy as np
 from ..accepted import accepts, any_of
 from ..errors import InputError
 from ..messages import nearest, quote
-from ..tables import Table, checked, choice, field, real, rows, table, text
+from ..tables import Several, Table, checked, choice, field, nodes, real, rows, table, text
 
 if TYPE_CHECKING:
     from ..net.net import Net
@@ -37,7 +39,7 @@ def _one_or_table(name, value):
 
 @table
 class Winch(Table):
-    """A winch at an end of a thread, whose node is its drum: it hauls material in and pays it out.
+    """A winch at an end of a thread, or at a node of a closed one, its drum: it hauls material in and pays it out.
 
     ``speed`` or ``tension`` says how. A line on a winch is a thread of two nodes. Energy that the winch takes from the
     web is ``winch_energy``: heat of a brake is positive, work of a motor negative. Mass of the thread stays at its
@@ -45,12 +47,21 @@ class Winch(Table):
     the node of the drum is the length that has gone over it. Explicit steps are of order 1 where a winch at its
     ``speed_limit`` turns round, and of order 2 else.
 
+    A closed thread, such as a drawstring, is tied to the drum and wound on it from one side. Its segments and rings
+    count from the drum: the first segment leaves it, and the last ring is the drum again. With friction the tension
+    falls along the thread from the side that is wound. To wind both sides, take two threads from the drum to a node
+    across, and a winch for each.
+
     Parameters
     ----------
     thread : str
-        Name of the thread, which is open. It has one winch.
-    end : {"first", "last"}
-        End of the thread at the drum: its first node or its last.
+        Name of the thread. It has one winch.
+    end : {"first", "last"}, optional
+        End of an open thread at the drum: its first node or its last. Of a closed thread the side that is wound: the
+        segment behind the drum, by default, or with "last" the one before it.
+    at : int or str, optional
+        Node of a closed thread that is the drum, by number or name, where the thread passes it first; by default the
+        first node of the thread.
     speed : float or list of (t, speed), optional
         Speed [m/s] at which material is hauled in, negative to pay out; or a table, linear between the times and
         constant before and after them. In statics the winch stays as it is at the start.
@@ -68,8 +79,9 @@ class Winch(Table):
     ------
     InputError
         For none or both of ``speed`` and ``tension``, a ``limit`` without ``speed``, and a ``speed_limit`` with it.
-        From ``extend``, for a thread that the scene does not have, that is closed, has a winch already, a law that
-        pushes, neighbours in one point or no more material for a speed.
+        From ``extend``, for a thread that the scene does not have, that is open and has no ``end``, or has ``at``, that
+        does not run through ``at``, has a winch already, a law that pushes, neighbours in one point or no more material
+        for a speed.
 
     Examples
     --------
@@ -84,7 +96,8 @@ class Winch(Table):
     either = ("speed",), ("tension",)
 
     thread: str = text(limit=80)
-    end: str = choice("first", "last")
+    end: str | None = choice("first", "last", default=None)
+    at: Several = nodes(default=None)
     speed: Any = field(_one_or_table, default=None, unit="m/s")
     limit: float | None = real(default=None, above=0.0, unit="N")
     tension: float | None = real(default=None, above=0.0, unit="N")
@@ -109,7 +122,6 @@ class Winch(Table):
         number = names.index(self.thread)
         thread = net.threads[number]
         for refused, why in (
-            (thread.closed, "is closed, and has no end"),
             (thread.winch, "has a winch already"),
             (thread.wraps, "runs over a body, and takes no winch: let the body turn about an axle"),
             (not thread.distances.all(), "has neighbours in one point: with a winch move them apart"),
@@ -122,9 +134,36 @@ class Winch(Table):
                 raise InputError(f"thread = {quote(self.thread)} {why}")
         if net.end < math.inf and not net.quasi_static:
             self._refuse_empty(thread, net.end)
+        thread = self._opened(thread, net.web)
         friction = thread.friction or (0.0,) * (len(thread.distances) - 1)
         wound = thread._replace(winch=self._numbers(net.quasi_static), at_last=self.end == "last", friction=friction)
         return replace(net, threads=(*net.threads[:number], wound, *net.threads[number + 1 :]))
+
+    def _opened(self, thread, web):
+        """The thread as an open one, from the drum to the drum where it is closed."""
+        if not thread.closed:
+            if self.at is not None:
+                raise InputError(f"at = {quote(self.at)} is of closed threads, and {thread.title} is open: give end")
+            if self.end is None:
+                raise InputError(f'end is missing: {thread.title} is open, give "first" or "last"')
+            return thread
+        start = 0
+        if self.at is not None:
+            drums = web.find(self.at, "at")
+            if len(drums) != 1:
+                raise InputError(f"at = {quote(self.at)} is {len(drums)} nodes, must be one")
+            passes = np.flatnonzero(thread.rows[:-1] == drums[0])
+            if not len(passes):
+                raise InputError(f"at = {quote(self.at)} must be a node of {thread.title}, such as {thread.rows[0]}")
+            start = int(passes[0])
+        rows = np.roll(thread.rows[:-1], -start)
+        return thread._replace(
+            rows=np.append(rows, rows[:1]),
+            vectors=np.roll(thread.vectors, -start, axis=0),
+            distances=np.roll(thread.distances, -start),
+            friction=(thread.friction[start:] + thread.friction[:start])[:-1],
+            closed=False,
+        )
 
     def _speeds(self):
         """Rows of time [s] and speed [m/s]."""
