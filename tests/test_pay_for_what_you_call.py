@@ -99,6 +99,8 @@ def roots(given, method):
         yield "effects.axle"
     if any("around" in thread for thread in given.get("thread", ())):
         yield from ("effects.around", "effects.winding")
+    if "winch" in given or any("friction" in thread for thread in given.get("thread", ())):
+        yield from ("effects.thread_friction", "effects.thread_slips")
     if any(reel.get("mass") == "follows" for reel in given.get("reel", ())):
         yield "system.material_flow"
     if any(shape in ("cylinder", "box") and "mass" in body for shape, body in zip(shapes, bodies, strict=True)):
@@ -163,7 +165,8 @@ def called(given):
         modules.add("net.curved")
     if given["cable"].get("order", 1) > 1 or rests or method in ("cvode", "ida"):
         outside.append("skfem")  # dofs of what has a matrix
-    if "mesh" not in given["web"] or "self_contact" in given or rests or factorized:  # parts, neighbours
+    joined = given.keys() & {"self_contact", "thread"}
+    if "mesh" not in given["web"] or joined or rests or factorized:  # parts, neighbours
         outside.append("scipy.sparse.csgraph")
     if factorized:
         outside.append("qdldl")
@@ -232,7 +235,6 @@ ALIKE = (
     "spinning-web",
     "tethered-web",
     "ring-on-slack-cable",
-    "closing-net",
     "by ida",
     "reeled-tether",
     "winch-drum",

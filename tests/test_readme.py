@@ -191,12 +191,14 @@ def test_comments_of_other_scenes():
     (push,) = numbers(r"\(here (\S+) kN/m at each contact", said)
     assert next(e for e in scene.effects if isinstance(e, refweb.Contact)).stiffness == 1e3 * push
     scene, said = refweb.Scene.load("closing-net"), comment("closing-net")
-    reel = next(effect for effect in scene.effects if isinstance(effect, refweb.Reel))
+    thread, winch = (next(e for e in scene.effects if isinstance(e, k)) for k in (refweb.Thread, refweb.Winch))
     thrown = next(effect for effect in scene.effects if isinstance(effect, refweb.Velocity))
     debris = body_of(scene)
-    assert "reeled in to half" in said and round(reel.factor[-1][1], 1) == 0.5
+    assert numbers(r"at (\d+) m/s with up to (\d+) N", said) == [winch.speed[-1][1], winch.limit]
+    web, rings = scene.build().net.web, set(thread.nodes)
+    assert "eight rings" in said and len(rings) == 8 and set(web.corners) < rings < set(web.rim)
     assert "touches the debris before the winch starts" in said
-    assert (debris.position[2] - debris.radius) / thrown.value[2] < reel.factor[0][0]
+    assert (debris.position[2] - debris.radius) / thrown.value[2] < winch.speed[0][0]
     assert numbers(r"with (\d+) layers", said) == [scene.web.layers]
     assert numbers(r"Example 1: (\d) m, (\d+) elements", comment("catenary")) == [
         refweb.Scene.load("catenary").web.length,

@@ -343,3 +343,20 @@ def test_refused_threads(rope, winch, text):
             {"kind": "static"},
             rope={"nodes": [0, 1, 2], **rope},
         ).build()
+
+
+def test_shipped_scene():
+    """The net closes behind the debris: its rim ends beyond it, drawn together, and the balances are kept."""
+    run = refweb.run(refweb.Scene.load("closing-net").replace(accuracy=refweb.Accuracy(error="none")))
+    assert run.status == "solved" and not run.warnings and run.solver["energy_drift"] < 5e-3
+    web, history, start = run.state.system.net.web, run.history, run.history["kinetic_energy"][0]
+    mass = 200.0 * 1e-4 * web.natural_length.sum() + 4 * 0.25
+    # Pairs of forces cancel; what is left is the rounding of 6000 steps.
+    np.testing.assert_allclose(history["momentum_z"], 4.0 * mass, rtol=1e-9)
+    closed(history, 5e-3 * start)
+    assert history["winch_energy"][-1] < -0.5 * start and history["dissipated_energy"][-1] > 0.1 * start
+    assert run.results["pull"].value <= 30.0 * (1.0 + 1e-9)  # the limit
+    rim, debris = run.positions[web.rim], run.state.position[-1]
+    assert rim[:, 2].min() > debris[2] + 0.3  # its radius
+    # The net is 1.9 m wide: a mouth of half of that is closed by more than the winch takes in.
+    assert np.ptp(rim[:, :2], axis=0).max() < 0.5 * 1.9 and run.results["debris_speed"].value > 0.0
