@@ -394,9 +394,11 @@ _rows = tuple(rows(width, increasing=True) for width in (2, 4))
 _kinds = [kind.metadata["read"].accepts for kind in (_number, _numbers, *_rows)]
 
 
-@accepts(any_of(array({"type": "string"}, 1), *_kinds))
+@accepts(any_of({"type": "string"}, array({"type": "string"}, 1), *_kinds))
 def _target(name, value):
     """Read a target: a number, numbers, names of observables, or a table over time."""
+    if isinstance(value, str):
+        return checked(name, [value], _names)
     if not isinstance(value, (list, tuple)):
         return checked(name, value, _number)
     if value and isinstance(value[0], str):
@@ -417,6 +419,9 @@ class Control(Table):
     The control sets what a scene has: ``load.N.force``, ``thrust.N.force``, ``pressure.N.value``,
     ``gravity.acceleration``, ``body.NAME.axle.torque``, or the rate of a table, ``reel.N.rate`` of the factor [1/s],
     ``motion.N.velocity``, ``motion.N.angular_velocity``. N counts from 0.
+
+    The run says the integral over time of the size of the value; for a load it is that of the force on one node. A reel
+    stops at a hundredth of its factor.
 
     With the error e = target − measured and its rate e', "pid" gives proportional · e + integral · ∫e dt + derivative
     · e'; the integral waits while the limit acts. "sliding-mode" gives strength · s/width, at most strength, with the
@@ -443,7 +448,8 @@ class Control(Table):
     measures : list of str
         Names of the observables that it measures: one, or three for a vector.
     rates : list of str, optional
-        Names of the observables of their rates; by default the difference over a period.
+        Names of the observables of their rates; by default the difference over the period before, 0 at the start. The
+        rate of a target is that difference, too.
     direction : sequence of 3 float, optional
         Direction of a vector that is set by one observable, of length 1.
     target : float, list or table
@@ -452,7 +458,8 @@ class Control(Table):
     limit : float, optional
         Largest size of the value; a larger vector keeps its direction.
     delay : float
-        Time from a measurement to its effect [s], a multiple of the period.
+        Time from a measurement to its effect [s], a multiple of the period. Until the first measurement is so old, it
+        acts at once.
     noise : float
         Standard deviation of what is added to each measurement; it follows from the seed of the scene.
 

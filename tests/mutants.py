@@ -389,7 +389,7 @@ MUTANTS = [
     Mutant("dynamics/commands", "last = now + rate * (end - t)", "last = now + rate * end"),
     Mutant("dynamics/control_laws", "        if not measurement.limited:\n", "        if True:\n"),
     Mutant("dynamics/control_laws", "/ (2.0 * self.strength)", "/ self.strength"),
-    Mutant("dynamics/controllers", "self.spent + norm * float(end - time)", "self.spent + float(end - time)"),
+    Mutant("dynamics/controllers", "return self._spent + self._size * (time - self._since)", "return self._spent"),
     Mutant("dynamics/controllers", "len(self._measured) - 1 - self._lag, 0)", "len(self._measured) - 1, 0)"),
     Mutant("dynamics/controllers", 'self._law.restore(arrays["law"])', "pass"),
     Mutant("dynamics/stepped_run", "copy._inputs.restore(self._inputs.present)", "pass"),

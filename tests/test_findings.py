@@ -13,7 +13,20 @@ from refweb.registry import EFFECTS
 from refweb.solution import load
 
 PACKAGE = pathlib.Path(refweb.__file__).parent
-TABLES = {"", "accuracy", "body", "cable", "event", "motion", "observe", "solve", "supports", "web", *EFFECTS}
+TABLES = {
+    "",
+    "accuracy",
+    "body",
+    "cable",
+    "control",
+    "event",
+    "motion",
+    "observe",
+    "solve",
+    "supports",
+    "web",
+    *EFFECTS,
+}
 
 
 def made():

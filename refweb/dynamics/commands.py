@@ -160,6 +160,13 @@ class Inputs:
         self.present[name, number] = effect
         return writes
 
+    def refuse_factor(self, path: str) -> None:
+        """Refuse a path of a force with a factor over time, which would change what is set; `InputError`."""
+        name, _, rest = path.partition(".")
+        number = self._number(name, rest.partition(".")[0], self._given[name]) if self._given[name][0].several else 0
+        if getattr(self._given[name][number], "factor", None) is not None and name in INPUTS:
+            raise InputError(f"sets = {quote(path)}: its factor would multiply what is set: leave that out")
+
     def apply(self, writes: list[Any], integrator: Integrator, course: IntegratorState) -> None:
         """Write the numbers of checked commands in a run, and keep the balances of the run closed."""
         system, t, x, v = self._system, course.time, course.x, course.v
@@ -330,8 +337,17 @@ class Commands:
         self._by_row: dict[int, list[Command]] = {}
         self._table = table
         for entry in given:
-            command = Command(*entry)
+            command = _command(entry)
+            self.refuse_controlled(command.path)
             self._by_row.setdefault(row_at(schedule.times, command.time), []).append(command)
+
+    def refuse_controlled(self, path: str) -> None:
+        """Refuse a command on what a control sets; `InputError`."""
+        for controller in self.controllers:
+            if controller.control.sets == path:
+                raise InputError(
+                    f"{path} is set by [[control]] {quote(controller.control.name)}: leave out one of them"
+                )
 
     def reset(self) -> None:
         """Begin at the values of the scene."""
@@ -369,6 +385,15 @@ class Commands:
         self.inputs.restore_arrays(saved["inputs"])
         for controller, arrays in zip(self.controllers, saved["controllers"], strict=True):
             controller.restore(arrays)
+
+
+def _command(entry):
+    """A command of (time, path, value)."""
+    try:
+        time, path, value = entry
+        return Command(float(time), str(path), value)
+    except (TypeError, ValueError):
+        raise InputError(f"commands: {short(repr(entry))} must be (time, path, value)") from None
 
 
 def row_at(times: NDArray[np.float64], time: float) -> int:

@@ -93,6 +93,13 @@ class Pid(Law):
         self._sum = np.array(numbers)
 
 
+def _positive(law, *names):
+    """Refuse parameters of a law that are not above zero."""
+    for name in names:
+        if not getattr(law, name) > 0.0:
+            raise ValueError(f"{name} = {getattr(law, name):g} must be > 0")
+
+
 @dataclass
 class SlidingMode(Law):
     """Feedback of one size that leads to the surface e' + slope · e = 0, smooth within ``width`` of it."""
@@ -100,6 +107,9 @@ class SlidingMode(Law):
     strength: float
     slope: float
     width: float
+
+    def __post_init__(self) -> None:
+        _positive(self, "strength", "width")
 
     def act(self, measurement: Measurement, time: float) -> NDArray[np.float64]:
         """The value."""
@@ -114,11 +124,18 @@ class BangBang(Law):
     strength: float
     mass: float
 
+    def __post_init__(self) -> None:
+        _positive(self, "strength", "mass")
+
+    def surface(self, measurement: Measurement) -> NDArray[np.float64]:
+        """The number whose sign decides."""
+        rate = measurement.error_rate
+        return measurement.error + rate * np.abs(rate) * self.mass / (2.0 * self.strength)
+
     def act(self, measurement: Measurement, time: float) -> NDArray[np.float64]:
         """The value; on the switching curve that of the motion along it."""
-        error, rate = measurement.error, measurement.error_rate
-        side = error + rate * np.abs(rate) * self.mass / (2.0 * self.strength)
-        return self.strength * np.where(side == 0.0, np.sign(rate), np.sign(side))
+        side = self.surface(measurement)
+        return self.strength * np.where(side == 0.0, np.sign(measurement.error_rate), np.sign(side))
 
 
 @dataclass

@@ -54,8 +54,10 @@ class Controller:
 
     Attributes
     ----------
-    spent, largest : float
-        Integral over time of the size of what is set, and its largest size.
+    largest : float
+        Largest size of what is set.
+    surfaces : list of float
+        Numbers whose sign decides what is set, of a law that switches.
 
     Raises
     ------
@@ -84,14 +86,16 @@ class Controller:
         if not self._vector and (len(control.measures) > 1 or control.direction is not None):
             raise InputError(f"{control.sets} is one number: give one name in measures, and no direction")
         self._law: Any = _law(control, scene.folder)
+        if control.law == "spin-up" and control.target == 0.0:
+            raise InputError('target = 0 must not be zero with law = "spin-up": it is the speed that is led to')
         self.reset()
 
     def reset(self) -> None:
         """Begin a run."""
         self._measured: list[Any] = []
         self._target_before: Any = None
-        self.spent = self.largest = 0.0
-        self.limited = False
+        self._spent = self.largest = self._size = self._since = 0.0
+        self.limited, self.surfaces = False, []
         with _asked(self.control, 0.0):
             self._law.reset()
 
@@ -121,6 +125,8 @@ class Controller:
         measurement = Measurement(value, rate, target, (target - before) / control.period, control.period, self.limited)
         with _asked(control, time):
             given = self._law.act(measurement, time)
+            if hasattr(self._law, "surface"):
+                self.surfaces += np.abs(self._law.surface(measurement)).tolist()
         return Command(time, control.sets, self._limited(given, row, time))
 
     def _target(self, time, values):
@@ -149,12 +155,16 @@ class Controller:
         self.limited = control.limit is not None and norm > control.limit
         if self.limited:
             value, norm = value * (control.limit / norm), control.limit
-        end = self._times[min(row + self._stride, len(self._times) - 1)]
-        self.spent, self.largest = self.spent + norm * float(end - time), max(self.largest, norm)
+        self._spent, self._size, self._since = self.spent(time), norm, time
+        self.largest = max(self.largest, norm)
         if self._vector and size == 1:
             direction = np.array(control.direction)
             value = value[0] * direction / np.linalg.norm(direction)
         return value.tolist() if self._vector else float(value[0])
+
+    def spent(self, time: float) -> float:
+        """Integral of the size of what is set until a time."""
+        return self._spent + self._size * (time - self._since)
 
     def arrays(self) -> dict[str, Any]:
         """State for a checkpoint; `InputError` for a law that does not give its own."""
@@ -162,7 +172,7 @@ class Controller:
             return {}
         measured = [[value.tolist(), None if rate is None else rate.tolist()] for value, rate in self._measured]
         before = None if self._target_before is None else self._target_before.tolist()
-        state = [self.spent, self.largest, self.limited]
+        state = [self._spent, self._size, self._since, self.largest, self.limited, self.surfaces]
         return {"law": list(self._law.save()), "measured": measured, "target": before, "state": state}
 
     def restore(self, arrays: dict[str, Any]) -> None:
@@ -176,15 +186,15 @@ class Controller:
             (np.array(value), None if rate is None else np.array(rate)) for value, rate in arrays["measured"]
         ]
         self._target_before = None if arrays["target"] is None else np.array(arrays["target"])
-        self.spent, self.largest, self.limited = arrays["state"]
+        self._spent, self._size, self._since, self.largest, self.limited, self.surfaces = arrays["state"]
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self, time: float) -> dict[str, Any]:
         """Largest value and integral of its size, for ``run.json``."""
         unit = UNITS.get(self.control.sets.partition(".")[0])
         return {
             "name": self.control.name,
             "sets": self.control.sets,
-            "spent": self.spent if unit else None,
+            "spent": self.spent(time) if unit else None,
             "error": None,
             "unit": unit,
             "largest": self.largest,
@@ -198,6 +208,8 @@ def controllers_of(scene: Scene, names: Sequence[str], times: NDArray[np.float64
         with refused_at(f"[[control]] {number + 1}"):
             if control.name in [earlier.control.name for earlier in made]:
                 raise InputError(f"name = {quote(control.name)} is already used")
+            for earlier in (earlier for earlier in made if earlier.control.sets == control.sets):
+                raise InputError(f"sets = {quote(control.sets)} is set by {quote(earlier.control.name)} already")
             made.append(Controller(control, number, scene, names, times))
     return made
 
@@ -216,6 +228,7 @@ def check(scene: Scene, system: System) -> None:
         vector = control.sets.partition(".")[0] in VECTORS
         with refused_at(f"[[control]] {number + 1}"):
             inputs.checked(Command(0.0, control.sets, [0.0] * 3 if vector else 0.0))
+            inputs.refuse_factor(control.sets)
 
 
 def _multiple(key, value, name, unit):

@@ -370,7 +370,9 @@ class Simulation:
             for event, time in zip(self.scene.event, course.events["time"][: len(self.scene.event)], strict=True)
         ]
         if self.schedule.commands is not None:
-            solution.controls = [controller.plain() for controller in self.schedule.commands.controllers]
+            controllers = self.schedule.commands.controllers
+            solution.controls = [controller.plain(course.time) for controller in controllers]
+            self.surfaces = [controller.surfaces for controller in controllers]
         spent = dict(nsteps=course.nsteps, **course.drifts, **self.integrator.spent(course))
         outer = (f for f in self.system.terms if not f.balance.internal and f.balance.impulse is None)
         if integrated := sorted({term.name for term in outer}):

@@ -158,6 +158,10 @@ class SteppedRun:
         """
         if isinstance(value, np.ndarray):
             value = value.tolist()
+        if not isinstance(path, str):
+            raise InputError(f"path = {path!r} must be a text, such as load.0.force")
+        if (commands := self._schedule.commands) is not None:
+            commands.refuse_controlled(path)
         command = Command(self.time, path, value)
         self._pending += self._inputs.checked(command)
         self.commands.append(command)

@@ -10,7 +10,7 @@ method, times `SPREAD`. The second run takes place beside the first or after it.
 from __future__ import annotations
 
 import threading
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,8 @@ PAUSE = 0.2
 MOST_CHANCE, TELLING = 10.0, 0.3
 """Largest factor on differences that are small by chance; least error of energy in a part of the time, over that of the
 largest part, at which this part counts for the factor."""
+SAME_SIDE = 1e-9
+"""Size of what decides a sign, over the largest one, below which rounding may decide."""
 ROUNDING = 1e-12
 """Error of energy that rounding may leave, over the largest energy of a run."""
 
@@ -49,8 +51,8 @@ class TwinRun(NamedTuple):
         See `refweb.dynamics.history.Watch.shares`.
     share_rows : ndarray, shape (rows, shares)
         See `refweb.dynamics.history.Watch.shares_of`.
-    spent : list of float
-        See `refweb.dynamics.controllers.Controller`.
+    controllers : list of refweb.dynamics.controllers.Controller
+        Controls at the end.
     """
 
     results: dict[str, Result]
@@ -58,7 +60,7 @@ class TwinRun(NamedTuple):
     rows: np.ndarray
     shares: dict[str, Result]
     share_rows: np.ndarray
-    spent: list[float]
+    controllers: list[Any]
 
 
 class Twin:
@@ -144,8 +146,8 @@ class Twin:
         watch, course = self._simulation.watch, self._course
         results, shares = watch.results(course, self._last), watch.shares(course)
         commands = self._simulation.schedule.commands
-        spent = [] if commands is None else [controller.spent for controller in commands.controllers]
-        return TwinRun(results, course, self._rows, shares, self._share_rows, spent)
+        controllers = [] if commands is None else commands.controllers
+        return TwinRun(results, course, self._rows, shares, self._share_rows, controllers)
 
 
 def _parts(times, end):
@@ -285,9 +287,8 @@ def add_errors(simulation, run, twin, rows):
             entry["error"] = SPREAD * factor * off + float(width) + 4e-16 * entry["time"]
     if first_run.stopped and len(rows) > 1:
         _add_lateness(solution.reduced, solution.events, rows[-2:])
-    for entry, spent in zip(solution.controls, twin.spent, strict=True):
-        if entry["spent"] is not None:
-            entry["error"] = SPREAD * factor * abs(entry["spent"] - spent) + 4e-16 * entry["spent"]
+    if solution.controls:
+        _add_errors_of_controls(simulation, twin, SPREAD * factor)
     known = np.inf
     if solution.breaks is not None:
         from .break_errors import add_errors_of_breaks
@@ -296,6 +297,27 @@ def add_errors(simulation, run, twin, rows):
     if run.shares and len(simulation.share_rows) == len(rows):
         _add_errors_of_shares(simulation, run, twin, rows, factor, known)
     return known
+
+
+def _add_errors_of_controls(simulation, twin, factor):
+    """Add ± to what controls have spent; find switches of a control that errors may have changed."""
+    solution = simulation.solution
+    late = max((event["error"] or 0.0 for event in solution.events if event["time"] is not None), default=0.0)
+    for entry, controller, surfaces in zip(solution.controls, twin.controllers, simulation.surfaces, strict=True):
+        if entry["spent"] is not None:
+            apart = abs(entry["spent"] - controller.spent(twin.course.time))
+            entry["error"] = factor * apart + entry["largest"] * late + 4e-16 * entry["spent"]
+        count = min(len(surfaces), len(controller.surfaces))
+        if count:
+            first, second = np.array(surfaces[:count]), np.array(controller.surfaces[:count])
+            near = first <= factor * np.maximum.accumulate(np.abs(first - second)) + SAME_SIDE * first.max()
+            if near.any():
+                text = (
+                    f"[[control]] {entry['name']}: {near.sum()} of {count} times what decides its sign is within ±, so "
+                    "that another error switches otherwise: results behind the first of these are those of one motion "
+                    "of several"
+                )
+                solution.findings.append(Finding("switch-in-doubt", text, "control"))
 
 
 def _add_errors_of_shares(simulation, run, twin, rows, factor, known):

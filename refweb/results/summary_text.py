@@ -129,6 +129,9 @@ def on_run(summary):
     for n, event in enumerate(summary.get("events") or []):
         when = "did not happen" if event["time"] is None else f"at t = {readable(event['time'], event['error'], 's')}"
         yield "events" * (n == 0), f"{event['name']} {when}"
+    if commands := summary.get("commands"):
+        paths = ", ".join(dict.fromkeys(path for _, path, _ in commands))
+        yield "commands", f"{len(commands)} from outside of the scene, on {paths}"
     for n, control in enumerate(summary.get("controls", [])):
         text = f"{control['name']} sets {control['sets']} up to {control['largest']:.4g}"
         if control["spent"] is not None:

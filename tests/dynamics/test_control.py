@@ -302,7 +302,47 @@ def test_it_acts_in_runs_that_are_stepped():
     np.testing.assert_array_equal(run.finish().history["x"], run.history["x"])
 
 
+def test_what_is_spent_ends_with_the_run():
+    """An event within a period ends the integral as well; ± has the error of its time."""
+    event = [{"name": "there", "kind": "threshold", "observe": "x", "value": 0.2, "stop": True}]
+    run = refweb.run(scene(event=event, solve={"kind": "dynamic", "duration": 1.0, "method": "ida", "rtol": 1e-7}))
+    _, _, forces = held(lambda x, v, n: 40.0 * (0.3 - x) - 6.0 * v, 20)
+    end, sizes = run.events[0]["time"], np.abs(forces)
+    whole = int(end / 0.05)
+    assert whole < 19 and abs(end - 0.05 * whole) > 1e-3
+    exact = 0.05 * sizes[:whole].sum() + (end - 0.05 * whole) * sizes[whole]
+    assert abs(run.controls[0]["spent"] - exact) <= run.controls[0]["error"] + 1e-6 < 1e-2
+
+
+def test_a_switch_within_its_error_is_told():
+    """At rest at its target the number whose sign decides is zero."""
+    law = {"law": "bang-bang", "parameters": {"strength": 1.0, "mass": MASS}}
+    doubt, sure = (refweb.run(scene({"target": target}, law=law, duration=0.2)) for target in (0.0, 5.0))
+    assert "switch-in-doubt" in [finding.code for finding in doubt.findings]
+    assert "switch-in-doubt" not in [finding.code for finding in sure.findings]
+
+
+def test_one_value_is_set_by_one():
+    """Two controls, commands, and a factor of the load are refused beside a control of it."""
+    two = scene().to_dict()
+    two["control"] = [two["control"][0], {**two["control"][0], "name": "second"}]
+    with pytest.raises(InputError, match='sets = "load.0.force" is set by "hover" already'):
+        refweb.Scene.from_dict(two).build()
+    with pytest.raises(InputError, match=r'load.0.force is set by \[\[control\]\] "hover"'):
+        refweb.run(scene(), commands=[(0.1, "load.0.force", [0, 0, 1])])
+    with pytest.raises(InputError, match=r'load.0.force is set by \[\[control\]\] "hover"'):
+        refweb.start(scene()).set("load.0.force", [0, 0, 1])
+    with pytest.raises(InputError, match="its factor would multiply what is set"):
+        scene(load=[{"node": 1, "force": [0, 0, 0], "factor": [[0, 1], [1, 2]]}]).build()
+    for wrong in ((1,), "abc", ("soon", "load.0.force", 1.0)):
+        with pytest.raises(InputError, match=r"must be \(time, path, value\)"):
+            refweb.run(scene(control=[]).replace(control=()), commands=[wrong])
+
+
 WRONG = [
+    ({"law": "bang-bang", "parameters": {"strength": 0.0, "mass": 1.0}}, "strength = 0 must be > 0"),
+    ({"law": "sliding-mode", "parameters": {"strength": 1.0, "slope": 1.0, "width": 0.0}}, "width = 0 must be > 0"),
+    ({"law": "spin-up", "parameters": {"strength": 1.0}, "target": 0.0}, "target = 0 must not be zero"),
     ({"law": "pdi"}, 'did you mean "pid"'),
     ({"parameters": {"proportionel": 1.0}}, 'did you mean "proportional"'),
     ({"law": "bang-bang", "parameters": {}}, "parameters.strength is missing"),
