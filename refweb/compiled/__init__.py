@@ -8,6 +8,8 @@
 `second_process`     a copy of the process that compiles from the other end of a list
 `numba_internals`    all uses of private parts of numba, with reasons and the ways without them
 ===================  ==========================================================================================
+
+A change of any file here, even of a comment, compiles all kernels of all users again.
 """
 
 from __future__ import annotations

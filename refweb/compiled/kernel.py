@@ -5,6 +5,9 @@ in loops over elements. A kernel with ``apart`` is called by its address: its ca
 annotations, and are not compiled again when the kernel changes. ``apart`` lists the features of a run that may call it;
 a run without them neither compiles nor loads it, see `prepare`. A call from Python goes through an entry, which is
 compiled at the first call.
+
+`COMMON` decides the bits of all results, `keys` and numba call `machine_code_key` and `_numba_type_`, and a kernel with
+a name in ``apart`` that `dynamics.integrators.features` never gives is not prepared.
 """
 
 from __future__ import annotations

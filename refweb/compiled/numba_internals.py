@@ -18,6 +18,8 @@ of one's own                                                                   n
 
 ``REFWEB_PLAIN=1`` uses the right column. Tables of kernels need addresses of functions and the calling convention of
 numba in both. numba is bounded above in ``pyproject.toml``.
+
+A new use of a private part of numba gets a row of the table and, if there is one, a way without it.
 """
 
 from __future__ import annotations

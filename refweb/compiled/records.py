@@ -13,6 +13,9 @@ a record               another record
 `Arrays`               a table of arrays of one type, of which kernels may put others in place
 `Functions`            a table of kernels of one signature, called by their addresses
 =====================  =======================================================================================
+
+Fields may be added and moved freely: the name of the type has a digest of them, so that kernels which read them compile
+again. Names of records are unique in refweb.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 All terms of the compiled loop take matrices, so that one loop serves every combination of them. A dtype names the
 columns of a matrix; its fields are numbers or arrays of one type. A row may have more columns before and after those of
 a record.
+
+Fields are eight bytes wide, since columns count numbers; `record_at` reads memory without a check of its bounds.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ LLVM and the front end of numba hold locks, so that two threads compile no faste
 all kernels of the list, needs no imports, and writes machine code to the folder of `refweb.compiled.store`, from which
 the first process reads it. File locks prevent that both compile the same kernel. A copy is made only on Linux, on which
 copying a process with threads is safe while no thread compiles.
+
+The copy leaves by `os._exit`, so that it runs no handler of the first process; `LEAST` is free.
 """
 
 from __future__ import annotations

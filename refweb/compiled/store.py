@@ -3,6 +3,8 @@
 Files are searched in a folder of the user, see `folder`, then in the folder ``machine_code`` of this package, which a
 wheel may contain. A file is written under another name and then renamed, so that several processes may share a folder.
 Files unused for `UNUSED` are removed during compilation.
+
+The format of files is free: a change here gives all of them other names. ``pyproject.toml`` packs `SHIPPED`.
 """
 
 from __future__ import annotations

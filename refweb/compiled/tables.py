@@ -3,6 +3,8 @@
 A table has two words, the number of its items and their address. An item of a table of kernels is the address of a
 kernel. An item of a table of arrays has the address of a reference counter, 0 for an array of Python, the address of
 the array, and its sizes.
+
+Words that Python writes and the code that reads them change together; ``_items`` stays, since kernels have its address.
 """
 
 from __future__ import annotations
