@@ -14,8 +14,9 @@ a record               another record
 `Functions`            a table of kernels of one signature, called by their addresses
 =====================  =======================================================================================
 
-Fields may be added and moved freely: the name of the type has a digest of them, so that kernels which read them compile
-again. Names of records are unique in refweb.
+Kernels follow fields that are added and moved: the name of the type has a digest of them, so that these compile again.
+Callers that fill a record by position, and fields that go into checkpoints by name, do not. Names of records are unique
+in refweb.
 """
 
 from __future__ import annotations
