@@ -174,7 +174,8 @@ class Solution(SolutionData):
             Any number of the scene by its path, such as ``cable.area`` or ``load.0.force.2``. By line or group
             ``cable.modulus``, ``cable.area``, ``cable.density``, ``cable.prestrain`` or ``natural_length`` of each: the
             others, natural lengths among them, stay as they are. ``force``: the forces on each node; ``position``: the
-            positions of each support, with the natural lengths as they are.
+            positions of each support, which moves as by ``[[motion]]``, so that natural lengths stay as they are and
+            displacements count from the web as built. The path ``web.points.0.2`` moves a point as built.
         by : {"line", "group", "node"}, optional
             Entries of the gradient; by default one number of the scene, or nodes.
 

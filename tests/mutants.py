@@ -379,6 +379,8 @@ MUTANTS = [
     ),
     Mutant("statics/gradients", "near & felt & kinked", "near & kinked"),
     Mutant("statics/monotone_loading", "(slope / (ea + slope)).T", "(slope / ea).T"),
+    Mutant("statics/gradients", "rows - reacting + loaded", "rows - reacting + 0.0 * loaded"),
+    Mutant("statics/responses", "|= system.fixed[", "|= False & system.fixed["),
     Mutant("net/laws/curve", "np.ones(len(begin)), 0.5 * begin**2", "np.ones(len(begin)), begin**2"),
     Mutant("net/laws/curve", "if curve.first > 0.0:", "if curve.first < 0.0:"),
     Mutant("net/law_keys", 'if curves[line].unit == "N" else 1.0', 'if curves[line].unit == "Pa" else 1.0'),

@@ -366,7 +366,7 @@ def print_gradients(solution, result, gradients, refused, limit):
     rows += [("no effect", ", ".join(idle))] if idle else []
     for gradient in (gradient for gradient in gradients if gradient.by):
         rows.append((gradient.path, _entries(gradient, limit)))
-        if (more := len(gradient.names) - limit) > 0:
+        if (more := gradient.value.size - limit) > 0:
             rows.append(("", f"{more} more with smaller ones: --json prints all"))
     rows += [("left out", text) for text in refused]
     _box(
@@ -387,13 +387,15 @@ def _of_numbers(gradients, unit):
 
 
 def _entries(gradient, limit):
-    """The largest entries of a gradient by line or group."""
-    falls = [] if gradient.left is None else ["where it falls"]
+    """The largest entries of a gradient by line or group, or of the components of vectors of nodes."""
+    names, falls = [str(name) for name in gradient.names], [] if gradient.left is None else ["where it falls"]
+    if gradient.value.ndim > 1:
+        names = [f"{name} {axis}" for name in names for axis in "xyz"]
     grid = _headed([gradient.by, f"gradient [{gradient.unit}]", "±", *falls])
-    sides = [gradient.value, *([] if gradient.left is None else [gradient.left])]
-    for at in sorted(range(len(gradient.names)), key=lambda at: -max(abs(side[at]) for side in sides))[:limit]:
-        cells = [str(gradient.names[at]), f"{gradient.value[at]:.6g}", f"{gradient.error[at]:.1e}"]
-        grid.add_row(*map(Text, cells if gradient.left is None else [*cells, f"{gradient.left[at]:.6g}"]))
+    error, *sides = (v.ravel() for v in (gradient.error, gradient.value, gradient.left) if v is not None)
+    for at in sorted(range(len(names)), key=lambda at: -max(abs(side[at]) for side in sides))[:limit]:
+        value, *left = (f"{side[at]:.6g}" for side in sides)
+        grid.add_row(*map(Text, [names[at], value, f"{error[at]:.1e}", *left]))
     return grid
 
 

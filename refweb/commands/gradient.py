@@ -12,7 +12,8 @@ def add_arguments(parser):
     add_scene(parser)
     add_values(parser)
     parser.add_argument("--of", metavar="RESULT", help="name of a result (default: the first of the scene)")
-    text = "a number of the scene, as cable.area or load.0.force.2; repeatable (default: all, by line cable.area)"
+    text = "a number of the scene, as cable.area or load.0.force.2, or force or position, of each node; repeatable "
+    text += "(default: all, by line cable.area)"
     parser.add_argument("--path", dest="paths", action="append", metavar="PATH", help=text)
     text = "by each line or group, of cable.modulus, cable.area, cable.density, cable.prestrain or natural_length"
     parser.add_argument("--by", choices=["line", "group"], help=text)

@@ -135,10 +135,7 @@ class Gradients:
             return system
         from .monotone_loading import of_curves
 
-        curved = of_curves(system)
-        for known in ("pattern", "unsupported_parts"):
-            curved.__dict__.pop(known, None)
-        return curved
+        return of_curves(system)
 
     @cached_property
     def linear(self):
@@ -169,6 +166,11 @@ class Gradients:
             observe = self._observed[result]
             if self._yielded and observe.quantity in ("strain_energy", "plastic_energy"):
                 raise InputError(f'gradient of "{result}": of lines that yield observe the total_energy')
+            if self._yielded and observe.quantity == "total_energy" and self.state.system.net.factors:
+                raise InputError(
+                    f'gradient of "{result}": where lines yield beside [[reel]] or [temperature], the energy depends '
+                    "on the path: take tensions or displacements, or solve the scene again with other numbers"
+                )
             try:
                 self._results[result] = [self._solved(item) for item in responses(observe, self.linear)]
             except InputError as error:
@@ -340,11 +342,15 @@ class Gradients:
             none = np.zeros_like(rows)
             reacting, slope = (none, none) if response is None else (response.reacting, response.slope)
             if path == "force":
-                return (rows - reacting)[: linear.net.nodes]
+                loaded = none if response is None or response.loaded is None else response.loaded
+                return (rows - reacting + loaded)[: linear.net.nodes]
             at = np.where(linear.system.supported, slope - linear.pulled(rows), 0.0)
             return at[: linear.net.nodes]
 
-        return _with_error([(values(*item[:3]), item[3]) for item in solved])
+        value, error = _with_error([(values(*item[:3]), item[3]) for item in solved])
+        if path == "position" and solved[0][1].doubt is not None:
+            error = error + np.where(self.linear.system.supported, np.abs(solved[0][1].doubt), 0.0)[: len(error)]
+        return value, error
 
     # By one number of the scene
 
@@ -393,12 +399,21 @@ class Gradients:
         summed = np.array([np.linalg.norm(items[0][2]) * tension for items in solved]) + np.abs(by_step[1][:, 0])
         return value, np.abs(value - narrow)[:, 0] + 4.0 * np.finfo(float).eps * summed / step
 
+    def _step_of(self, scene, system):
+        """The last load step of a scene whose load steps change."""
+        corners = system.corners
+        if (np.abs(corners - self.state.time) <= LARGEST_STEP * abs(self.state.time)).any():
+            raise InputError(f"a table of a load or motion has a corner near t = {self.state.time:g}")
+        return scene.solve.load_steps[-1]
+
     def _lagrangians(self, solved, path, value):
         """J + λ·f at the displacements of the equilibrium and beside it, for another number, (responses, states)."""
         from ..scene import Scene
 
         scene = Scene.from_dict(with_value(self._given, path, float(value)), self.scene.folder)
         system, t = self._at_once(at_rest(scene.build())), self.state.time
+        if path.startswith("solve.load_steps."):
+            t = self._step_of(scene, system)
         if system.rows != self.state.system.rows or not np.array_equal(system.free, self.state.system.free):
             raise InputError("it changes the net itself, and has no gradient")
         forces, states, free = {}, {}, system.free

@@ -5,7 +5,8 @@ then along the slope of hardening over the elastic and the plastic strain togeth
 equilibrium is that of lines with a curve, whatever the path has been, and `refweb.statics.duality_bound` proves it. It
 has no bound where a line yields without hardening, since its tension then tells nothing of its strain.
 
-`load_steps` and `dynamic_relaxation` add its bounds, and `gradients` differentiates its system.
+`load_steps` and `dynamic_relaxation` add its bounds, and `gradients` differentiates its system. `of_curves` drops
+cached properties of `System` by name, all that follow from terms or numbers of lines.
 """
 
 from __future__ import annotations
@@ -22,6 +23,10 @@ from ..net.laws.curve import WIDTH, Table
 from .duality_bound import duality_bound
 from .floating import between_slack_lines
 
+KEPT_BY_LINES = (
+    "pattern", "carriers", "mass", "unsupported_parts", "lengths", "material_flow", "links", "contact_forces"
+)  # fmt: skip
+"""Cached properties of a system that follow from its terms or from the numbers of its lines."""
 CLOSE = 1e-8
 """Plastic strain over the strain at yield by which a line counts as not let go: equilibria differ by rounding."""
 
@@ -65,9 +70,12 @@ def of_curves(system):
         net = replace(net, line_data=net.line_data.copy()) if known else net.with_column(name, 0.0)
         net.line_data[name][:] = np.where(yields, values, net.line_data[name])
     laws = tuple(Table if law.plastic else law for law in net.laws)
-    changed.net = net = replace(net, laws=laws, kept=(*net.kept, pieces))
+    changed.net = net = replace(net, laws=laws, kept=(*net.kept, pieces), length_force=None)
     rest = [term for term in system.terms if term.name != "plastic" and term is not system.lines]
     changed.terms = [Elasticity().on(net), *rest]
+    for known in KEPT_BY_LINES:
+        changed.__dict__.pop(known, None)
+    changed.arrange()
     return changed
 
 

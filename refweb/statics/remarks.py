@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..findings import NOTE, Finding
+from ..results.observables.balances import lost_by_path
 from ..results.state import curve_remark, floor_remark, strain_remark
 from ..results.strength import strength_remark
 
@@ -179,6 +180,8 @@ def _not_proven(state, equilibrium):
             yield Finding("monotone-loading", text, severity=NOTE)
             return
         why = "as the proven bound asks for dead loads, constant natural lengths, and lines that do not turn back and"
+        if lost_by_path(state):
+            unseen += ", as well for plastic_energy and total_energy, which have no ±: they depend on the load steps"
         yield Finding("not-proven", f"{start} are estimates, {why} harden where they yield; {unseen}")
         return
     if not state.system.dead or proven.all() or not (proven.any() or net.forming.any()):

@@ -50,6 +50,8 @@ class Response(NamedTuple):
         Displacement of supports whose virtual work, reversed, the result is; 0 for results that are no reaction.
     doubt : ndarray, shape (rows, 3), optional
         Possible error of the slope, where it is one of differences.
+    loaded : ndarray, shape (rows, 3), optional
+        ∂J/∂f by a further load on each row, where it is not 0: of work, the displacement.
     """
 
     again: Any
@@ -58,6 +60,7 @@ class Response(NamedTuple):
     explicit: Sensitivity
     reacting: np.ndarray
     doubt: np.ndarray | None = None
+    loaded: np.ndarray | None = None
 
 
 def responses(observe, linear):
@@ -231,7 +234,8 @@ def _energy(name, linear):
     def value(state):
         return float(state.energies[name])
 
-    return Response(partial(_energy, name), value, slope, explicit, reacting)
+    loaded = linear.x if name == "work" else None
+    return Response(partial(_energy, name), value, slope, explicit, reacting, loaded=loaded)
 
 
 def _share(name, column):
@@ -242,23 +246,24 @@ def _share(name, column):
 
 
 def _by_differences(observable, linear):
-    """The response of what follows from places and turns of some rows, by differences of order 4 by their unknowns."""
+    """The response of what follows from places and turns of some rows, by differences of order 4."""
     system, (explicit, reacting) = linear.system, _nothing(linear)
     rows, size = _rows_and_size(observable, linear)
     spins = [body.spin for body in system.net.bodies if body.spin is not None]
     bodies = [row for body in system.resting for row in (body.row, body.spin) if row is not None]
-    places = system.free // 3
-    slope, doubt = np.zeros_like(reacting), np.zeros_like(reacting)
-    for k in np.flatnonzero(np.isin(places, [*rows, *bodies])):
-        step = STEP * (1.0 if places[k] in spins else size)
-        values = []
+    slope, doubt, moves = np.zeros_like(reacting), np.zeros_like(reacting), ~system.supported
+    moves[: system.net.nodes] |= system.fixed[: system.net.nodes]  # supports, for derivatives by their positions
+    for row, axis in np.argwhere(moves):
+        if row not in (*rows, *bodies):
+            continue
+        step, values = STEP * (1.0 if row in spins else size), []
         for steps in (-2.0, -1.0, 1.0, 2.0):
-            p = np.zeros(len(system.free))
-            p[k] = steps * step
-            values.append(observable.of(State(system, linear.t, system.moved(linear.x, system.rows_of(p)))).value)
+            move = np.zeros_like(slope)
+            move[row, axis] = steps * step
+            values.append(observable.of(State(system, linear.t, system.moved(linear.x, move))).value)
         near = (values[2] - values[1]) / (2.0 * step)
-        slope.ravel()[system.free[k]] = best = (8.0 * near - (values[3] - values[0]) / (2.0 * step)) / 6.0
-        doubt.ravel()[system.free[k]] = best - near
+        slope[row, axis] = best = (8.0 * near - (values[3] - values[0]) / (2.0 * step)) / 6.0
+        doubt[row, axis] = best - near
 
     def value(state):
         return observable.of(state).value

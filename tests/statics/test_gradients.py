@@ -100,6 +100,76 @@ def test_taylor_of_lines_that_yield():
     assert abs(by_group.value[by_group.names.index("tie")] - float(tie)) <= by_group.error.sum() + 3.0 * tie.error[0]
 
 
+def two_that_yield(*effects, observe=(), **keys):
+    """Two lines from supports to a loaded node between, both far beyond their yield stress."""
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0.1, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2])
+    cable = refweb.Cable(
+        law="elastic-plastic", modulus=7e7, area=1e-4, density=200.0, yield_stress=3e5, hardening=7e6, **keys
+    )
+    return refweb.Scene(
+        web=web, cable=cable, effects=[refweb.Load(node=1, force=(1.0, 30.0, 20.0)), *effects],
+        observe=[refweb.Observe(name="T", quantity="tension", line=0), *observe], solve=refweb.Static(),
+        accuracy=refweb.Accuracy(error="none"),
+    )  # fmt: skip
+
+
+YIELD_BESIDE = {
+    "temperature": ([refweb.Temperature(expansion=1e-5, change=-300.0)], "temperature.change"),
+    "reel": ([refweb.Reel(lines=0, factor=[(0.0, 1.0), (1.0, 0.99)])], "reel.0.factor.1.1"),
+    "contact": (
+        [
+            refweb.Body(name="b", shape="sphere", radius=0.2, fixed=True, position=(0.5, 0.2, 0.25)),
+            refweb.Contact(stiffness=1e5),
+        ],
+        "body.0.radius",
+    ),
+    "attach": (
+        [
+            refweb.Body(name="b", shape="sphere", radius=0.1, mass=1.0, position=(1.0, 0.1, -0.1)),
+            refweb.Attach(body="b", node=1),
+            refweb.Gravity(acceleration=(0.0, 0.0, -1.0)),
+        ],
+        "body.0.mass",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", YIELD_BESIDE)
+def test_lines_that_yield_beside_other_effects(name):
+    """Natural lengths that change, contact and bodies that carry nodes, with the curve in place of yield."""
+    effects, path = YIELD_BESIDE[name]
+    for one in (path, "cable.yield_stress"):
+        check_slopes(remainders(two_that_yield(*effects), one, ["T"], (0.004, 0.002)))
+
+
+def test_total_energy_of_lines_that_yield_by_their_lengths():
+    """One line under a dead load F: L (F²/2EA + ∫ Y dp), Y = 30 N + 700 N p up to F; and by runs of two lines."""
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0])
+    cable = refweb.Cable(law="elastic-plastic", modulus=7e7, area=1e-4, density=0.0, yield_stress=3e5, hardening=7e6)
+    observe = [refweb.Observe(name="total", quantity="total_energy")]
+    load = refweb.Load(node=1, force=(50.0, 0.0, 0.0))
+    one = refweb.run(refweb.Scene(web=web, cable=cable, effects=[load], observe=observe, solve=refweb.Static()))
+    exact = 0.5 * 50.0**2 / 7e3 + 0.5 * (30.0 + 50.0) * 20.0 / 700.0
+    assert one.results["total"].value == pytest.approx(exact, rel=1e-9)
+    np.testing.assert_allclose(one.gradient("total", "natural_length", "line").value, [exact], rtol=1e-9)
+    np.testing.assert_allclose(one.gradient("total", "cable.prestrain").value, [-exact], rtol=1e-9)
+    check_slopes(remainders(two_that_yield(observe=observe, prestrain=0.01), "cable.prestrain", ["total"]))
+    wound = refweb.run(two_that_yield(*YIELD_BESIDE["reel"][0], observe=observe))
+    with pytest.raises(InputError, match="beside .*reel.* the energy depends on the path"):
+        wound.gradient("total", "cable.area")
+
+
+def test_load_steps():
+    """By the last load step loads grow with it, F·dT/dF; where a table has a corner there, it has no derivative."""
+    solution = refweb.run(net())
+    for name in ("tension", "moved"):
+        by_force = solution.gradient(name, "force").value
+        found = solution.gradient(name, "solve.load_steps.0")
+        np.testing.assert_allclose(found.value, (by_force[[4, 5]] @ LOAD.force).sum(), rtol=1e-8)
+    with pytest.raises(InputError, match="a table of a load or motion has a corner near t = 1"):
+        refweb.run(net(effects=(LOAD, *EFFECTS["reel"][0]))).gradient("tension", "solve.load_steps.0")
+
+
 EFFECTS = {
     "frame": ([refweb.Frame(angular_velocity=(0.0, 0.2, 1.5))], "frame.angular_velocity.2"),
     "orbit": ([refweb.Orbit(mean_motion=2.0)], "orbit.mean_motion"),
@@ -317,6 +387,24 @@ def test_forces_on_nodes_and_positions_of_supports():
     assert not solution.gradient("moved", "position").value[4:].any()
 
 
+@pytest.mark.parametrize("quantity", ["distance", "mouth_perimeter", "mouth_area", "work"])
+def test_what_forces_and_supports_change_beside_the_equilibrium(quantity):
+    """Mouths and distances from a support that moves, and the work of one more load, by runs."""
+    nodes = {"distance": [1, 5], "work": None}.get(quantity, [0, 1, 6])
+    observe = [refweb.Observe(name="r", quantity=quantity, **({} if nodes is None else {"node": nodes}))]
+    step, direction, ends = 1e-4, np.array([0.3, -0.2, 0.9]), []
+    solution = refweb.run(net().replace(observe=observe))
+    for sign in (-1.0, 1.0):
+        move = sign * step * direction
+        more = refweb.Load(node=6, force=tuple(move))
+        if quantity != "work":
+            more = refweb.Motion(node=1, displacement=[(0, 0, 0, 0), (1, *move)])
+        ends.append(refweb.run(net(effects=(LOAD, more)).replace(observe=observe)).results["r"].value)
+    path, node = ("force", 6) if quantity == "work" else ("position", 1)
+    found = solution.gradient("r", path).value[node] @ direction
+    np.testing.assert_allclose(found, (ends[1] - ends[0]) / (2.0 * step), rtol=1e-6)
+
+
 @pytest.mark.parametrize("path", [*BY_LINE])
 def test_lines_together_are_the_number_of_all(path):
     """The sum over lines is the derivative by the number of the cable, by systems that are built with others."""
@@ -454,6 +542,8 @@ def test_command(tmp_path, capsys):
     assert main(["gradient", str(path), "--of", "tension"]) in (0, None)
     out = capsys.readouterr().out
     assert "cable.groups.tie.area" in out and "load.0.force.2" in out and "no effect" in out
+    assert main(["gradient", str(path), "--of", "tension", "--path", "force"]) in (0, None)
+    assert " 4 z " in capsys.readouterr().out
     assert main(["gradient", "hexagon-impact"]) == 2
     assert '[solve] kind = "dynamic" must be "static"' in capsys.readouterr().err
     picture = tmp_path / "web.png"

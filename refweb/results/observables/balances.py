@@ -32,6 +32,11 @@ def weights(system: System, column: str) -> NDArray[np.float64]:
     return np.array(weights_found, dtype=float)
 
 
+def lost_by_path(state: State) -> bool:
+    """Tell if lines have yielded beside natural lengths that change, so that load steps count for what they lose."""
+    return bool(state.system.net.factors and state.plastic_strain is not None and state.plastic_strain.any())
+
+
 class Booked(Observable):
     """A column of the energy balance, with the name of the quantity.
 
@@ -140,9 +145,16 @@ class RuptureEnergy(Booked):
 
 
 class PlasticEnergy(StrainEnergy):
-    """Energy lost in lines that have yielded: a proven error is that of what they have taken up, kept or lost."""
+    """Energy lost in lines that have yielded: a proven error is that of what they have taken up, kept or lost.
+
+    Where natural lengths change beside it, it depends on the load steps, and ± is not known.
+    """
 
     needs = 'law = "elastic-plastic"'
+
+    def error(self, state: State, equilibrium: Equilibrium) -> float | None:
+        """That of the strain energy; None where it depends on the load steps."""
+        return None if lost_by_path(state) else super().error(state, equilibrium)
 
 
 class WinchEnergy(Booked):
@@ -165,6 +177,10 @@ class DissipatedEnergy(Booked):
 class TotalEnergy(Booked):
     """Sum of stored energies, in dynamics with the kinetic energy."""
 
+    def error(self, state: State, equilibrium: Equilibrium) -> float | None:
+        """The estimate; None where it depends on the load steps."""
+        return None if lost_by_path(state) else super().error(state, equilibrium)
+
 
 class Work(Booked):
     """Work of loads, motions, reels and other devices."""
@@ -178,7 +194,7 @@ class Work(Booked):
             super().on(system)
         loads = [f for f in system.terms if f.balance.column == "work"]
         if system.net.quasi_static and (moved or any(f.energy is None for f in loads)):
-            tables = "[[motion]], [[pressure]], [[thrust]] and [[reel]]"
+            tables = "[[motion]], [[pressure]], [[thrust]], [[reel]] and [temperature]"
             raise InputError(f'quantity = "work" is not known in statics with {tables}: it depends on the path')
 
 
