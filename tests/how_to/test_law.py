@@ -1,6 +1,7 @@
 """The page "How to write a law", followed word by word in a package that is installed for it."""
 
 import importlib
+import math
 import tomllib
 
 import nets
@@ -182,6 +183,55 @@ def _twice(strain, line):
 
 
 @kernel()
+def _far(strain, line):
+    return line.ea * (0.3 if 0.0301 < strain < 0.09 else 1.0) if strain >= 0.0 else 0.0
+
+
+@kernel()
+def _hole(strain, line):
+    return math.nan if 0.04 < strain < 0.09 else line.ea * max(strain, 0.0)
+
+
+@kernel()
+def _text(strain, line):
+    return "much"
+
+
+@kernel()
+def _tripled(strain, line):
+    return 3.0 * line.ea * max(strain, 0.0)
+
+
+@kernel()
+def _tripled_slope(strain, line):
+    return 3.0 * line.ea if strain >= 0.0 else 0.0
+
+
+@kernel()
+def _tripled_energy(strain, line):
+    return 1.5 * line.ea * max(strain, 0.0) ** 2
+
+
+@kernel()
+def _waves(strain, line):
+    return 0.25 * line.ea * (strain + 0.006 * math.sin(strain / 0.002)) if strain > 0.0 else 0.0
+
+
+@kernel()
+def _slope_of_waves(strain, line):
+    return 0.25 * line.ea * (1.0 + 3.0 * math.cos(strain / 0.002)) if strain >= 0.0 else 0.0
+
+
+@kernel()
+def _energy_of_waves(strain, line):
+    return 0.25 * line.ea * (0.5 * strain**2 + 1.2e-5 * (1.0 - math.cos(strain / 0.002))) if strain > 0.0 else 0.0
+
+
+TRIPLED = {"stress": _tripled, "tangent": _tripled_slope, "energy_density": _tripled_energy}
+WAVES = {"stress": _waves, "tangent": _slope_of_waves, "energy_density": _energy_of_waves}
+
+
+@kernel()
 def _falls(strain, line):
     return 0.9 * line.ea if strain >= 0.0 else 0.0
 
@@ -191,10 +241,18 @@ def _falls(strain, line):
     [
         ({"energy_density": _twice}, r"at a strain of 1e-05 energy_density rises by 0.14 N .* stress is 0.07 N"),
         ({"tangent": _falls}, r"at a strain of 1e-05 stress rises by 7000 N .* tangent is 6300 N"),
+        ({"tangent": _far}, r"at a strain of 0.0301\d* stress rises by 7000 N .* tangent is 2100 N"),
+        ({"stress": _hole}, r"at a strain of 0.04\d* stress is no finite number"),
+        ({"stress": _text}, r"stress cannot be compiled, it must return a number of \(strain, line\)"),
+        (TRIPLED, r"at a strain of 1e-05 tangent is 21000 N, must be at most EA = 7000 N: raise the modulus"),
+        (WAVES, r"at a strain of 0.0038\d* stress falls, by [\d.]+ N per strain, and convex = True"),
     ],
 )
 def test_a_law_that_contradicts_itself_is_refused(page, kernels, words, monkeypatch):
-    """Twice the energy, or nine tenths of the tangent; the message has the law, the strain and both numbers."""
+    """Twice the energy, nine tenths of the tangent, and so on; the message has the law, the strain and the numbers.
+
+    The waves fall where cos(ε/a) < −1/3, a = 0.002, from 1.9106 a on; a law that is not said to rise may have them.
+    """
     own = type("Wrong", (refweb.net.laws.straight.TensionOnly,), {"name": "wrong", "__module__": __name__, **kernels})
     monkeypatch.setitem(refweb.registry.LAWS, "wrong", own)
     web = {"points": [[0, 0, 0], [1, 0, 0]], "lines": [[0, 1]], "supports": [0]}
