@@ -2,6 +2,7 @@
 
 # This docstring is the help of the verb; `--markdown` writes `validation/REFERENCE.md`, which a test compares.
 
+import argparse
 import sys
 import textwrap
 
@@ -9,7 +10,7 @@ import textwrap
 def add_arguments(parser):
     """Declare the table, or term, and the format."""
     text = (
-        "such as gravity, web.cable, solve.dynamic; a term, or glossary for all; materials; a guide "
+        "such as gravity, web.cable, solve.dynamic; a term, or glossary for all; materials; a guide; a command "
         "(default: a line for each table)"
     )
     parser.add_argument("table", nargs="?", metavar="TABLE", help=text)
@@ -21,7 +22,7 @@ def run(arguments):
     from ..reference.glossary import explained
     from ..reference.pages import names
     from ..reference.words import as_markdown, as_text, guide, guides, overview
-    from ..registry import load_installed
+    from ..registry import COMMANDS, load, load_installed
 
     for message in load_installed():
         print(f"refweb: {message}", file=sys.stderr)
@@ -36,6 +37,13 @@ def run(arguments):
         print(f"{as_table()}\n\n{textwrap.fill(MATERIALS_TEXT.replace('`', ''), 100)}")
     elif arguments.table in guides():
         print(guide(arguments.table), end="")
+    elif arguments.table in COMMANDS and arguments.table not in names() and explained(arguments.table) is None:
+        verb = load(COMMANDS[arguments.table])
+        parser = argparse.ArgumentParser(
+            prog=f"refweb {arguments.table}", description=(verb.__doc__ or "").replace("``", "")
+        )
+        verb.add_arguments(parser)
+        parser.print_help()
     elif arguments.table in names() or (text := explained(arguments.table)) is None:
         print(as_text(arguments.table))
     else:
