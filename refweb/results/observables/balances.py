@@ -153,7 +153,7 @@ class PlasticEnergy(StrainEnergy):
     needs = 'law = "elastic-plastic"'
 
     def error(self, state: State, equilibrium: Equilibrium) -> float | None:
-        """That of the strain energy; None where it depends on the load steps."""
+        """± as of the strain energy; None where it depends on the load steps."""
         return None if lost_by_path(state) else super().error(state, equilibrium)
 
 
