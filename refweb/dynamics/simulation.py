@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects.base import pairs_of
-from ..errors import InputError, IntegrationError, SolverError
+from ..errors import EnergyDriftError, InputError, IntegrationError, SolverError
 from ..findings import NOTE, Finding
 from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
@@ -258,8 +258,12 @@ class Simulation:
                 if last in self.schedule.frames or course.stopped:
                     self._frame(last, folder, course)
                 report(course.time)
-        except SolverError:
+        except SolverError as error:
             self._refuse_overlap(course)  # whatever stopped it: what comes of a line within a body is nonsense
+            if isinstance(error, EnergyDriftError) and any(thread.wraps for thread in self.system.net.threads):
+                from ..effects.half_turns import half_turn_remark
+
+                error.args = (f"{error}{half_turn_remark(self.system.net, course.x)}",)
             raise
         finally:
             self._record(course)

@@ -412,7 +412,7 @@ def kernels(law, record, width, wraps):
     return force, energy, stiffness, bound
 
 
-def _segments(net: Net, thread: ThreadLine) -> tuple[Any, list[int], bool]:
+def segments_of(net: Net, thread: ThreadLine) -> tuple[Any, list[int], bool]:
     """(Records of its segments, bases of bodies, True if a body bears moments that keep its axis)."""
     rows, count = thread.rows, len(thread.distances)
     segments, bases, bears = np.zeros(count, dtype=SEGMENT), [], False
@@ -439,7 +439,7 @@ def term(net: Net, thread: ThreadLine) -> ForceTerm:
         refuse_free(net)
     line = thread.line
     numbers = line.line_data.matrix
-    segments, bases, bears = _segments(net, thread)
+    segments, bases, bears = segments_of(net, thread)
     force, energy, stiffness, bound = kernels(line.law, line.law_record, numbers.shape[1], len(bases))
     across = np.zeros((1, 3 * (len(thread.rows) + len(bases)), 3 * (len(thread.rows) + len(bases))))
     across[:, : 3 * len(thread.rows), : 3 * len(thread.rows)] = thread.across

@@ -29,6 +29,7 @@ from .equilibrium import (
     NotFound,
     check_supported,
     force_scale,
+    refuse_half_turns,
     residual,
     with_reason,
 )
@@ -109,9 +110,10 @@ def solve(system, load_steps, progress=None, limit=10_000_000, tolerance=TOLERAN
         Where there is no equilibrium, or none is found.
     """
     system = at_rest(system)
-    relaxation, x = Relaxation(system, progress, limit, tolerance), np.zeros((system.rows, 3))
+    relaxation, x, turns = Relaxation(system, progress, limit, tolerance), np.zeros((system.rows, 3)), []
     for t in load_steps:
         state = relaxation.solve(t, x)
+        turns = refuse_half_turns(system, t, state.x, turns)
         x = state.x = system.taken_on(t, state.x)
         yield state
 

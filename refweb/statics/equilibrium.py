@@ -173,6 +173,15 @@ def carried_off(system, t, parts):
     return None
 
 
+def refuse_half_turns(system, t, x, before):
+    """`refweb.effects.half_turns.refuse_half_turns` of a system with threads over bodies."""
+    if not any(thread.wraps for thread in system.net.threads):
+        return []
+    from ..effects.half_turns import refuse_half_turns
+
+    return refuse_half_turns(system, t, x, before)
+
+
 def with_reason(system, t, error, remedy=""):
     """The error with what it may come from: rings together, two contacts alike, or parts that nothing else holds.
 

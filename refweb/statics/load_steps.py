@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..system.static_system import at_rest
-from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, with_reason
+from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, refuse_half_turns, with_reason
 from .newton import Newton
 
 MOST = 400
@@ -23,7 +23,7 @@ SHARING = 60
 PATIENCE = 3000
 """Largest number of factorizations of the smooth law after the interior-point method has failed."""
 FAR = 1e4
-"""Way of a node over the size of the web from which on lines of form finding, or lines that yield, do not hold it."""
+"""Way of a node over the size of the web from which lines of form finding, or that yield, or winches do not hold it."""
 SOFTEST = 1e-2
 """Load over EA of the first net in a series of nets of growing stiffness."""
 
@@ -50,7 +50,7 @@ def solve(system, load_steps, progress=None):
         If there is no equilibrium, or none is found; the load steps before have been yielded.
     """
     full_system, system = system, at_rest(system)
-    newton, push, states = Newton(system, progress, load_steps[0]), None, []
+    newton, push, states, turns = Newton(system, progress, load_steps[0]), None, [], []
     for t in load_steps:
         x, error = _start(system, t, states), None
         solver, shared = newton, bool(states) and states[-1].contact_shares is not None
@@ -67,8 +67,8 @@ def solve(system, load_steps, progress=None):
 
                 push = SharedPush(newton, load_steps[0])
             solver, state = push.newton, push.equilibrium(t, x, error)
-        if system.net.forming.any() or system.net.law_is("plastic").any():
-            _refuse_far(system, t, state)
+        _refuse_far(system, t, state)
+        turns = refuse_half_turns(system, t, state.x, turns)
         if system.bounded:
             from .duality_bound import duality_bound
 
@@ -98,15 +98,21 @@ def solve(system, load_steps, progress=None):
 def _refuse_far(system, t, state):
     """Refuse a state that has run away, since forces that do not grow with length balance no load, however far."""
     net = system.net
+    wound = any(thread.winch for thread in net.threads)
+    if not (wound or net.forming.any() or net.law_is("plastic").any()):
+        return
     size = float(np.ptp(net.points, axis=0).max() + net.natural_length.max())
     distance = np.linalg.norm(state.x[: net.nodes], axis=1)
     if distance.max() > FAR * size:
         reason, remedy = "as forces that do not grow with the length of lines cannot carry the loads", "pretension"
-        if not net.forming.any():
+        if wound:
+            reason, remedy = "as a winch that pays out cannot carry the loads", "tension or limit of [[winch]]"
+        elif not net.forming.any():
             reason, remedy = "as lines that yield cannot carry loads above the limit load", "yield_stress or hardening"
+        node = distance.argmax()
         raise NotFound(
-            f"no equilibrium at load step {t:g}: node {distance.argmax()} goes further than {FAR:g} times the size of "
-            f"the web, {reason}: lower these, or raise {remedy}",
+            f"no equilibrium at load step {t:g}: node {node} goes further than {FAR:g} times the size of the web along "
+            f"{'xyz'[np.abs(state.x[node]).argmax()]}, {reason}: lower these, or raise {remedy}",
             state.stats,
         )
 

@@ -232,6 +232,51 @@ def test_the_hoist():
     assert [finding.code for finding in run.findings if finding.code == "body-not-felt"] == []
 
 
+# Half turns
+
+
+def around_a_post(turns, steps):
+    """An end of a thread over a post goes around it in a circle by some turns."""
+    angles = 2.0 * np.pi * np.linspace(0.0, turns, 61)
+    table = [[t, np.sin(a), 0.0, np.cos(a) - 1.0] for t, a in zip(np.linspace(0.0, 1.0, 61), angles, strict=True)]
+    rope = {"nodes": [0, "drum", 1], "around": [OVER | {"side": [-1, 0, 0]}], "prestrain": 0.5}
+    points, solve = [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], {"kind": "static", "load_steps": np.linspace(0, 1, steps)[1:]}
+    return scene(points, [0], rope, DRUM | {"fixed": True}, solve, motion=[{"node": 1, "displacement": table}])
+
+
+@pytest.mark.parametrize(
+    "turns, steps, text",
+    [
+        (0.6, 31, r'node 1 goes about body "drum" by -?0.4[6-9] of a turn, limit 0.45, as turns are counted'),
+        (-0.6, 31, r'node 1 goes about body "drum" by -?0.4[6-9] of a turn, limit 0.45, as turns are counted'),
+        (0.6, 2, r"from 0.00 to -?0.40 of a turn in one load step, by which way is open: use more load_steps"),
+    ],
+)
+def test_half_a_turn_is_refused(turns, steps, text):
+    """Beyond it the thread would be a turn longer or shorter."""
+    with pytest.raises(refweb.SolverError, match=text):
+        refweb.run(around_a_post(turns, steps))
+
+
+def test_less_than_half_a_turn():
+    """The tension is EA (l/L − 1) with l = 2 √(r² − R²) + R (π + 2 π 0.4 − 2 acos R/r)."""
+    run, straight, angle = refweb.run(around_a_post(0.4, 11)), 2.0 * np.sqrt(1.0 - R**2), np.pi - 2.0 * np.arccos(R)
+    strain = 1.5 * (straight + R * (angle + 0.8 * np.pi)) / (straight + R * angle) - 1.0
+    assert run.results["pull"].value == pytest.approx(EA * strain, rel=1e-9)
+
+
+def test_half_a_turn_is_named_beside_a_drift():
+    """A mass that flies around a post by more than half a turn."""
+    rope = {"nodes": [0, "drum", 1], "around": [OVER | {"side": [-1, 0, 0]}]}
+    given = scene(
+        [[0.0, 0, -R - 1e-4], [1.0, 0, R]], [0], rope, DRUM | {"fixed": True},
+        {"kind": "dynamic", "duration": 2.0, "method": "cvode"}, {1: 1.0}, gravity=[],
+        velocity=[{"node": 1, "value": [0.0, 0.0, 3.0]}], accuracy={"error": "none"},
+    )  # fmt: skip
+    with pytest.raises(refweb.SolverError, match=r'node 1 is -?0\.\d+ of a turn about body "drum" from where it was'):
+        refweb.run(given)
+
+
 # A ball that is caught
 
 

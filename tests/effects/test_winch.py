@@ -235,6 +235,17 @@ def test_statics_at_a_tension(friction):
         assert place[2] == pytest.approx(-np.tan(np.arcsin(weight / (2.0 * pull))), rel=1e-8)
 
 
+@pytest.mark.parametrize("winch", [{"tension": 10.0}, {"speed": 0.0, "limit": 10.0}])
+def test_a_load_that_no_winch_carries(winch):
+    """A weight above the tension of a winch has no equilibrium."""
+    given = scene(
+        [[0, 0, 0], [0, 0, -3.0]], [0], {"end": "first", **winch}, {"kind": "static"}, rope={"nodes": [0, 1]},
+        load=[{"node": 1, "force": [0.0, 0.0, -10.1]}],
+    )  # fmt: skip
+    with pytest.raises(refweb.SolverError, match=r"node 1 goes further .* along z, .* raise tension or limit"):
+        refweb.run(given)
+
+
 def test_speed_in_statics():
     """A winch with a speed is at its starting length: W = EA (l/L − 1)."""
     run = refweb.run(
