@@ -340,6 +340,12 @@ def notices(scene: Scene, system: System) -> Iterator[Finding]:
     if scene.solve.kind == "static" and any(map(rubs, scene.effects)):
         text = 'statics has no friction: contact pushes along its normal alone; [solve] kind = "dynamic" has it'
         yield Finding("left-out", text, "contact")
+    alone = [o.name for o in scene.observables if o.quantity in ("tension", "stress") and o.thread is o.line is None]
+    if system.net.threads and alone:
+        text = (
+            f'{", ".join(alone)}: of lines alone; that of thread "{system.net.threads[0].name}" is observed by thread'
+        )
+        yield Finding("left-out", text, "observe", NOTE)
     if system.net.threads and any(hasattr(effect, "expansion") for effect in scene.effects):
         text = (
             f'[temperature] acts on lines alone: thread "{system.net.threads[0].name}" keeps its natural length; give '

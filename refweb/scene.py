@@ -308,7 +308,7 @@ class Scene:
         """The observables, or the default ones."""
         from .results.observables.observe import default
 
-        return tuple(self.observe) or default()
+        return tuple(self.observe) or default([e.name for e in self.effects if type(e).__name__ == "Thread"])
 
     @property
     def start_folder(self) -> pathlib.Path | None:

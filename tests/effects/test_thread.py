@@ -170,6 +170,15 @@ def test_heat_of_lines_leaves_threads_and_says_so():
     assert 'thread "rope" keeps its natural length' in text
 
 
+def test_default_results_have_the_tension_of_each_thread():
+    """Those of lines are said to leave threads out."""
+    run = static([[0, 0, 0], [0, 0, -1]], [0], {"nodes": [0, 1]}, {1: 1.0}, observe=[])
+    assert run.results["max_tension"].value == pytest.approx(0.0, abs=1e-6)
+    assert run.results["tension_rope"].value == pytest.approx(9.81, rel=1e-9)
+    (text,) = (finding.text for finding in run.findings if finding.code == "left-out")
+    assert text.startswith("max_stress, max_tension: of lines alone")
+
+
 # Proven bounds
 
 

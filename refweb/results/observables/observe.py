@@ -196,18 +196,28 @@ class Observe(Table):
         return self.observable.probe(system)._replace(sign=SIGN[self.reduce], average=self.average or 0.0)
 
 
-def default():
-    """Observables of a scene without ``[[observe]]``."""
+def default(threads=()):
+    """Observables of a scene without ``[[observe]]``, with the tension of each thread by its name."""
     return (
         Observe(name="deflection", quantity="displacement", reduce="max"),
         Observe(name="max_stress", quantity="stress", reduce="max"),
         Observe(name="max_tension", quantity="tension", reduce="max"),
+        *(
+            Observe(name=f"tension_{name if _is_plain(name) else number}", quantity="tension", thread=name, reduce="max")
+            for number, name in enumerate(threads)
+        ),
     )
+
+
+def _is_plain(name):
+    """Tell if the name of a thread can be in that of an observable."""
+    return len(name) <= 70 and "," not in name and '"' not in name
 
 
 def observes_of(tables):
     """Observables of the tables of a scene file, each an `Observe`."""
-    return [Observe.read("[[observe]]", entry) for entry in tables.get("observe") or ()] or list(default())
+    names = [thread["name"] for thread in tables.get("thread") or ()]
+    return [Observe.read("[[observe]]", entry) for entry in tables.get("observe") or ()] or list(default(names))
 
 
 def bounds_by_name(tables):
