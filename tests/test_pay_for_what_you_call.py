@@ -98,7 +98,7 @@ def roots(given, method):
     if any("axle" in body for body in bodies):
         yield "effects.axle"
     if any("around" in thread for thread in given.get("thread", ())):
-        yield from ("effects.around", "effects.winding")
+        yield from ("effects.around", "effects.half_turns", "effects.winding")
     if "winch" in given or any("friction" in thread for thread in given.get("thread", ())):
         yield from ("effects.thread_friction", "effects.thread_slips")
     if any(reel.get("mass") == "follows" for reel in given.get("reel", ())):

@@ -203,7 +203,9 @@ def default(threads=()):
         Observe(name="max_stress", quantity="stress", reduce="max"),
         Observe(name="max_tension", quantity="tension", reduce="max"),
         *(
-            Observe(name=f"tension_{name if _is_plain(name) else number}", quantity="tension", thread=name, reduce="max")
+            Observe(
+                name=f"tension_{name if _is_plain(name) else number}", quantity="tension", thread=name, reduce="max"
+            )
             for number, name in enumerate(threads)
         ),
     )
