@@ -431,10 +431,6 @@ def _last_state(folder, scene, commands):
         from .dynamics.commands import Inputs
 
         Inputs(system).restore_arrays(json.loads(controls)["inputs"])
-    if commands:
-        from .dynamics.commands import Command, Inputs
-
-        Inputs(system).replay([command for command in map(Command._make, commands) if command.time < time])
     if broken and len(broken[0]):
         from .system.broken_lines import torn
 

@@ -139,13 +139,6 @@ class Inputs:
         """Take the values of a checkpoint."""
         self.restore({(name, number): type(self._given[name][number]).read(name, v) for name, number, v in values})
 
-    def replay(self, commands: Iterable[Command]) -> None:
-        """Take the values that commands have given one after another, without a run."""
-        for command in commands:
-            name, number, effect = self._changed(command, command.time)
-            self.present[name, number] = effect
-        self.restore(self.present)
-
     def checked(self, command: Command) -> list[Any]:
         """Check a command, and return what `apply` writes.
 
@@ -379,9 +372,8 @@ class Commands:
         return json.dumps({"controllers": controllers, "inputs": self.inputs.arrays()})
 
     def load(self, text: str) -> None:
-        """Take the state of a checkpoint."""
+        """Take the state of a checkpoint, at the values of the scene."""
         saved = json.loads(text)
-        self.reset()
         self.inputs.restore_arrays(saved["inputs"])
         for controller, arrays in zip(self.controllers, saved["controllers"], strict=True):
             controller.restore(arrays)

@@ -143,7 +143,7 @@ def times_of(schedule, time, first, stop):
 def block_of(schedule, first, stop, compared):
     """The `Block` of the rows from ``first`` to ``stop`` − 1, from the `History` at their `times_of`."""
     rows, history = schedule.times[first:stop], compared
-    if len(compared) > len(rows) or len(schedule.between):
+    if len(schedule.between):
         selected = np.isin(compared.time, rows)
         selected[-1:] = True  # where an event ends the run, its row is that of the event
         history = compared[selected]
