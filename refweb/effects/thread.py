@@ -29,7 +29,7 @@ import numpy as np
 from ..accepted import accepts, any_of, array
 from ..compiled.rows import record_at
 from ..errors import InputError
-from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import quote
 from ..net.law_keys import points
 from ..net.materials import MATERIALS
@@ -38,7 +38,7 @@ from ..registry import LAWS
 from ..tables import Several, Table, boolean, checked, choice, field, nodes, numbers_by_name, real, table, text
 from .base import Balance, ForceTerm, Tangent
 from .line_kernels import line_at
-from .thread_segments import segment_kernel
+from .thread_segments import add_across, energy_kernel, segment_kernel
 
 if TYPE_CHECKING:
     from ..net.net import Net
@@ -76,8 +76,7 @@ def kernels(law, record, width):
     width : int
         Columns of a cell ahead of 1/A and of the vector and distance of each segment in the web's position.
     """
-    stress, tangent, energy_density = law.stress, law.tangent, law.energy_density
-    segment = segment_kernel(width)
+    stress, tangent, segment = law.stress, law.tangent, segment_kernel(width)
 
     @kernel()
     def strain_of(x, cells, data, c):
@@ -104,12 +103,6 @@ def kernels(law, record, width):
             out[c, 0], out[c, 1], out[c, 2] = tension, tension * data[c, width], strain
             out[c, 3] = line.natural_length * (1.0 + strain)
 
-    @kernel(ENERGY)
-    def energy(t, x, cells, data, out):
-        for c in range(cells.shape[0]):
-            line = record_at(record, data, c, 0)
-            out[c] = line.natural_length * energy_density(strain_of(x, cells, data, c), line)
-
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         size = 3 * cells.shape[1]
@@ -133,14 +126,7 @@ def kernels(law, record, width):
             for s in range(cells.shape[1] - 1):
                 p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
-                for k in range(3):
-                    for m in range(3):
-                        across = tension * inverse * ((1.0 if k == m else 0.0) - p[k] * p[m])
-                        first, second = 3 * s + k, 3 * s + m
-                        blocks[c, first, second] += across
-                        blocks[c, first + 3, second + 3] += across
-                        blocks[c, first, second + 3] -= across
-                        blocks[c, first + 3, second] -= across
+                add_across(blocks, c, s, p, tension * inverse)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
@@ -156,7 +142,7 @@ def kernels(law, record, width):
                 rates[cells[c, s]] += along + across
                 rates[cells[c, s + 1]] += along + across
 
-    return force, energy, stiffness, bound
+    return force, energy_kernel(law, record, strain_of), stiffness, bound
 
 
 _number = real(at_least=0.0)

@@ -39,7 +39,7 @@ from ..kernels import BOUND, ENERGY, FORCE, RELAX, STIFFNESS, kernel
 from ..net.threads import COLUMNS, TAUT
 from .base import Balance, ForceTerm, InternalVariables, Tangent, Timing, no_force, with_rows
 from .line_kernels import internal_number, line_at
-from .thread_segments import segment_kernel
+from .thread_segments import add_across, segment_kernel
 from .thread_slips import (
     BEFORE,
     HEAD,
@@ -160,19 +160,17 @@ def kernels(law, record, width):
             for s in range(w.shape[1]):
                 out[c] += natural(w, s) * energy_density(strain_of(w, s), line)
 
-    @kernel(ENERGY)
-    def gone(t, x, cells, data, out):
-        w = np.empty((ROWS, cells.shape[1] - 1))
-        for c in range(cells.shape[0]):
-            rings = find_slips(t, x, cells, data, c, w)
-            out[c] = lost_now(x, cells, data, c, w, rings) * line_at(data, c).ea
+    def energy_of(now):
+        @kernel(ENERGY)
+        def energy(t, x, cells, data, out):
+            w = np.empty((ROWS, cells.shape[1] - 1))
+            for c in range(cells.shape[0]):
+                rings = find_slips(t, x, cells, data, c, w)
+                out[c] = now(x, cells, data, c, w, rings) * line_at(data, c).ea
 
-    @kernel(ENERGY)
-    def taken(t, x, cells, data, out):
-        w = np.empty((ROWS, cells.shape[1] - 1))
-        for c in range(cells.shape[0]):
-            rings = find_slips(t, x, cells, data, c, w)
-            out[c] = taken_now(x, cells, data, c, w, rings) * line_at(data, c).ea
+        return energy
+
+    gone, taken = energy_of(lost_now), energy_of(taken_now)
 
     @kernel(RELAX)
     def relax(h, x, cells, data, before, lost):
@@ -266,14 +264,7 @@ def kernels(law, record, width):
                     for k in range(3):
                         blocks[c, 3 * s + k, m] -= p[k] * change
                         blocks[c, 3 * s + 3 + k, m] += p[k] * change
-                for k in range(3):
-                    for m in range(3):
-                        across = tension * inverse * ((1.0 if k == m else 0.0) - p[k] * p[m])
-                        first, second = 3 * s + k, 3 * s + m
-                        blocks[c, first, second] += across
-                        blocks[c, first + 3, second + 3] += across
-                        blocks[c, first, second + 3] -= across
-                        blocks[c, first + 3, second] -= across
+                add_across(blocks, c, s, p, tension * inverse)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):

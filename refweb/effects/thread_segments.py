@@ -1,11 +1,12 @@
-"""The kernel of a segment of a thread, which all its terms read."""
+"""Kernels of the segments of threads, which terms of threads share: vector, stiffness across, and energy."""
 
 from __future__ import annotations
 
 import functools
 import math
 
-from ..kernels import kernel
+from ..compiled.rows import record_at
+from ..kernels import ENERGY, kernel
 
 
 @functools.cache
@@ -25,3 +26,29 @@ def segment_kernel(width):
         return p0, p1, p2, 1.0 / length if length > 0.0 else 0.0, length, square / both if both > 0.0 else 0.0
 
     return segment
+
+
+@kernel(forceinline=True)
+def add_across(blocks, c, s, p, turn):
+    """Add the stiffness of segment s of cell c across its unit vector p, T/l = ``turn``, to the block of the cell."""
+    for k in range(3):
+        for m in range(3):
+            across = turn * ((1.0 if k == m else 0.0) - p[k] * p[m])
+            first, second = 3 * s + k, 3 * s + m
+            blocks[c, first, second] += across
+            blocks[c, first + 3, second + 3] += across
+            blocks[c, first, second + 3] -= across
+            blocks[c, first + 3, second] -= across
+
+
+def energy_kernel(law, record, strain_of):
+    """The energy kernel of threads of one strain, which ``strain_of(x, cells, data, c)`` gives."""
+    energy_density = law.energy_density
+
+    @kernel(ENERGY)
+    def energy(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            line = record_at(record, data, c, 0)
+            out[c] = line.natural_length * energy_density(strain_of(x, cells, data, c), line)
+
+    return energy

@@ -29,11 +29,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..compiled.rows import record_at, width_of
-from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..net.threads import COLUMNS, TAUT
 from .around import CYLINDER, KINDS, SPHERE, STRAIGHT, refuse_free, steady
 from .base import Balance, ForceTerm, Tangent
 from .line_kernels import line_at
+from .thread_segments import energy_kernel
 from .vectors import cross, dot
 
 if TYPE_CHECKING:
@@ -295,7 +296,7 @@ def kernels(law, record, width, wraps):
     wraps : int
         Rows of a cell behind those of its nodes: bases of bodies.
     """
-    stress, tangent, energy_density, size = law.stress, law.tangent, law.energy_density, width_of(SEGMENT)
+    stress, tangent, size = law.stress, law.tangent, width_of(SEGMENT)
 
     @kernel()
     def path_at(x, cells, data, c, s):
@@ -335,12 +336,6 @@ def kernels(law, record, width, wraps):
                         f[spin, k] += first[k] + second[k]
             out[c, 0], out[c, 1], out[c, 2] = tension, tension * data[c, width], strain
             out[c, 3] = line.natural_length * (1.0 + strain)
-
-    @kernel(ENERGY)
-    def energy(t, x, cells, data, out):
-        for c in range(cells.shape[0]):
-            line = record_at(record, data, c, 0)
-            out[c] = line.natural_length * energy_density(strain_of(x, cells, data, c), line)
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
@@ -409,7 +404,7 @@ def kernels(law, record, width, wraps):
                 rates[i] += across
                 rates[j] += across
 
-    return force, energy, stiffness, bound
+    return force, energy_kernel(law, record, strain_of), stiffness, bound
 
 
 def segments_of(net: Net, thread: ThreadLine) -> tuple[Any, list[int], bool]:
