@@ -2,17 +2,16 @@
 
 import numpy as np
 import pytest
+import threads
 from nets import METHODS
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
+from threads import EA, FALLING, PULL, ROPE, G
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
 
-G, EA, R = 9.81, 1e4, 0.2
-ROPE = {"name": "rope", "modulus": 1e9, "area": 1e-5, "density": 0.0}
-FAR = [[50.0, 0.0, 0.0], [51.0, 0.0, 0.0]]
-"""Ends of the one line that a web has, away from all else; both are supported, and stand behind the other points."""
+R = 0.2
 DRUM = {"name": "drum", "shape": "cylinder", "radius": R, "length": 0.5, "axis": [0.0, 1.0, 0.0], "position": [0, 0, 0]}
 ON_AXLE = DRUM | {"axle": {"direction": [0.0, 1.0, 0.0]}}
 BALL = {"name": "drum", "radius": R, "position": [0.0, 0.0, 0.0]}
@@ -21,19 +20,7 @@ OVER = {"body": "drum", "side": [0.0, 0.0, 1.0]}
 
 def scene(points, supports, rope, body, solve, masses=(), **tables):
     """A scene of points, some of them supported, with a thread over a body and point masses by node."""
-    far = len(points)
-    given = {
-        "web": {"kind": "inline", "points": [*points, *FAR], "lines": [[far, far + 1]]},
-        "supports": {"nodes": [*supports, far, far + 1]},
-        "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-5, "density": 0.0},
-        "gravity": {"acceleration": [0.0, 0.0, -G]},
-        "thread": [{**ROPE, **rope}],
-        "body": [body],
-        "point_mass": [{"node": node, "mass": mass} for node, mass in dict(masses).items()],
-        "observe": [{"name": "pull", "quantity": "tension", "thread": "rope"}],
-        "solve": solve,
-    }
-    return refweb.Scene.from_dict({name: value for name, value in {**given, **tables}.items() if value != []})
+    return threads.scene(points, supports, rope, solve, masses, **{**FALLING, **PULL, "body": [body], **tables})
 
 
 def natural_length(points, body, **around):

@@ -1,11 +1,15 @@
 """Threads that slide through rings: closed forms of pulleys and rings, independent programs, and the balances."""
 
+import functools
+
 import numpy as np
 import pytest
+import threads
 from nets import METHODS
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import brentq, least_squares
+from threads import EA, FALLING, FAR, PULL, ROPE, G
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
@@ -13,26 +17,8 @@ from refweb.results.vtu import web_mesh
 from refweb.statics.duality_bound import duality_bound
 from refweb.statics.equilibrium import Equilibrium
 
-G, EA = 9.81, 1e4
-ROPE = {"name": "rope", "modulus": 1e9, "area": 1e-5, "density": 0.0}
-FAR = [[50.0, 0.0, 0.0], [51.0, 0.0, 0.0]]
-"""Ends of the one line that a web has, away from all else; both are supported, and stand behind the other points."""
-
-
-def scene(points, supports, rope, solve, masses=(), **tables):
-    """A scene of points, some of them supported, with a thread and point masses by node."""
-    far = len(points)
-    given = {
-        "web": {"kind": "inline", "points": [*points, *FAR], "lines": [[far, far + 1]]},
-        "supports": {"nodes": [*supports, far, far + 1]},
-        "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-5, "density": 0.0},
-        "gravity": {"acceleration": [0.0, 0.0, -G]},
-        "thread": [{**ROPE, **rope}],
-        "point_mass": [{"node": node, "mass": mass} for node, mass in dict(masses).items()],
-        "observe": [{"name": "pull", "quantity": "tension", "thread": "rope"}],
-        "solve": solve,
-    }
-    return refweb.Scene.from_dict({name: value for name, value in {**given, **tables}.items() if value != []})
+scene = functools.partial(threads.scene, **FALLING, **PULL)
+"""A scene with a thread that is observed, and gravity."""
 
 
 def static(points, supports, rope, masses, method="newton", **tables):

@@ -4,31 +4,16 @@ import functools
 
 import numpy as np
 import pytest
+import threads
 from nets import METHODS
 from scipy.optimize import brentq, fsolve
+from threads import EA, G
 
 import refweb
 from refweb.results.vtu import web_mesh
 
-G, EA = 9.81, 1e4
-ROPE = {"name": "rope", "modulus": 1e9, "area": 1e-5, "density": 0.0}
-FAR = [[50.0, 0.0, 0.0], [51.0, 0.0, 0.0]]
-"""Ends of the one line that a web has, away from all else."""
-
-
-def scene(points, supports, rope, solve, masses=(), **tables):
-    """A scene of points, some of them supported, with a thread and point masses by node."""
-    far = len(points)
-    given = {
-        "web": {"kind": "inline", "points": [*points, *FAR], "lines": [[far, far + 1]]},
-        "supports": {"nodes": [*supports, far, far + 1]},
-        "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-5, "density": 0.0},
-        "thread": [{**ROPE, **rope}],
-        "point_mass": [{"node": node, "mass": mass} for node, mass in dict(masses).items()],
-        "accuracy": {"error": "none"},
-        "solve": solve,
-    }
-    return refweb.Scene.from_dict({name: value for name, value in {**given, **tables}.items() if value != []})
+scene = functools.partial(threads.scene, accuracy={"error": "none"})
+"""A scene with a thread, without errors."""
 
 
 def seen(segments=(), rings=(), **more):

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+import threads
 from nets import METHODS
+from threads import FAR, G
 
 import refweb
 
-G, EA = 9.81, 1e5
-ROPE = {"name": "rope", "modulus": 1e10, "area": 1e-5, "density": 0.0}
-FAR = [[50.0, 0.0, 0.0], [51.0, 0.0, 0.0]]
-"""Ends of the one line that a web has, away from all else."""
+EA = 1e5
+ROPE = {"modulus": 1e10}
 STEPS = {name: keys for name, keys in METHODS.items() if keys.get("method") != "explicit"}
 TIGHT = {
     "central-difference": {"step_size": 1e-4},
@@ -21,18 +21,8 @@ TIGHT = {
 
 def scene(points, supports, winch, solve, masses=(), rope=None, **tables):
     """A scene of points, some of them supported, with a thread, a winch at an end of it, and point masses by node."""
-    far = len(points)
-    given = {
-        "web": {"kind": "inline", "points": [*points, *FAR], "lines": [[far, far + 1]]},
-        "supports": {"nodes": [*supports, far, far + 1]},
-        "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-5, "density": 0.0},
-        "thread": [{**ROPE, **(rope or {})}],
-        "winch": [{"thread": "rope", **winch}],
-        "point_mass": [{"node": node, "mass": mass} for node, mass in dict(masses).items()],
-        "accuracy": {"error": "none"},
-        "solve": solve,
-    }
-    return refweb.Scene.from_dict({name: value for name, value in {**given, **tables}.items() if value != []})
+    given = {"winch": [{"thread": "rope", **winch}], "accuracy": {"error": "none"}, **tables}
+    return threads.scene(points, supports, {**ROPE, **(rope or {})}, solve, masses, **given)
 
 
 def lifted(winch, solve, start=0.0, pull=0.0, gravity=G, **tables):
