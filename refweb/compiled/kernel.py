@@ -34,7 +34,7 @@ RECORDS: dict[str, Any] = {}
 
 
 def type_of(annotation):
-    """Type of numba for an annotation: a number, an array with its type, a table, or a record."""
+    """Type of numba for an annotation: a number, an array with its type, a (named) tuple, a table, or a record."""
     if annotation in PLAIN_TYPES:
         return PLAIN_TYPES[annotation]
     if typing.get_origin(annotation) is Annotated:
@@ -42,6 +42,9 @@ def type_of(annotation):
         return base.kind_of(kind) if hasattr(base, "kind_of") else kind
     if typing.get_origin(annotation) is tuple:
         return types.Tuple([type_of(part) for part in typing.get_args(annotation)])
+    if hasattr(annotation, "_fields"):
+        hints = typing.get_type_hints(annotation, localns=RECORDS, include_extras=True)
+        return types.BaseTuple.from_types([type_of(hints[name]) for name in annotation._fields], annotation)
     return annotation.reference()
 
 

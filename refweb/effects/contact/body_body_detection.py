@@ -14,18 +14,19 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numba import from_dtype, types
 
 from ...compiled.rows import column_of, record_at, width_of
-from ...kernels import kernel
+from ...kernels import Indices, Matrix, kernel
 from ...net.rotation import matrix_at, times, times_transposed
 from ...net.skeleton import ARC, PART, SEGMENT
 from ..vectors import dot
 from .contact_points import climb, hessian_times, places, window
 from .nonconvex_contacts import STEEPEST
-from .pair import AWAY, LINE_CONTACT, SPHERE, SURFACE, pair_of
+from .pair import AWAY, LINE_CONTACT, SPHERE, SURFACE, LineContacts, pair_of
 
 BEHIND = AWAY + 6
 """Column of the `refweb.effects.contact.pair.SURFACE` of a line with two ends on a body."""
@@ -68,6 +69,7 @@ BODY_CONTACT = np.dtype(
 """A contact: its point from each body's row [m]; G, as from the first body into the second; depth [m]; by what its
 energy counts, and its losses; how far from its point, along G, the bodies touch [m]; whether its place moves; which
 contact of the pair it is."""
+BodyContacts = Annotated[np.ndarray, types.Array(from_dtype(BODY_CONTACT), 1, "C")]
 
 
 class Frame(NamedTuple):
@@ -101,11 +103,11 @@ class Law(NamedTuple):
 class Space(NamedTuple):
     """Space to work in: rows, cell and numbers of one line, what is found on it, and all contacts of a pair."""
 
-    x: np.ndarray
-    cells: np.ndarray
-    data: np.ndarray
-    contact_data: np.ndarray
-    contacts: np.ndarray
+    x: Matrix
+    cells: Indices
+    data: Matrix
+    contact_data: LineContacts
+    contacts: BodyContacts
 
 
 @kernel()
@@ -238,7 +240,7 @@ def pressing(depth):
     The kernel ``(ahead, x, cells, data, c, s, space, count)`` writes those of the skeleton of side ``s``, grown by
     ``ahead`` more, to rows of ``space.contacts`` from ``count`` on, and returns the row behind them.
     """
-    _, _, contacts, touch_of, limit = places(depth, 0)
+    _, contacts, touch_of, limit = places(depth, 0, 1, 2, LINE)
     arc = arcs(depth)
 
     @kernel()
@@ -282,8 +284,8 @@ def pressing(depth):
                     continue
                 for k in range(3):
                     space.x[0, k], space.x[1, k] = p[k], q[k]
-                for m in range(contacts(space.x, space.cells, row, 0, 1, 2, LINE, space.contact_data)):
-                    touch = touch_of(space.x, space.cells, row, 2, LINE, space.contact_data, m)
+                for m in range(contacts(space.x, space.cells, row, 0, space.contact_data)):
+                    touch = touch_of(space.x, space.cells, row, space.contact_data, m)
                     end = 1 if touch.xi > 0.5 else 0
                     if (touch.inner or part.owns[end] != 0.0) and count < limit:
                         w = window(False, touch.xi, touch.inner)[0]
@@ -324,7 +326,7 @@ def meeting(first, second):
     """Kernels of two bodies whose depths are given, see `pressing`.
 
     ``space_of(data)`` is the `Space`, and ``detect(ahead, x, cells, data, c, space)`` the number of contacts of a pair
-    that it holds.
+    that it holds; it is called by its address, see `refweb.effects.contact.contact_points.places`.
     """
     (press, first_limit), (press_back, second_limit) = pressing(second), pressing(first)
     rows = max(first_limit, second_limit)
@@ -338,8 +340,8 @@ def meeting(first, second):
         contacts = np.empty(largest, BODY_CONTACT)
         return Space(np.zeros((3, 3)), cells, np.empty((1, PAIR_WIDTH)), np.empty(rows, LINE_CONTACT), contacts)
 
-    @kernel()
-    def detect(ahead, x, cells, data, c, space):
+    @kernel(apart=())
+    def detect(ahead: float, x: Matrix, cells: Indices, data: Matrix, c: int, space: Space) -> int:
         away = apart(x, cells, data, c)
         reach = side_of(data, c, 0).extent + side_of(data, c, 1).extent + ahead
         if dot(away, away) > reach * reach:

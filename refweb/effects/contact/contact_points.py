@@ -19,11 +19,11 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ...kernels import kernel
+from ...kernels import Indices, Matrix, kernel
 from ...net.rotation import times
 from ..vectors import dot
 from .nearest_point import SAMPLES, far, in_box, point, share
-from .pair import Pair, from_shape, pair_of, pairing
+from .pair import LineContacts, Pair, from_shape, pair_of, pairing
 
 NOWHERE = -1.0
 """Coordinate ξ of an element without any contact."""
@@ -141,7 +141,6 @@ def set_place(contact, c, xi, inner):
 class Places(NamedTuple):
     """Kernels that find where lines touch bodies of one depth, see `places`, and how many contacts an element has."""
 
-    within: Callable[..., Any]
     deepest: Callable[..., Any]
     contacts: Callable[..., Any]
     touch_of: Callable[..., Any]
@@ -165,23 +164,9 @@ def climb(value, curve, low, high, moved, xi):
 
 
 @functools.cache
-def places(depth, spins=0):
-    """Kernels that find where lines touch.
-
-    ``within(x, cells, data, c, nodes, functions, xi)`` is the `ContactPoint` at a place of cell c, ``deepest`` of all
-    but the place (place, depth) of the contact between the ends of a cell, or `NOWHERE`. ``contacts`` finds those of a
-    line, and ``touch_of`` is the `PointContact` that is one of them. ``limit`` is the largest number of contacts of an
-    element.
-
-    Parameters
-    ----------
-    depth : kernel
-        Depth in the bodies, as `refweb.net.grown_core.depth`; where they need not be convex, with ``convex = False``,
-        see `refweb.effects.contact.nonconvex_contacts`.
-    spins : int
-        See `refweb.effects.contact.pair.pairing`.
-    """
-    paired, convex = pairing(spins), getattr(depth, "convex", True)
+def within_of(depth, spins):
+    """Kernel ``(x, cells, data, c, nodes, functions, xi)`` of the `ContactPoint` at a place of cell c; see `places`."""
+    paired = pairing(spins)
 
     @kernel()
     def within(x, cells, data, c, nodes, functions, xi):
@@ -191,8 +176,45 @@ def places(depth, spins=0):
         deep, gradient, hessian = depth(from_shape(p, data, c, nodes) if spins == 2 else p, pair.shape)
         return ContactPoint(p, d, e, deep, gradient, hessian)
 
+    return within
+
+
+@functools.cache
+def places(depth, spins, pieces, nodes, functions):
+    """Kernels that find where lines touch.
+
+    ``deepest(x, cells, data, c)`` is (place, depth) of the contact between the ends of a cell, or `NOWHERE`.
+    ``contacts(x, cells, data, first, buffer)`` writes the contacts of a line to an array of `LINE_CONTACT` and returns
+    their number, and ``touch_of(x, cells, data, buffer, n)`` is the `PointContact` that is one of them. ``limit`` is
+    the largest number of contacts of an element. ``contacts`` is called by its address: its search is a large part of
+    the machine code of a contact, of which all kernels would have a copy.
+
+    Parameters
+    ----------
+    depth : kernel
+        Depth in the bodies, as `refweb.net.grown_core.depth`; where they need not be convex, with ``convex = False``,
+        see `refweb.effects.contact.nonconvex_contacts`.
+    spins : int
+        See `refweb.effects.contact.pair.pairing`.
+    pieces, nodes, functions
+        See `refweb.effects.contact.penalty.kernels`.
+    """
+    paired, within, convex = pairing(spins), within_of(depth, spins), getattr(depth, "convex", True)
+
+    @kernel(forceinline=True)
+    def touch_of(x, cells, data, buffer, n):
+        c, xi = buffer[n].cell, buffer[n].xi
+        spot = within(x, cells, data, c, nodes, functions, xi)
+        weight, share = (1.0, 1.0) if convex else (buffer[n].weight, buffer[n].share)
+        return PointContact(c, xi, buffer[n].inner > 0.0, paired(x, cells, data, c, nodes), spot, weight, share)
+
+    if not convex:
+        from .nonconvex_contacts import PLACES, several
+
+        return Places(*several(within, rise, pieces, nodes, functions), touch_of, PLACES)
+
     @kernel()
-    def climbed(x, cells, data, c, nodes, functions, low, high, xi):
+    def climbed(x, cells, data, c, low, high, xi):
         moved, pair = math.inf, pair_of(data, c, nodes)
         if pair.once:
             for end in (low, high):
@@ -212,37 +234,36 @@ def places(depth, spins=0):
         return xi, within(x, cells, data, c, nodes, functions, xi).depth
 
     @kernel()
-    def felt(x, cells, data, c, nodes, functions, xi):
+    def felt(x, cells, data, c, xi):
         deep, pair = within(x, cells, data, c, nodes, functions, xi).depth, pair_of(data, c, nodes)
         return window(pair.once, xi, True)[0] ** (1.0 / (pair.exponent + 1.0)) * deep if deep > 0.0 else deep
 
     @kernel()
-    def deepest(x, cells, data, c, nodes, functions):
+    def deepest(x, cells, data, c):
         if nodes > 2:  # from the places where samples are largest, of which there may be several
             largest, where, depth_there = -math.inf, 0.0, 0.0
-            before, current = -math.inf, felt(x, cells, data, c, nodes, functions, 0.0)
+            before, current = -math.inf, felt(x, cells, data, c, 0.0)
             for n in range(SAMPLES + 1):
                 at, after = n / SAMPLES, -math.inf
                 if n < SAMPLES:
-                    after = felt(x, cells, data, c, nodes, functions, at + 1.0 / SAMPLES)
+                    after = felt(x, cells, data, c, at + 1.0 / SAMPLES)
                 if current >= before and current > after:
                     low, high = max(at - 1.0 / SAMPLES, 0.0), min(at + 1.0 / SAMPLES, 1.0)
-                    xi, deep = climbed(x, cells, data, c, nodes, functions, low, high, at)
-                    value = felt(x, cells, data, c, nodes, functions, xi)
+                    xi, deep = climbed(x, cells, data, c, low, high, at)
+                    value = felt(x, cells, data, c, xi)
                     if value > largest:
                         largest, where, depth_there = value, xi, deep
                 before, current = current, after
             return where, depth_there
-        return climbed(x, cells, data, c, nodes, functions, 0.0, 1.0, 0.5)
+        return climbed(x, cells, data, c, 0.0, 1.0, 0.5)
 
-    @kernel(forceinline=True)
-    def contacts(x, cells, data, first, pieces, nodes, functions, buffer):
-        """Write each contact of a line to ``buffer``, an array of `LINE_CONTACT`; return their number."""
+    @kernel(leaf=True, apart=())
+    def contacts(x: Matrix, cells: Indices, data: Matrix, first: int, buffer: LineContacts) -> int:
         count, best = 0, 0.0
         for c in range(first, first + pieces):
             if far(x, cells, data, c, nodes):
                 continue
-            xi, deep = deepest(x, cells, data, c, nodes, functions)
+            xi, deep = deepest(x, cells, data, c)
             if xi == NOWHERE:
                 continue
             inner = 0.0 < xi < 1.0
@@ -260,18 +281,7 @@ def places(depth, spins=0):
                     count += 1
         return count
 
-    @kernel(forceinline=True)
-    def touch_of(x, cells, data, nodes, functions, buffer, n):
-        c, xi = buffer[n].cell, buffer[n].xi
-        spot = within(x, cells, data, c, nodes, functions, xi)
-        weight, share = (1.0, 1.0) if convex else (buffer[n].weight, buffer[n].share)
-        return PointContact(c, xi, buffer[n].inner > 0.0, paired(x, cells, data, c, nodes), spot, weight, share)
-
-    if convex:
-        return Places(within, deepest, contacts, touch_of, 3)
-    from .nonconvex_contacts import PLACES, several
-
-    return Places(within, *several(within, rise), touch_of, PLACES)
+    return Places(deepest, contacts, touch_of, 3)
 
 
 @functools.cache
@@ -283,7 +293,7 @@ def in_reach(depth, spins):
     boxed = in_box(spins)
     if not getattr(depth, "convex", True):
         return boxed
-    within = places(depth, spins).within
+    within = within_of(depth, spins)
 
     @kernel(forceinline=True)
     def in_reach(skin, x, cells, data, c, nodes, functions):
@@ -305,7 +315,7 @@ def reaching(depth, spins):
     """
     if not getattr(depth, "convex", True):
         return in_reach(depth, spins)
-    within = places(depth, spins).within
+    within = within_of(depth, spins)
 
     @kernel()
     def reaches(reach, x, cells, data, c, nodes, functions):

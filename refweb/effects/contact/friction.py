@@ -268,16 +268,16 @@ def kernels(depth, pieces, nodes, functions, spins):
         Number of rows behind the body in a cell that are its rotation: 1 or 2, see `refweb.net.rotation`, or 0.
     """
     rows, paired = nodes + (2 if spins else 1), pairing(spins)
-    _, _, contacts, touch_of, limit = places(depth, spins)
-    depth_ahead = foresight(depth, spins)
+    _, contacts, touch_of, limit = places(depth, spins, pieces, nodes, functions)
+    depth_ahead = foresight(depth, spins, pieces, nodes, functions)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         buffer = np.empty(limit * pieces, LINE_CONTACT)
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
-                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
+            for n in range(contacts(x, cells, data, first, buffer)):
+                touch = touch_of(x, cells, data, buffer, n)
                 c, xi, pair, y = touch.c, touch.xi, touch.pair, touch.spot.y
                 u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, xi, y)
                 friction = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
@@ -304,8 +304,8 @@ def kernels(depth, pieces, nodes, functions, spins):
         blocks[:] = 0.0
         for first in range(0, cells.shape[0] if not definite else 0, pieces):
             pushes[:] = 0.0
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
-                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
+            for n in range(contacts(x, cells, data, first, buffer)):
+                touch = touch_of(x, cells, data, buffer, n)
                 place_moves(touch, touch.inner, nodes, functions, z)
                 add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_u)
                 if spins == 2:
@@ -329,8 +329,8 @@ def kernels(depth, pieces, nodes, functions, spins):
         buffer, q, by_u = np.empty(limit * pieces, LINE_CONTACT), np.empty((3, 3)), np.empty((3, 3))
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
-                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
+            for n in range(contacts(x, cells, data, first, buffer)):
+                touch = touch_of(x, cells, data, buffer, n)
                 add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u)
             for c in range(first, first + pieces):
                 turn_block(blocks, c, rows, paired(x, cells, data, c, nodes).axes, q)
@@ -338,7 +338,7 @@ def kernels(depth, pieces, nodes, functions, spins):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            deep = depth_ahead(False, reach, speed, x, mass, cells, data, c, nodes, functions).depth
+            deep = depth_ahead(False, reach, speed, x, mass, cells, data, c).depth
             if deep > 0.0:
                 pair = pair_of(data, c, nodes)
                 limit = SHALLOW * pair.damping * speed * (1.0 + pair.friction) + pair.friction

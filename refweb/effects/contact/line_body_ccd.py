@@ -78,10 +78,10 @@ def passing(depth, nodes, functions, spins=0):
             return radius - away < share * radius - margin
 
     else:
-        from .contact_points import places
+        from .contact_points import within_of
         from .penalty import thickness
 
-        (within, *_), steepest = places(depth, spins), 0.0
+        within, steepest = within_of(depth, spins), 0.0
         if not getattr(depth, "convex", True):
             from .nonconvex_contacts import STEEPEST as steepest
 

@@ -86,16 +86,16 @@ def kernels(depth, pieces, functions, spins):
 @functools.cache
 def detecting(depth, pieces, functions, spins):
     """The kernel that detects contacts of elements with two nodes, with the parameters of `kernels`."""
-    _, _, contacts_of, touch_of, limit = places(depth, spins)
+    _, contacts_of, touch_of, limit = places(depth, spins, pieces, 2, functions)
 
     @kernel(DETECT)
     def detect(x, cells, data, contacts, parts, begin):
         buffer, count = np.empty(limit * pieces, LINE_CONTACT), begin
         at_node = np.full(x.shape[0], -1)
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts_of(x, cells, data, first, pieces, 2, functions, buffer)):
+            for n in range(contacts_of(x, cells, data, first, buffer)):
                 if count < contacts.size:
-                    touch = touch_of(x, cells, data, 2, functions, buffer, n)
+                    touch = touch_of(x, cells, data, buffer, n)
                     if not touch.inner:
                         node = cells[touch.c, 0 if touch.xi < 0.5 else 1]
                         same = at_node[node]

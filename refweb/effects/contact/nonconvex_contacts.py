@@ -24,10 +24,10 @@ import math
 
 import numpy as np
 
-from ...kernels import kernel
+from ...kernels import Indices, Matrix, kernel
 from ..vectors import dot
 from .nearest_point import far, point
-from .pair import LINE_CONTACT, pair_of, power_of_depth
+from .pair import LINE_CONTACT, LineContacts, pair_of, power_of_depth
 
 SAMPLES = 256
 """Largest number of parts of an element for samples of the slope."""
@@ -74,11 +74,11 @@ def share_out(buffer, begin, end):
 
 
 @functools.cache
-def several(within, rise):
+def several(within, rise, pieces, nodes, functions):
     """(kernel of the deepest place of an element, kernel of all contacts of a line), as in `places`."""
 
     @kernel()
-    def between(x, cells, data, c, nodes, functions, low, high, xi, sign):
+    def between(x, cells, data, c, low, high, xi, sign):
         pair, moved = pair_of(data, c, nodes), math.inf
         for _ in range(100):  # Newton's method, by bisection where it leaves the bracket or comes no nearer
             value, curve = rise(pair, xi, within(x, cells, data, c, nodes, functions, xi))
@@ -95,7 +95,7 @@ def several(within, rise):
         return xi
 
     @kernel()
-    def dip(x, cells, data, c, nodes, functions, low, high, begin, end):
+    def dip(x, cells, data, c, low, high, begin, end):
         """A place between two where the slope of F has another sign than at both, 2 where there is none."""
         pair, sign = pair_of(data, c, nodes), 1.0 if begin[0] > 0.0 else -1.0
         for _ in range(LOOKS):
@@ -115,7 +115,7 @@ def several(within, rise):
         return 2.0
 
     @kernel()
-    def scan(x, cells, data, c, nodes, functions, buffer, begin):
+    def scan(x, cells, data, c, buffer, begin):
         """Write the contacts of a cell between its ends to rows from ``begin`` on; (row behind, depths of its ends)."""
         pair, count = pair_of(data, c, nodes), begin
         _, d, _ = point(x, cells, data, c, nodes, functions, 0.5)
@@ -139,13 +139,13 @@ def several(within, rise):
                 first = spot.depth
             elif not clear and n == last_n + 1:
                 turn = (before[0] > 0.0) != (value[0] > 0.0)
-                inner = 2.0 if turn else dip(x, cells, data, c, nodes, functions, low, xi, before, value)
+                inner = 2.0 if turn else dip(x, cells, data, c, low, xi, before, value)
                 for k in range(1 if turn else 2 if inner < 1.0 else 0):
                     begins, ends = (low, xi) if turn else (low, inner) if k == 0 else (inner, xi)
                     sign = 1.0 if (before[0] > 0.0) == (k == 0) else -1.0
                     at = before[0] / (before[0] - value[0]) if turn else 0.5
                     at = begins + at * (ends - begins)
-                    at = between(x, cells, data, c, nodes, functions, begins, ends, at, sign)
+                    at = between(x, cells, data, c, begins, ends, at, sign)
                     deep = within(x, cells, data, c, nodes, functions, at).depth
                     if deep > 0.0 and 0.0 < at < 1.0:
                         felt = 4.0 * at * (1.0 - at) * deep * power_of_depth(pair.exponent, deep)
@@ -161,9 +161,9 @@ def several(within, rise):
         return count, first, last
 
     @kernel()
-    def deepest(x, cells, data, c, nodes, functions):
+    def deepest(x, cells, data, c):
         buffer, where, largest = np.empty(PLACES, LINE_CONTACT), 0.0, -math.inf
-        count, first, last = scan(x, cells, data, c, nodes, functions, buffer, 0)
+        count, first, last = scan(x, cells, data, c, buffer, 0)
         largest = max(first, last)
         for n in range(count):
             deep = within(x, cells, data, c, nodes, functions, buffer[n].xi).depth
@@ -171,13 +171,13 @@ def several(within, rise):
                 where, largest = buffer[n].xi, deep
         return where, largest
 
-    @kernel()
-    def contacts(x, cells, data, first, pieces, nodes, functions, buffer):
+    @kernel(apart=())
+    def contacts(x: Matrix, cells: Indices, data: Matrix, first: int, buffer: LineContacts) -> int:
         count = 0
         for c in range(first, first + pieces):
             if far(x, cells, data, c, nodes):
                 continue
-            count, begin, end = scan(x, cells, data, c, nodes, functions, buffer, count)
+            count, begin, end = scan(x, cells, data, c, buffer, count)
             for at, deep in ((0.0, begin), (1.0, end)):
                 if deep > 0.0:
                     record(buffer[count], c, at, 0.0, 1.0, 0.0)

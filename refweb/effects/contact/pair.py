@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numba import from_dtype, types
 
 from ...compiled.rows import record_at, width_of
 from ...kernels import kernel
@@ -37,6 +38,7 @@ LINE_CONTACT = np.dtype([("cell", np.int64), *((name, float) for name in ("xi", 
 """A contact that is found on a line: its cell, place, and whether that moves; on bodies that are not convex by what its
 energy counts, 1 of a maximum or an end and −1 of a minimum, the share of the push that losses have, and F of
 `refweb.effects.contact.nonconvex_contacts`."""
+LineContacts = Annotated[np.ndarray, types.Array(from_dtype(LINE_CONTACT), 1, "C")]
 AWAY, WIDTH = width_of(SPHERE), width_of(SURFACE)
 """First column of the vectors; number of columns of a `SURFACE`."""
 

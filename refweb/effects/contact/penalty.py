@@ -23,11 +23,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled.rows import record_at
-from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, Indices, Matrix, Vector, kernel
 from ...net.rotation import times_transposed, to_quaternion
 from ..base import TOUCH
 from ..vectors import cross, dot
-from .contact_points import hessian_times, place_moves, places, reaching, window
+from .contact_points import hessian_times, place_moves, places, reaching, window, within_of
 from .nearest_point import lightness, point, share
 from .pair import LINE_CONTACT, lever_of, pair_of, pairing, power_of_depth
 from .rotational_stiffness import add_moments, add_push, add_rotation, set_arms
@@ -98,19 +98,22 @@ class Foreseen(NamedTuple):
 
 
 @functools.cache
-def foresight(depth, spins=0):
-    """Kernel ``(careful, reach, speed, x, mass, cells, data, c, nodes, functions)`` of what is `Foreseen` of a cell.
+def foresight(depth, spins, pieces, nodes, functions):
+    """Kernel ``(careful, reach, speed, x, mass, cells, data, c)`` of what is `Foreseen` of a cell.
 
     It goes no deeper than ``reach`` and the energy of what meets at this speed allow; unless ``careful``, only by
-    `SHALLOW` of that, and not beyond twice the depth that it already has. ``depth`` is the kernel of the bodies,
-    ``spins`` as in `refweb.effects.contact.pair.pairing`.
+    `SHALLOW` of that, and not beyond twice the depth that it already has. Arguments are those of
+    `refweb.effects.contact.contact_points.places`.
     """
-    (within, deepest, *_), reaches = places(depth, spins), reaching(depth, spins)
+    deepest = places(depth, spins, pieces, nodes, functions).deepest
+    within, reaches = within_of(depth, spins), reaching(depth, spins)
 
-    @kernel()
-    def depth_ahead(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
+    @kernel(apart=())
+    def depth_ahead(
+        careful: bool, reach: float, speed: float, x: Matrix, mass: Vector, cells: Indices, data: Matrix, c: int
+    ) -> Foreseen:
         reduced_mass, body, pair = 0.0, mass[cells[c, nodes]], pair_of(data, c, nodes)
-        xi, deep = deepest(x, cells, data, c, nodes, functions)
+        xi, deep = deepest(x, cells, data, c)
         first = within(x, cells, data, c, nodes, functions, 0.0).depth
         last = within(x, cells, data, c, nodes, functions, 1.0).depth
         _, d, _ = point(x, cells, data, c, nodes, functions, xi)
@@ -202,16 +205,16 @@ def kernels(depth, pieces, nodes, functions, spins=0):
         2 where the last rows of a cell are those of the rotation of the body, else 0.
     """
     arity, paired = nodes + 1 + spins, pairing(spins)
-    _, _, contacts, touch_of, limit = places(depth, spins)
-    depth_ahead = foresight(depth, spins)
+    _, contacts, touch_of, limit = places(depth, spins, pieces, nodes, functions)
+    depth_ahead = foresight(depth, spins, pieces, nodes, functions)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         buffer = np.empty(limit * pieces, LINE_CONTACT)
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
-                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
+            for n in range(contacts(x, cells, data, first, buffer)):
+                touch = touch_of(x, cells, data, buffer, n)
                 c, push = touch.c, push_of(touch)
                 shows = record_at(TOUCH, out, c, 0)
                 shows.value = max(shows.value, touch.spot.depth)
@@ -231,8 +234,8 @@ def kernels(depth, pieces, nodes, functions, spins=0):
         buffer = np.empty(limit * pieces, LINE_CONTACT)
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
-                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
+            for n in range(contacts(x, cells, data, first, buffer)):
+                touch = touch_of(x, cells, data, buffer, n)
                 pair, deep = touch.pair, touch.spot.depth
                 stored = pair.stiffness / (pair.exponent + 1.0) * power_of_depth(pair.exponent, deep) * deep
                 out[touch.c] += touch.weight * window(pair.once, touch.xi, touch.inner)[0] * stored
@@ -244,8 +247,8 @@ def kernels(depth, pieces, nodes, functions, spins=0):
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             pushes[:] = 0.0
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
-                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
+            for n in range(contacts(x, cells, data, first, buffer)):
+                touch = touch_of(x, cells, data, buffer, n)
                 if definite and touch.weight < 0.0:
                     continue
                 place_moves(touch, touch.inner and not definite, nodes, functions, z)
@@ -265,7 +268,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            ahead = depth_ahead(True, reach, speed, x, mass, cells, data, c, nodes, functions)
+            ahead = depth_ahead(True, reach, speed, x, mass, cells, data, c)
             if ahead.depth > 0.0:
                 add_row_sums(rates, ahead, speed, mass, cells, data, c, nodes, spins)
 
