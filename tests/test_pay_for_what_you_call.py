@@ -9,6 +9,7 @@ compiled loop is called with.
 import importlib.util
 import itertools
 import json
+import os
 import subprocess
 import sys
 import tomllib
@@ -33,7 +34,19 @@ DEFAULT = [{"quantity": quantity} for quantity in ("displacement", "stress", "te
 """What a scene observes that does not say."""
 BASE = ("numpy", "numba", "numba.core.typing.cffi_utils", "platformdirs")
 """Libraries of every scene; each brings others along, and numba a part of its own once it types a function."""
-LOADED = "print(json.dumps(sorted(sys.modules)))"
+LOADED = "print(json.dumps(sorted(sys.modules)), flush=True)"
+PARENT = f"""
+import json, os, sys
+import {", ".join(BASE)}
+for line in sys.stdin:
+    child = os.fork()
+    if not child:
+        exec(json.loads(line))
+        {LOADED}
+        os._exit(0)
+    print(json.dumps(os.waitpid(child, 0)[1]), flush=True)
+"""
+"""A process with the libraries of every scene, which take most of the time of a short run: its children run lines."""
 
 
 def run(*lines):
@@ -41,6 +54,28 @@ def run(*lines):
     program = "\n".join(["import json, sys", *lines, LOADED])
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+@pytest.fixture(scope="module")
+def run_with_base():
+    """The same as `run`, in a child of one process that has loaded `BASE`, where there is a fork."""
+    if not hasattr(os, "fork"):
+        yield run
+        return
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", PARENT], **pipes) as p:
+
+        def run_in_child(*lines):
+            p.stdin.write(json.dumps("\n".join(lines)) + "\n")
+            p.stdin.flush()
+            modules = None
+            while isinstance(printed := json.loads(p.stdout.readline()), list):
+                modules = set(printed)
+            assert printed == 0 and modules is not None
+            return modules
+
+        yield run_in_child
+        p.stdin.close()
 
 
 def libraries(modules):
@@ -245,13 +280,13 @@ ALIKE = (
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in ALIKE)) for n in SCENES])
-def test_a_run_loads_what_its_scene_calls_for(name):
+def test_a_run_loads_what_its_scene_calls_for(name, run_with_base):
     given = SCENES[name]
     modules, outside = called(given)
     scene = f"refweb.Scene.from_dict(json.loads({json.dumps(given)!r}), {str(SHIPPED_SCENES)!r})"
-    loaded = run("import refweb", f"refweb.run({scene})")
+    loaded = run_with_base("import refweb", f"refweb.run({scene})")
     if "scipy.linalg" in loaded and "scipy.linalg" not in brought(*outside):  # numba loads it to compile
-        loaded = run("import refweb", f"refweb.run({scene})")
+        loaded = run_with_base("import refweb", f"refweb.run({scene})")
     own = {m.removeprefix("refweb.") for m in loaded if m.startswith("refweb.")}
     assert own == modules, f"not called for: {sorted(own - modules)}, not seen: {sorted(modules - own)}"
     assert libraries(loaded) <= brought(*outside), sorted(libraries(loaded) - brought(*outside))

@@ -1,6 +1,7 @@
 """Print the JSON Schema of scene files, by which editors check and complete them."""
 
-# This docstring is the help of the verb; `reference.schema` makes all that is printed.
+# This docstring is the help of the verb; `reference.schema` makes all that is printed. The command line finds
+# the verb by the name of this file, and calls `add_arguments` and `run`.
 
 import sys
 

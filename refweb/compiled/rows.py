@@ -4,7 +4,9 @@ All terms of the compiled loop take matrices, so that one loop serves every comb
 columns of a matrix; its fields are numbers or arrays of one type. A row may have more columns before and after those of
 a record.
 
-Fields are eight bytes wide, since columns count numbers; `record_at` reads memory without a check of its bounds.
+Fields are eight bytes wide, since columns count numbers; `record_at` reads memory without a check of its bounds. All
+effects with data of more than one column rely on the four functions of dtypes and on `record_at`; the way in which an
+intrinsic builds its address is free.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 The first run is always completed, since there is no result before. A further run is not begun if it is expected to
 exceed the remaining budget, and it is ended if it will exceed it.
 
-`runner`, `expected_cost` and `studies.further_runs` use this file; tests replace `clock` by a count of steps.
+`runner`, `expected_cost` and `studies.further_runs` use this file; tests replace `clock` by a count of steps. The help
+text of `settings.Accuracy` names `LEAST` and `RUNS` in words.
 """
 
 from __future__ import annotations

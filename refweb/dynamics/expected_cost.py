@@ -1,6 +1,7 @@
 """Expected cost of an explicit run: its step, the cause of that step, and the CPU time.
 
-`ruling` follows `integrators.step_bound` with the same kernels, and both change together; texts are free.
+`refweb check` prints the text of `expected_cost`, and `refweb warm` calls it to compile its kernels. `ruling` follows
+`integrators.step_bound` with the same kernels, and both change together; texts are free.
 """
 
 from __future__ import annotations

@@ -1,4 +1,11 @@
-"""Kernels of the segments of threads, which terms of threads share: vector, stiffness across, and energy."""
+"""Kernels of the segments of threads, which terms of threads share: vector, stiffness across, and energy.
+
+Data of a cell have ``width`` columns of a record, 1/A, and four columns for each segment s from ``width + 1 + 4 s`` on:
+its vector in the web's position and the length of it [m].
+
+`thread` and `thread_friction` write these columns and call the kernels, so that the layout changes in all three; how a
+kernel computes its numbers is free.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """The page of a run: one HTML file without other files, from a result folder or a solution.
 
-`page.html` has the names that `filled` gives; contents are found by the form of `markup.section`.
+`page.html` has the names that `filled` gives; contents are found by the form of `markup.section`. Scripts run in the
+order of `SCRIPTS`. The hash of a script is that of its text between the tags of `page.html`, line breaks included.
 """
 
 from __future__ import annotations

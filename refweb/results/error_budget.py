@@ -16,7 +16,8 @@ Every verdict follows from ± and the parts alone:
 
 A result has n digits if ± is at most 10^−n of its value. There is no verdict if ± is small and a part is not estimated.
 
-Parts and verdicts stand in `run.json` and `results.csv`; a new part needs words, and a colour of `pictures.sheet`.
+Parts and verdicts stand in `run.json` and `results.csv`; a new part needs words, and a colour of `pictures.sheet`. The
+runs that show smoothing have `SMOOTHING_SHARE` of it, to which `SMOOTHED` belongs.
 """
 
 from __future__ import annotations
@@ -46,9 +47,10 @@ ALLOWED = 0.1
 SMOOTHING_SHARE = 0.1
 """Smoothing of the runs that show the error of smoothing, over that of the scene."""
 SMOOTHED = 1.32
-"""Error of smoothing over the error that a run with a tenth of it shows, if errors are proportional to η.
+"""Factor on the error of smoothing that follows from a run with a tenth of η, if errors are proportional to η.
 
-For nets that are flat and slack errors are proportional to √η, and a tenth of η leaves √0.1 of them."""
+That error is the difference of both runs over 0.9. In nets that are flat and slack, errors are proportional to √η: it
+is the difference over 1 − √0.1, which is 1.32 times as much."""
 FAR_WITHIN = 1e-2
 """Value over its ± up to which it may be zero, as by symmetry: no smaller ± leaves a digit of it."""
 ZERO = 1e-14

@@ -25,6 +25,9 @@ a ball takes 65 factorizations from its start, and is not found with w a hundred
 Dynamics has the force of the deepest element alone. Damped, it comes to the same rest, and goes to and fro about it by
 the way of a step.
 
+`load_steps` calls `SharedPush.equilibrium`; w and its limits change the cost and no result. Names of
+cached properties that the copy of a system drops are those of `refweb.system.system.System`.
+
 References
 ----------
 .. [1] F. H. Clarke, "Optimization and Nonsmooth Analysis", SIAM 1990, chapter 2, doi:10.1137/1.9781611971309.
@@ -47,8 +50,9 @@ from .newton import Newton
 WIDEST, NARROWEST = 100.0, 1e-3
 """w over the energy of a line at the start, and at last: rounding of energies over w is an error of shares."""
 STIFF = 2e-6
-"""Least w over the energy of a line, over the radius and under the depth of the largest force: where contact is stiff,
-rounding of the depth moves shares more."""
+"""Least w over the energy of a line, times the depth F/k of the largest force over the radius.
+
+Where contact is stiff, that depth is small against the radius, and its rounding moves shares more."""
 NARROWER = 0.1
 """Factor on w from one round to the next."""
 NEGLIGIBLE = 1e-3

@@ -1,6 +1,7 @@
 """An independent method for `refweb.studies.work_precision`: scipy's DOP853 with the same forces.
 
-It shares forces with the methods of refweb and no integrator, so that it stays an independent reference.
+It shares forces, monitors and starts with the methods of refweb and no formula for a step, so that it stays an
+independent reference. `trials`, `cost` and `diagram` read `NAME` and `TOLERANCES`; other tolerances only move points.
 """
 
 from __future__ import annotations

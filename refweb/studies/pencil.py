@@ -5,7 +5,8 @@ on (K − σM)⁻¹ with σ just below the wanted ω², so that a thousand slack
 none is missed, which matters where symmetry makes frequencies double. Nodes without mass have no frequency and follow
 the others.
 
-`spectrum` and `turning` call these methods; without the count of pivots after a search modes may be missed.
+`spectrum` and `turning` call these methods; without the count of pivots after a search modes may be missed. Methods
+that use a factor need a shift before, by `bend` or `above`. `DENSE` decides only what is quicker.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ class Pencil:
         return self._factor.negative_pivots()
 
     def beside(self, low, sign):
-        """A shift of a sign with at most ``low`` eigenvalues below; the next is within 1.5 times the shift."""
+        """A shift of a sign with at most ``low`` eigenvalues below it; the next one is within 1.5 times the shift."""
         near, far = 1e-24 * self._top, self._top
         while far > 1.5 * near:
             middle = np.sqrt(near * far)

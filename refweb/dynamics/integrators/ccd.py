@@ -17,7 +17,8 @@ order 2, and cut in the same way. Lines that pass in one of its drifts neverthel
 steps limits the approach of two bodies, see `refweb.effects.contact.pair_overlap`.
 
 `features` gives the names in ``apart``, `records` the fields of ``model`` and ``running``; `line_body_ccd` sets
-``met[3]``, and `central_difference` reads ``met[4]``. No change may miss a meeting.
+``met[3]``, and `central_difference` reads ``met[4]``; `explicit_loop` uses `SHORTER` and `LEAST`. The first three
+numbers of ``met`` are rows that meet. `FEW` and `CALM` decide only how often is checked. No change may miss a meeting.
 """
 
 from __future__ import annotations

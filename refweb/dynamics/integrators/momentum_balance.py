@@ -56,8 +56,10 @@ if TYPE_CHECKING:
     from .records import ForceTerms
 
 CLOSURE = 1e-6
-"""Largest momentum that an explicit run may miss, over the largest of the run: 1e4 roundings in each of 1e6 steps, of
-any sign. A web whose momentum is below this share of what its stiffness makes of roundings is at rest."""
+"""Largest momentum that an explicit run may miss, over the largest of the run.
+
+It is that of 1e4 roundings of 1e-16 in each of 1e6 steps if all have one sign. A web whose momentum is below this share
+of what its stiffness makes of roundings is at rest. A larger value would miss more, a smaller one refuse long runs."""
 ROUNDINGS = 8.0 * np.finfo(float).eps
 """Force that each line may have too much by rounding, over its EA."""
 

@@ -4,7 +4,8 @@ A method takes steps of its own choice and knows its state anywhere within the l
 rows, is looked at in its middle and at its end: for extremes and events, and for the integrals of power and of the
 supports' forces by Simpson's rule. A flag of success is not believed: the book of energies is checked at every row.
 
-Plug-ins derive from `StepObserver` and use its public names; a checkpoint keeps ``stats`` by their order.
+Plug-ins derive from `StepObserver` and use its public names; a checkpoint keeps ``stats`` by their order. Simpson's
+weights stand in `simpson_balance`; `PATIENCE` and `BREATH` are free.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ sin²(π ξ). Each contact has the energy k/(p + 1) W δ^(p + 1). Since ξ is an
 With G = ∂δ/∂y at the contact point y, it is −k W δ^p G on the body with the skeleton, and the opposite on the other
 body, both at y. Therefore momentum and angular momentum are conserved to rounding.
 
-`bodies` writes `BODIES` and `SIDE` by position; friction remembers forces by ``slot``, of which a part has three.
+`bodies` writes `BODIES` and `SIDE` by position, `BEHIND` follows from two nodes of a line; friction remembers forces by
+``slot``, of which a part has three. Fields of `BODY_CONTACT` are read by name, and more `SAMPLES` only cost time.
 """
 
 from __future__ import annotations
@@ -43,10 +44,13 @@ SIDE = np.dtype(
         ("touched", float, (PAIR_WIDTH,)),
     ]
 )
-"""Data of one of two bodies: its axes at the start, the centre of its shape, number of rows of its rotation that count,
-and what `refweb.effects.contact.pair.Pair` has; greatest distance of its surface from its row [m]; whether it moves;
-least distance from its middle to its surface [m]; number of parts, and the column of the first; what
-`refweb.effects.contact.pair.pair_of` reads of the body as one that is touched, without axes."""
+"""Data of one of two bodies.
+
+``axes`` are those at the start, ``offset`` is the centre of the shape from the row [m], ``spins`` the number of rows of
+its rotation that count; ``planar``, ``mobility`` and ``lever`` are as in `refweb.effects.contact.pair`. ``extent`` is
+the greatest distance of its surface from its row and ``thick`` the least from its middle [m]; ``free`` is 1 if it
+moves. ``parts`` is the number of its parts and ``begin`` the column of the first. `refweb.effects.contact.pair.pair_of`
+reads ``touched`` of a body that is touched, without axes."""
 BODIES = np.dtype([("room", float), ("away", float, (3,)), ("sides", SIDE, (2,))])
 """Data of a pair: number of contacts there is room for, the first body's row from the second's at the start [m], and
 both sides; behind these stand their parts, see `refweb.net.skeleton.PART`."""
@@ -66,9 +70,11 @@ BODY_CONTACT = np.dtype(
         ("slot", np.int64),
     ]
 )
-"""A contact: its point from each body's row [m]; G, as from the first body into the second; depth [m]; by what its
-energy counts, and its losses; how far from its point, along G, the bodies touch [m]; whether its place moves; which
-contact of the pair it is."""
+"""A contact.
+
+``points`` are from each body's row [m], ``normal`` is G, as from the first body into the second, ``depth`` is in m. Its
+energy counts by ``weight`` and its losses by ``share``. The bodies touch at the distance ``down`` from the point along
+G [m]. ``inner`` is 1 where its place changes as the bodies move, and ``slot`` is its number in the pair."""
 BodyContacts = Annotated[np.ndarray, types.Array(from_dtype(BODY_CONTACT), 1, "C")]
 
 

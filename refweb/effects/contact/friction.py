@@ -13,7 +13,9 @@ matrices A = ∂F/∂y and B = ∂F/∂u, tangents follow from dF = A dy + B du 
 of ξ. `refweb.effects.contact_solver` solves for F in explicit kicks.
 
 `contact_solver.friction_law` solves the same law in explicit kicks, so that both change together; `pair` has the layout
-of ``data``, and ``out`` has the power [W] and the force on the body [N].
+of ``data``, and ``out`` has the power [W] and the force on the body [N]. `table` unpacks force, stiffness, bound and
+damping in this order; numbers of the bound may grow, and make steps shorter then. `facing` gives −n, as the law has
+only products of two n.
 
 References
 ----------

@@ -13,7 +13,8 @@ The library trimesh 5.2 finds the volume of 8 of the 14 faulty solids in ``tests
 manifold3d it finds all, but keeps gaps: between two boxes at a distance of 1e-6 m it gives a depth of 1 mm, and 99 mm
 is that of one solid.
 
-Texts in `remarks` become warnings of a run; `COARSE`, `SMALL` and `GAP` change depth and mass of faulty solids.
+Texts in `remarks` become warnings of a run, and may change. `COARSE`, `SMALL`, `GAP`, `FLAT`, `LOOP` and `SUMMED`
+change depth and mass of faulty solids. Callers read the fields of `Repaired` by name.
 """
 
 from __future__ import annotations
