@@ -9,6 +9,7 @@ PACKAGES : set of str
 """
 
 import ast
+import functools
 import pathlib
 from collections.abc import Mapping
 
@@ -69,9 +70,15 @@ def imported(name, node):
     return [f"{base}.{alias.name}" for alias in node.names]
 
 
+@functools.cache
+def nodes_of(name):
+    """All nodes of a module, as `ast.walk` finds them."""
+    return tuple(ast.walk(MODULES[name]))
+
+
 def imports(name, tree=None):
     """Absolute names of all imports in a module."""
-    nodes = ast.walk(MODULES[name] if tree is None else tree)
+    nodes = nodes_of(name) if tree is None else ast.walk(tree)
     return [found for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) for found in imported(name, node)]
 
 
@@ -84,6 +91,7 @@ def at_head(tree):
             yield from at_head(node)
 
 
+@functools.cache
 def uses(name, tree=None):
     """Modules of the package that a module imports, or a part of it, the longest name that is one."""
     found = set()

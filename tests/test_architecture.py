@@ -12,7 +12,7 @@ import re
 import subprocess
 
 import pytest
-from import_graph import MODULES, PACKAGES, at_head, imports, uses
+from import_graph import MODULES, PACKAGES, at_head, imports, nodes_of, uses
 
 import refweb
 from refweb.registry import EFFECTS
@@ -107,8 +107,8 @@ EFFECT = re.compile(r"(?:refweb\.)?effects\.([\w.]+)")
 
 def texts(name):
     """Texts in a module's code, docstrings left out."""
-    bare = {id(node.value) for node in ast.walk(MODULES[name]) if isinstance(node, ast.Expr)}
-    nodes = (node for node in ast.walk(MODULES[name]) if isinstance(node, ast.Constant) and id(node) not in bare)
+    bare = {id(node.value) for node in nodes_of(name) if isinstance(node, ast.Expr)}
+    nodes = (node for node in nodes_of(name) if isinstance(node, ast.Constant) and id(node) not in bare)
     return [node.value for node in nodes if isinstance(node.value, str)]
 
 
@@ -214,7 +214,7 @@ FUNCTIONS = ast.FunctionDef | ast.AsyncFunctionDef
 
 def functions(name):
     """Functions of a module, at any depth, and whether each is a factory: one that defines kernels inside of it."""
-    for node in ast.walk(MODULES[name]):
+    for node in nodes_of(name):
         if isinstance(node, FUNCTIONS):
             inner = [n for n in ast.walk(node) if isinstance(n, FUNCTIONS) and n is not node]
             yield node, any("kernel" in ast.unparse(decorator) for n in inner for decorator in n.decorator_list)

@@ -8,7 +8,7 @@ import inspect
 import itertools
 import re
 
-from import_graph import MODULES
+from import_graph import MODULES, nodes_of
 
 BARE = set(
     "told found own one other most least whole way room place look note give take meet keep held shown seen here "
@@ -23,9 +23,9 @@ SENTENCE = re.compile(r"(?:^|[.:;?!]\s+)((?:What|Whether)\s.*?)(?=[.:;?!]\s|$)")
 """Sentence that begins with a what-clause, in a passage on one line."""
 
 
-def defined(tree):
+def defined(name):
     """Names that a module defines, with their lines."""
-    for node in ast.walk(tree):
+    for node in nodes_of(name):
         if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
             yield node.id if isinstance(node, ast.Name) else node.attr, node.lineno
         elif isinstance(node, ast.arg):
@@ -37,8 +37,8 @@ def defined(tree):
 def test_names_say_what_they_are():
     bare = [
         f"{word} in line {line} of {name}"
-        for name, tree in MODULES.items()
-        for word, line in defined(tree)
+        for name in MODULES
+        for word, line in defined(name)
         if word.strip("_") in BARE - CONTRACT.get(name, set())
     ]
     assert not bare
@@ -47,8 +47,8 @@ def test_names_say_what_they_are():
 def test_docstrings_say_what_they_are():
     parts = [
         (name, node)
-        for name, tree in MODULES.items()
-        for node in ast.walk(tree)
+        for name in MODULES
+        for node in nodes_of(name)
         if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module)
     ]
     texts = [(name, text) for name, node in parts if (text := ast.get_docstring(node))]
@@ -73,8 +73,8 @@ def passages(text):
 def test_no_sentence_begins_with_a_what_clause():
     texts = [
         (name, node.value.value)
-        for name, tree in MODULES.items()
-        for node in ast.walk(tree)
+        for name in MODULES
+        for node in nodes_of(name)
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
     ]
     clauses = [
