@@ -98,6 +98,8 @@ EXAMPLES = {
         dict(thread="rope", end="first", tension=10.0, speed_limit=0.02),
         dict(thread="rope", end="last", speed=[(0.0, 0.1), (1.0, 0.05)], limit=4.0),
         dict(thread="rope", at=4, tension=10.0, speed_limit=0.02),
+        dict(thread="rope", end="last", power=0.1, speed_limit=0.05),
+        dict(thread="rope", at=4, power=-0.3, speed_limit=0.02),
     ],
     "Reel": [
         dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
@@ -196,8 +198,17 @@ def test_effect(name, i, law, seed):
         return constraint(net, system, seed)
     assert system.terms
     for terms in potentials(system):
-        alone = SimpleNamespace(on=lambda _, terms=terms: terms)
-        check_term(net, System(net, [alone], np.zeros(net.points.shape, dtype=bool)), terms[0], seed)
+        check_term(net, alone(system, terms), terms[0], seed)
+
+
+def alone(system, terms):
+    """The system of some terms of another one, with its internal variables."""
+    net = system.net
+    one = System(net, [SimpleNamespace(on=lambda _: terms)], np.zeros(net.points.shape, dtype=bool))
+    first = len(net.points) - net.internal
+    one.supported[first:] = system.supported[first:]
+    one.arrange()
+    return one
 
 
 def potentials(system):
@@ -324,8 +335,7 @@ def check_derivatives(name, i, law, place):
     set_internal(net, x, 0.02)  # arms that have crept: without, all are at their kink
     d, t = noise[1], 0.7
     for terms in potentials(system):
-        alone, term = SimpleNamespace(on=lambda _, terms=terms: terms), terms[0]
-        one = System(net, [alone], np.zeros(net.points.shape, dtype=bool))
+        one, term = alone(system, terms), terms[0]
         d = np.where(one.supported, 0.0, d)
         force = one.force(t, x, v)
         assert np.isfinite(force).all()

@@ -166,6 +166,7 @@ EFFECTS = {
                 "speed": SIGNED,
                 "limit": ANY,
                 "tension": ANY,
+                "power": SIGNED,
                 "speed_limit": ANY,
             },
         ),

@@ -136,6 +136,8 @@ def roots(given, method):
         yield from ("effects.around", "effects.half_turns", "effects.winding")
     if "winch" in given or any("friction" in thread for thread in given.get("thread", ())):
         yield from ("effects.thread_friction", "effects.thread_slips")
+    if any("power" in winch for winch in given.get("winch", ())):
+        yield "effects.winch_power"
     if any(reel.get("mass") == "follows" for reel in given.get("reel", ())):
         yield "system.material_flow"
     if any(shape in ("cylinder", "box") and "mass" in body for shape, body in zip(shapes, bodies, strict=True)):
@@ -514,6 +516,17 @@ def test_kernels_of_friction(handed, monkeypatch):
     monkeypatch.setitem(TABLES, "contact", {**TABLES["contact"], "friction": 0.3})
     rubbing = {**summed("contact"), "force": 3, "energy": 3, "bound": 3, **dict.fromkeys(SOLVED, 1)}
     assert handed("contact") == rubbing
+
+
+def test_what_a_winch_of_constant_power_adds(handed, monkeypatch):
+    """A term that takes its two unknowns over a step, and these in the pattern, with nodes of the thread."""
+    others = entries("winch")
+    rows = scene_of("winch").build().rows
+    monkeypatch.setitem(TABLES, "winch", {"thread": "rope", "end": "last", "power": 10.0, "speed_limit": 1.0})
+    powered = summed("winch")
+    assert handed("winch") == {which: number + (which in (*TERM, "relax")) for which, number in powered.items()}
+    more = entries("winch") - others
+    assert others < entries("winch") and all(max(i, j) // 3 >= rows - 3 for (i, j) in more)
 
 
 @pytest.mark.parametrize("name", KERNELS)

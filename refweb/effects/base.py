@@ -270,9 +270,9 @@ class InternalVariables(NamedTuple):
     components : ndarray of int, shape (variables,)
         3 row + axis of each.
     elements : ndarray of int, shape (variables,)
-        Element of each.
+        Element of each; −1 for one of none, as of a thread.
     resistance : ndarray, shape (variables,)
-        c over the natural length of the element.
+        c over the natural length of the element, without one c.
     relax : kernel
         Takes them over a step of an explicit method.
     space : int
@@ -292,6 +292,11 @@ class InternalVariables(NamedTuple):
     space: int
     title: str
     follower: Any = None
+
+    def joined(self, others: InternalVariables) -> InternalVariables:
+        """These and others that stand behind them, as unknowns of one system."""
+        names = "components", "elements", "resistance"
+        return self._replace(**{name: np.append(getattr(self, name), getattr(others, name)) for name in names})
 
 
 def with_rows(net: Net, count: int) -> Net:

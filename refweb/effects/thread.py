@@ -372,7 +372,11 @@ class Thread(Table):
             return _term(thread)
         from .thread_friction import terms
 
-        return terms(thread)
+        if not thread.powered:
+            return terms(thread)
+        from .winch_power import with_power
+
+        return with_power(thread, terms(thread))
 
 
 def _term(thread: ThreadLine):

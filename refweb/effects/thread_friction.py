@@ -29,8 +29,9 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -71,15 +72,31 @@ if TYPE_CHECKING:
     from ..net.threads import ThreadLine
 
 
+class FrictionKernels(NamedTuple):
+    """Kernels of a thread with friction, whose signatures are in `refweb.kernels`.
+
+    Attributes
+    ----------
+    force, kept, stiffness, bound, gone, relax, taken : kernel
+        Force, strain energy, stiffness, bound, energy lost, relaxation, and the energy that a winch has taken.
+    pulled_over, tension_slopes : kernel
+        Configurational force at a winch, and slopes of tensions.
+    """
+
+    force: Callable[..., Any]
+    kept: Callable[..., Any]
+    stiffness: Callable[..., Any]
+    bound: Callable[..., Any]
+    gone: Callable[..., Any]
+    relax: Callable[..., Any]
+    taken: Callable[..., Any]
+    pulled_over: Callable[..., Any]
+    tension_slopes: Callable[..., Any]
+
+
 @functools.cache
 def kernels(law, record, width):
-    """Force, strain energy, stiffness, bound, lost energy and relaxation kernels.
-
-    Parameters
-    ----------
-    law, record, width
-        As in `refweb.effects.thread.kernels`.
-    """
+    """The `FrictionKernels` of the parameters of `refweb.effects.thread.kernels`."""
     energy_density, segment = law.energy_density, segment_kernel(width)
     find_slips = return_mapping(law, record, width)
     first_of, _, turn_of = layout_kernels(width)
@@ -215,12 +232,14 @@ def kernels(law, record, width):
 
     @kernel()
     def slip_slopes(x, cells, data, c, w, rings, a, b):
-        """Write ∂δ/∂x of each ring to b."""
+        """Write ∂δ/∂x of each ring to b, and in its last column ∂δ/∂δ of a last ring that sticks."""
         choose(w, rings, True)
         matrix(w, rings, a)
         for r in range(rings):
             for m in range(b.shape[1]):
                 b[r, m] = 0.0
+            if r == rings - 1 and w[MODE, r] == 0.0:
+                b[r, b.shape[1] - 1] = 1.0
             if abs(w[MODE, r]) != 1.0:
                 continue
             low, high = sides(w, r)
@@ -240,31 +259,41 @@ def kernels(law, record, width):
             turn_slopes(x, cells, data, c, r, w, -w[MODE, r] * friction * w[KAPPA, r] * w[TENSION, high], b)
         eliminate(a, b)
 
+    @kernel()
+    def tension_slopes(x, cells, data, c, w, rings, definite, slopes):
+        """Write ∂T/∂x of each segment, and in the last column that by the slip of a winch that is given."""
+        count, size = cells.shape[1] - 1, 3 * cells.shape[1]
+        a, b = np.zeros((rings, rings)), np.zeros((count, size + 1))
+        if not definite:  # else that of rings that stick, which is symmetric
+            slip_slopes(x, cells, data, c, w, rings, a, b)
+        for s in range(count):
+            p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
+            p = (p0 * inverse, p1 * inverse, p2 * inverse)
+            for m in range(size + 1):
+                before = b[s - 1, m] if s > 0 else b[count - 1, m] * w[HEAD, 0]
+                behind = b[s, m] if s < count - 1 else b[count - 1, m] * w[TAIL, 0]
+                slopes[s, m] = -w[RATE, s] * (before - behind)
+                if 3 * s <= m < 3 * s + 6:
+                    slopes[s, m] += w[SLOPE, s] * p[m % 3] * (-1.0 if m < 3 * s + 3 else 1.0)
+
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         count, size = cells.shape[1] - 1, 3 * cells.shape[1]
-        w = np.empty((ROWS, count))
+        w, slopes = np.empty((ROWS, count)), np.empty((count, size + 1))
         for c in range(cells.shape[0]):
             rings = find_slips(t, x, cells, data, c, w)
-            a, b = np.zeros((rings, rings)), np.zeros((count, size))
-            if not definite:  # else that of rings that stick, which is symmetric
-                slip_slopes(x, cells, data, c, w, rings, a, b)
+            tension_slopes(x, cells, data, c, w, rings, definite, slopes)
             for i in range(size):
                 for j in range(size):
                     blocks[c, i, j] = 0.0
             for s in range(count):
                 p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
-                p, tension = (p0 * inverse, p1 * inverse, p2 * inverse), w[TENSION, s]
+                p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 for m in range(size):
-                    before = b[s - 1, m] if s > 0 else b[count - 1, m] * w[HEAD, 0]
-                    behind = b[s, m] if s < count - 1 else b[count - 1, m] * w[TAIL, 0]
-                    change = -w[RATE, s] * (before - behind)
-                    if 3 * s <= m < 3 * s + 6:
-                        change += w[SLOPE, s] * p[m % 3] * (-1.0 if m < 3 * s + 3 else 1.0)
                     for k in range(3):
-                        blocks[c, 3 * s + k, m] -= p[k] * change
-                        blocks[c, 3 * s + 3 + k, m] += p[k] * change
-                add_across(blocks, c, s, p, tension * inverse)
+                        blocks[c, 3 * s + k, m] -= p[k] * slopes[s, m]
+                        blocks[c, 3 * s + 3 + k, m] += p[k] * slopes[s, m]
+                add_across(blocks, c, s, p, w[TENSION, s] * inverse)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
@@ -288,7 +317,7 @@ def kernels(law, record, width):
                 rates[cells[c, s]] += total
                 rates[cells[c, s + 1]] += total
 
-    return force, kept, stiffness, bound, gone, relax, taken
+    return FrictionKernels(force, kept, stiffness, bound, gone, relax, taken, pulled_over, tension_slopes)
 
 
 def with_slips(net: Net, name: str) -> Net:
@@ -302,32 +331,30 @@ def with_slips(net: Net, name: str) -> Net:
 def terms(thread: ThreadLine) -> list[ForceTerm]:
     """Terms of the tensions, of the energy that is stored and of that which is lost."""
     line, numbers = thread.line, thread.numbers
-    force, kept, stiffness, bound, gone, relax, taken = kernels(
-        line.law, line.law_record, line.line_data.matrix.shape[1]
-    )
+    acting = kernels(line.law, line.law_record, line.line_data.matrix.shape[1])
     friction = np.array([thread.first, thread.ends, *thread.friction, *thread.winch], dtype=float)
     of_thread = {"name": "thread", "cells": thread.rows[None, :], "data": np.append(numbers, friction)[None, :]}
     tension = ForceTerm(
         **of_thread,
-        force=force,
-        tangent=Tangent(stiffness, bound, symmetric=False, across=thread.across),
+        force=acting.force,
+        tangent=Tangent(acting.stiffness, acting.bound, symmetric=False, across=thread.across),
         balance=Balance("strain_energy", internal=True),
         timing=Timing(thread.corners),
         observed=COLUMNS + len(thread.distances) + thread.rings,
     )
-    stored = ForceTerm(**of_thread, force=no_force, energy=kept, balance=Balance("strain_energy", internal=True))
+    stored = ForceTerm(**of_thread, force=no_force, energy=acting.kept, balance=Balance("strain_energy", internal=True))
     none = np.zeros(0, dtype=np.int64)
-    slips = Slips(thread, relax, of_thread["cells"], of_thread["data"])
+    slips = Slips(thread, acting.relax, of_thread["cells"], of_thread["data"])
     lost = ForceTerm(
         **of_thread,
         force=no_force,
-        energy=gone,
+        energy=acting.gone,
         balance=Balance("dissipated_energy", internal=True),
-        internal=InternalVariables(none, none, np.zeros(0), relax, 0, "[[thread]] friction", slips),
+        internal=InternalVariables(none, none, np.zeros(0), acting.relax, 0, "[[thread]] friction", slips),
     )
     if not thread.winch:
         return [tension, stored, lost]
-    wound = ForceTerm(**of_thread, force=no_force, energy=taken, balance=Balance("winch_energy", internal=True))
+    wound = ForceTerm(**of_thread, force=no_force, energy=acting.taken, balance=Balance("winch_energy", internal=True))
     return [tension, stored, lost, wound]
 
 

@@ -4,11 +4,12 @@ A closed thread with a winch is one that begins and ends at the drum: one end is
 
 A winch is one more ring of its thread, behind which is any amount of material. Its slip in a step follows with those of
 the other rings, see `refweb.effects.thread_slips`: it hauls in up to a tension, pays out from a tension
-on, and stays between the two, all that beside what its speed asks for and within its largest speed.
+on, and stays between the two, all that beside what its speed asks for and within its largest speed. That of a winch of
+constant power has a rate of its own, see `refweb.effects.winch_power`.
 
 Numbers of a winch: the tensions up to which it hauls in and from which it pays out [N], its largest speed beside the
 one that is asked for [m/s], 1 in statics, where time does not pass, the number of rows of its table of speeds, and
-these rows, of time [s] and speed [m/s].
+these rows, of time [s] and speed [m/s]; in dynamics those of a constant power behind them.
 """
 
 from __future__ import annotations
@@ -41,11 +42,11 @@ def _one_or_table(name, value):
 class Winch(Table):
     """A winch at an end of a thread, or at a node of a closed one, its drum: it hauls material in and pays it out.
 
-    ``speed`` or ``tension`` says how. A line on a winch is a thread of two nodes. Energy that the winch takes from the
-    web is ``winch_energy``: heat of a brake is positive, work of a motor negative. Mass of the thread stays at its
-    nodes. For lines whose mass follows, or many of which change alike, see ``[[reel]]``. A ``slip`` whose ``ring`` is
-    the node of the drum is the length that has gone over it. Explicit steps are of order 1 where a winch at its
-    ``speed_limit`` turns round, and of order 2 else.
+    ``speed``, ``tension`` or ``power`` says how. A line on a winch is a thread of two nodes. Energy that the winch
+    takes from the web is ``winch_energy``: heat of a brake is positive, work of a motor negative. Mass of the thread
+    stays at its nodes. For lines whose mass follows, or many of which change alike, see ``[[reel]]``. A ``slip`` whose
+    ``ring`` is the node of the drum is the length that has gone over it. Explicit steps are of order 1 where a winch
+    with ``tension`` at its ``speed_limit`` turns round, and of order 2 else.
 
     A closed thread, such as a drawstring, is tied to the drum and wound on it from one side. Its segments and rings
     count from the drum: the first segment leaves it, and the last ring is the drum again. With friction the tension
@@ -72,13 +73,19 @@ class Winch(Table):
         Tension that the winch holds [N], at any speed up to ``speed_limit``. In statics it holds it whatever length of
         thread that takes; with ``start = "equilibrium"`` as well, but for one with a ``speed_limit``, which begins as
         the web is.
+    power : float, optional
+        Power that the web gets [W], without the strain energy of what is wound; negative to pay out. The speed is power
+        over tension, up to ``speed_limit``. A load that sinks at a constant power goes faster and faster, up to the
+        limit. In statics, and with ``start = "equilibrium"``, the winch stays as it is.
     speed_limit : float, optional
-        Largest speed with ``tension`` [m/s], in and out; by default none. At it the tension is lower or higher.
+        Largest speed with ``tension`` or ``power`` [m/s], in and out; by default none. With ``tension`` the tension is
+        lower or higher at it. ``power`` needs one, since a slack thread has no tension.
 
     Raises
     ------
     InputError
-        For none or both of ``speed`` and ``tension``, a ``limit`` without ``speed``, and a ``speed_limit`` with it.
+        For none or several of ``speed``, ``tension`` and ``power``, a ``limit`` without ``speed``, a ``speed_limit``
+        with it, and ``power`` without one.
         From ``extend``, for a thread that the scene does not have, that is open and has no ``end``, or has ``at``, that
         does not run through ``at``, has a winch already, a law that pushes, neighbours in one point or no more material
         for a speed.
@@ -93,7 +100,7 @@ class Winch(Table):
     """
 
     several = True
-    either = ("speed",), ("tension",)
+    either = ("speed",), ("tension",), ("power", "speed_limit")
 
     thread: str = text(limit=80)
     end: str | None = choice("first", "last", default=None)
@@ -101,17 +108,26 @@ class Winch(Table):
     speed: Any = field(_one_or_table, default=None, unit="m/s")
     limit: float | None = real(default=None, above=0.0, unit="N")
     tension: float | None = real(default=None, above=0.0, unit="N")
+    power: float | None = real(default=None, unit="W")
     speed_limit: float | None = real(default=None, above=0.0, unit="m/s")
 
     def check(self) -> None:
-        """Refuse two ways to wind, and limits that have no meaning."""
-        if (self.speed is None) == (self.tension is None):
-            both = "exclude each other: leave one of them out" if self.speed is not None else "are missing: give one"
-            raise InputError(f"speed and tension {both}")
+        """Refuse none or several ways to wind, and limits that have no meaning or are missing."""
+        given = [name for name in ("speed", "tension", "power") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise InputError(
+                f"{' and '.join(given)} exclude each other: give one of them"
+                if given
+                else "speed, tension and power are missing: give one"
+            )
         if self.limit is not None and self.speed is None:
-            raise InputError(f"limit = {self.limit:g} has no meaning with tension: it needs speed")
+            raise InputError(f"limit = {self.limit:g} has no meaning with {given[0]}: it needs speed")
         if self.speed_limit is not None and self.speed is not None:
             raise InputError(f"speed_limit = {self.speed_limit:g} has no meaning with speed: leave it out")
+        if self.power is not None and self.speed_limit is None:
+            raise InputError(
+                f"speed_limit is missing: with power = {self.power:g} a slack thread would be wound at any speed"
+            )
 
     def extend(self, net: Net) -> Net:
         """The net whose thread has the winch."""
@@ -192,9 +208,11 @@ class Winch(Table):
             holds = self.tension, self.tension
         else:
             holds = -math.inf, math.inf if self.limit is None else self.limit
-        largest = 0.0 if self.limit is None and self.speed is not None else self.speed_limit or math.inf
+        largest = 0.0 if self.limit is None and self.tension is None else self.speed_limit or math.inf
         speeds = self._speeds()
         flat = [value for row in speeds for value in row]
+        if self.power is not None and not quasi_static:
+            flat += [self.power, self.speed_limit]
         return (*holds, largest, float(quasi_static), float(len(speeds)), *flat)
 
     def on(self, net: Net) -> list[Any]:

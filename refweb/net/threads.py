@@ -105,7 +105,17 @@ class ThreadLine(NamedTuple):
     @property
     def corners(self) -> tuple[float, ...]:
         """Times at which the speed of its winch has a corner [s]."""
-        return self.winch[5::2]
+        return self.winch[5 : 5 + 2 * int(self.winch[4]) : 2] if self.winch else ()
+
+    @property
+    def powered(self) -> bool:
+        """True if its winch has a constant power, and its slip is an unknown."""
+        return bool(self.winch) and len(self.winch) > 5 + 2 * int(self.winch[4])
+
+    @property
+    def unknowns(self) -> NDArray[np.int64]:
+        """Components of the slip of a winch of constant power, and of the energy that it has taken, shape (2,)."""
+        return 3 * self.first + np.array([self.rings - 1, 2 * self.rings + 2], dtype=np.int64)
 
     @property
     def rows_of_slips(self) -> int:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -126,7 +126,8 @@ class System:
         if len(set(powers)) < len(powers):
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
         internal = [term.internal for term in self.terms if term.internal]
-        self.internal: Any = next((variables for variables in internal if not variables.follower), None)
+        unknown = [variables for variables in internal if not variables.follower]
+        self.internal: Any = reduce(lambda first, more: first.joined(more), unknown) if unknown else None
         self.followers: list[Any] = [variables.follower for variables in internal if variables.follower]
         self.supported: NDArray[np.bool_] = np.vstack(
             [supported, np.zeros((self.rows - len(supported), 3), dtype=bool)]
@@ -182,7 +183,7 @@ class System:
 
     def resistance(self, t: float) -> NDArray[np.float64]:
         """c of each internal variable at time t, in the order of their components, see `InternalVariables`."""
-        return self.internal.resistance * self.natural_length(t)[self.internal.elements]
+        return self.internal.resistance * np.append(self.natural_length(t), 1.0)[self.internal.elements]
 
     def settled(self, x: Any) -> Any:
         """A state, x or None as it is given, with internal variables as they are after all time at rest, or new."""
@@ -499,6 +500,9 @@ class System:
     def row_name(self, row: int) -> str:
         """Name of a row in messages: a node by its number, a body by its name."""
         if row >= self.rows - self.net.internal:
+            for thread in self.net.threads:
+                if 0 <= thread.first <= row < thread.first + thread.rows_of_slips:
+                    return f"winch of {thread.title}"
             row -= self.rows - self.net.internal
             return f"arms of line {self.net.line[row // (self.net.rows_of_elements // len(self.net.cells))]}"
         return f"node {row}" if row < self.net.nodes else f'body "{row_names(self.net.bodies)[row - self.net.nodes]}"'

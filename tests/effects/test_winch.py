@@ -1,9 +1,11 @@
 """Winches at the ends of threads: closed forms of tension, brake and power, reels of lines, and the balances."""
 
+import nets
 import numpy as np
 import pytest
 import threads
 from nets import METHODS
+from scipy.integrate import solve_ivp
 from threads import FAR, G
 
 import refweb
@@ -25,8 +27,13 @@ def scene(points, supports, winch, solve, masses=(), rope=None, **tables):
     return threads.scene(points, supports, {**ROPE, **(rope or {})}, solve, masses, **given)
 
 
-def lifted(winch, solve, start=0.0, pull=0.0, gravity=G, **tables):
-    """History of a mass of 2 kg on 3 m of rope below a winch, at a velocity and a tension at the start."""
+def lifted(*given, **tables):
+    """History of a scene of `lifted_scene`."""
+    return refweb.run(lifted_scene(*given, **tables)).history
+
+
+def lifted_scene(winch, solve, start=0.0, pull=0.0, gravity=G, **tables):
+    """A mass of 2 kg on 3 m of rope below a winch, at a velocity and a tension at the start."""
     at_first = winch.get("end", "first") == "first"
     seen = [{"name": "z", "quantity": "displacement", "node": 1, "component": "z"}]
     seen += [{"name": "u", "quantity": "velocity", "node": 1, "component": "z"}]
@@ -41,9 +48,7 @@ def lifted(winch, solve, start=0.0, pull=0.0, gravity=G, **tables):
     rope = {"nodes": [0, 1] if at_first else [1, 0], "prestrain": pull / EA}
     points = [[0, 0, 0], [0, 0, -3.0]]
     solve = {"kind": "dynamic", "duration": 0.4, **solve}
-    return refweb.run(
-        scene(points, [0], {"end": "first", **winch}, solve, {1: 2.0}, rope, **{**given, **tables})
-    ).history
+    return scene(points, [0], {"end": "first", **winch}, solve, {1: 2.0}, rope, **{**given, **tables})
 
 
 def closed(history, size):
@@ -267,6 +272,121 @@ def test_a_run_goes_on(tmp_path, method):
         assert run.history[name][-1] == pytest.approx(whole[name][-1], rel=2e-3)
 
 
+def hoisted(times, power, limit, pull):
+    """(Height, length hauled in, work) of `lifted` by a winch of constant power, by DOP853 on elastic rope and load."""
+    natural = 3.0 / (1.0 + pull / EA)
+
+    def rate(t, y):
+        strain = max((3.0 - y[0]) / (natural - y[2]) - 1.0, 0.0)
+        given = EA * (strain + 0.5 * strain**2)  # Y = T (1 + ε) − W
+        speed = np.sign(power) * min(abs(power) / given if given > 0.0 else np.inf, limit)
+        return [y[1], EA * strain / 2.0 - G, speed, given * speed]
+
+    found = solve_ivp(rate, (0.0, times[-1]), np.zeros(4), "DOP853", times, rtol=1e-10, atol=1e-12, max_step=2e-4)
+    return found.y[[0, 2, 3]]
+
+
+@pytest.mark.parametrize("method", STEPS)
+def test_power(method):
+    """The load rises as by an independent solver, and gets P t; in the end its speed is nearly P/(m g)."""
+    power, weight, solve = 30.0, 2.0 * G, {**STEPS[method], **TIGHT[method]}
+    history = lifted({"power": power, "speed_limit": 20.0}, solve, pull=weight)
+    height, hauled, work = hoisted(history["time"], power, 20.0, weight)
+    np.testing.assert_allclose(history["z"], height, atol=1e-6)
+    np.testing.assert_allclose(-history["wound"], hauled, atol=1e-6)
+    np.testing.assert_allclose(work, power * history["time"], rtol=1e-9)  # never at the limit
+    np.testing.assert_allclose(history["winch_energy"], -work, rtol=1e-9, atol=1e-9)
+    # Of a rope that does not stretch m v' = P/v − m g, t(v) in closed form; the rope differs by its stretch.
+    last = power / weight
+    speeds = np.linspace(0.0, (1.0 - 1e-9) * last, 100_001)
+    times = -speeds / G - last / G * np.log1p(-speeds / last)
+    ways = np.append(0.0, np.cumsum(0.5 * np.diff(times) * (speeds[1:] + speeds[:-1])))
+    rise = np.interp(history["time"], times, ways)
+    np.testing.assert_allclose(history["z"][3:], rise[3:], atol=2.0 * weight * 3.0 / EA)
+    closed(history, 1e-4)
+
+
+@pytest.mark.parametrize(
+    "method, end", [("central-difference", "first"), ("central-difference", "last"), ("adams", "last")]
+)
+def test_power_up_to_a_speed(method, end):
+    """A slack rope is wound at the speed limit, as is one whose load takes less than the power."""
+    power, limit, solve = 30.0, 1.0, {**STEPS[method], **TIGHT[method]}
+    history = lifted({"power": power, "speed_limit": limit, "end": end}, solve)
+    height, hauled, work = hoisted(history["time"], power, limit, 0.0)
+    np.testing.assert_allclose(history["z"], height, atol=1e-5)
+    np.testing.assert_allclose(history["wound"] * (1.0 if end == "last" else -1.0), hauled, atol=1e-5)
+    np.testing.assert_allclose(history["winch_energy"], -work, atol=1e-4)
+    assert work[-1] < 0.75 * power * 0.4  # by the limit
+    closed(history, 1e-3)
+
+
+def test_paying_out_at_a_power():
+    """A load that sinks at the speed limit gives the winch its weight times that, below the power."""
+    limit, weight = 1.4, 2.0 * G
+    history = lifted({"power": -30.0, "speed_limit": limit}, {"step_size": 1e-4}, pull=weight, start=-limit)
+    np.testing.assert_allclose(history["wound"], limit * history["time"], atol=1e-9)
+    given = weight * (1.0 + 0.5 * weight / EA)  # Y
+    np.testing.assert_allclose(history["winch_energy"], given * limit * history["time"], rtol=1e-3)
+    closed(history, 1e-3)
+
+
+def test_power_over_a_ring():
+    """Explicit steps are of order 2; with friction methods agree, and the ring takes heat of the power."""
+    seen = [{"name": "z", "quantity": "displacement", "node": 2, "component": "z"}]
+    seen += [{"name": "wound", "quantity": "slip", "thread": "rope", "ring": 0}]
+    given = {"gravity": {"acceleration": [0.0, 0.0, -G]}, "observe": seen, "output": {"interval": 0.02}}
+
+    def history(friction, solve):
+        found = refweb.run(
+            scene(
+                [[0, 0, 0], [1.0, 0.0, 0.4], [1.6, 0.2, -0.5]], [0, 1],
+                {"end": "first", "power": 4.0, "speed_limit": 5.0}, {"kind": "dynamic", "duration": 0.2, **solve},
+                {2: 0.3}, {"nodes": [0, 1, 2], "friction": friction, "modulus": 1e8, "prestrain": 5e-3}, **given,
+            )
+        ).history  # fmt: skip
+        closed(found, 1e-3)
+        assert found["winch_energy"][-1] == pytest.approx(-4.0 * 0.2, rel=1e-9)
+        return found
+
+    def off(one, exact):
+        return [np.abs(one[name] - exact[name]).max() for name in ("z", "wound")]
+
+    by_cvode = {"method": "cvode", "family": "adams", "rtol": 1e-9}
+    exact = history(0.0, by_cvode)
+    errors = [off(history(0.0, {"step_size": 0.2 / count}), exact) for count in (500, 2000)]
+    assert (np.log(np.array(errors[0]) / errors[1]) / np.log(4.0)).min() > 1.9
+    exact = history(0.2, by_cvode)
+    assert max(off(history(0.2, {"step_size": 1e-4}), exact)) < 1e-6  # of 0.17 m
+    assert max(off(history(0.2, {"method": "ida", "rtol": 1e-7}), exact)) < 1e-5
+    assert exact["dissipated_energy"][-1] > 0.1
+
+
+@pytest.mark.parametrize("method", ["central-difference", "bdf"])
+def test_power_goes_on(tmp_path, method):
+    """A run that was stopped and resumed is the same, bit for bit, and one from its folder goes on like one run."""
+    keys = {"power": 30.0, "speed_limit": 2.0}
+    given = lifted_scene(keys, {**STEPS[method], **TIGHT[method]})
+    whole, resumed = nets.whole_and_resumed(given, tmp_path)
+    for name, values in whole.history.items():
+        np.testing.assert_array_equal(resumed.history[name], values, err_msg=name)
+    stepped = refweb.start(given)
+    for _ in range(3):
+        stepped.advance(0.1)
+    np.testing.assert_array_equal(stepped.history["z"], whole.history["z"][:7])
+
+
+def test_power_in_statics():
+    """It stays as it is: W = EA (l/L − 1)."""
+    run = refweb.run(
+        scene(
+            [[0, 0, 0], [0, 0, -3.0]], [0], {"end": "first", "power": 30.0, "speed_limit": 1.0}, {"kind": "static"},
+            rope={"nodes": [0, 1]}, load=[{"node": 1, "force": [0.0, 0.0, -40.0]}],
+        )
+    )  # fmt: skip
+    assert run.positions[1][2] == pytest.approx(-3.0 * (1.0 + 40.0 / EA), rel=1e-9)
+
+
 def test_order_of_explicit_steps():
     """A winch and friction at a ring at once: order 2, and 1 of positions where a winch at its limit turns round."""
     points, masses = [[0, 0, 0], [1.0, 0.0, 0.4], [1.6, 0.2, -0.5]], {2: 0.3}
@@ -302,7 +422,9 @@ def test_order_of_explicit_steps():
 @pytest.mark.parametrize(
     "winch, text",
     [
-        ({}, r"speed and tension are missing: give one"),
+        ({}, r"speed, tension and power are missing: give one"),
+        ({"power": 1.0}, r"speed_limit is missing: with power = 1 a slack thread would be wound at any speed"),
+        ({"power": 1.0, "speed_limit": 1.0, "limit": 2.0}, r"limit = 2 has no meaning with power: it needs speed"),
         ({"speed": 1.0, "tension": 1.0}, r"speed and tension exclude each other"),
         ({"tension": 1.0, "limit": 2.0}, r"limit = 2 has no meaning with tension"),
         ({"speed": 1.0, "speed_limit": 2.0}, r"speed_limit = 2 has no meaning with speed"),

@@ -69,7 +69,8 @@ class Sundials(StepObserver):
         """Absolute tolerances of unknown displacements and of velocities, each of shape (unknowns,)."""
         both = [np.full(self.unknowns, size) for size in (self.atol_position, self.atol_velocity)]
         if len(self._inner):
-            both[0][self._inner] /= self.system.natural_length(0.0).min()
+            of_lines = self._inner[self.system.internal.elements >= 0]  # strains
+            both[0][of_lines] /= self.system.natural_length(0.0).min()
         if self.rotations:
             self.rotations.scale(both[0], False)
             self.rotations.scale(both[1], True)
