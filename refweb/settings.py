@@ -417,7 +417,8 @@ class Control(Table):
     measurements, so that ± holds its effect as well. A run with controls goes on after it was stopped.
 
     The control sets what a scene has: ``load.N.force``, ``thrust.N.force``, ``pressure.N.value``,
-    ``gravity.acceleration``, ``body.NAME.axle.torque``, or the rate of a table, ``reel.N.rate`` of the factor [1/s],
+    ``gravity.acceleration``, ``body.NAME.axle.torque``, of a winch ``winch.N.speed``, ``limit``, ``tension`` or
+    ``power``, whichever the scene gives, or the rate of a table, ``reel.N.rate`` of the factor [1/s],
     ``motion.N.velocity``, ``motion.N.angular_velocity``. N counts from 0.
 
     The run says the integral over time of the size of the value; for a load it is that of the force on one node. A reel

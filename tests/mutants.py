@@ -441,6 +441,7 @@ MUTANTS = [
     Mutant("effects/thread_slips", "if pull == low or pull == high:", "if high - low < 1e-3 * ea:"),
     Mutant("effects/thread_slips", "total += (high - low) * (first + slope * middle)", "total += (high - low) * first"),
     Mutant("effects/thread_slips", "w[SLIP, r] = w[BEFORE, r] + math.copysign(reach, moved)", "w[SLIP, r] += 0.0"),
+    Mutant("effects/winch", "of_table = [(t, value) for t, _ in given]", "of_table = list(given)"),
     Mutant("effects/winch_power", "mean = 0.5 * (first + pulled_over(data, c, w))", "mean = pulled_over(data, c, w)"),
     Mutant("effects/winch_power", "return power / pull, -power / pull**2", "return power / pull, power / pull**2"),
     Mutant("effects/winch_power", "f[q, m] -= rate * pull /", "f[q, m] -= rate * abs(pull - 1.0) /"),

@@ -36,8 +36,9 @@ if TYPE_CHECKING:
     from .integrators.integrator import History, Integrator, IntegratorState
     from .schedule import Schedule
 
-INPUTS = {"load": "force", "thrust": "force", "pressure": "value", "gravity": "acceleration"}
-"""Key of each effect that a command may set."""
+INPUTS = {"load": ("force",), "thrust": ("force",), "pressure": ("value",), "gravity": ("acceleration",)}
+INPUTS["winch"] = "speed", "limit", "tension", "power"
+"""Keys of each effect that a command may set."""
 RATES = {
     "reel": {"rate": ("factor", 1)},
     "motion": {"velocity": ("displacement", 3), "angular_velocity": ("rotation", 3)},
@@ -205,9 +206,11 @@ class Inputs:
             return name, number, self._with_torque(effect, key, command.value)
         if key in RATES.get(name, {}):
             return name, number, self._with_rate(name, effect, key, command.value, t)
-        keys = [INPUTS[name]] if name in INPUTS else list(RATES[name])
+        keys = [*INPUTS.get(name, ()), *RATES.get(name, {})]
         if key not in keys:
             raise InputError(f"{quote(key)} is not a key of [{name}] that a command may set, {nearest(key, keys)}")
+        if name == "winch":
+            return name, number, effect.commanded(key, _finite(command.value, 1)[0])
         return name, number, replace(effect, **{key: command.value})
 
     @staticmethod
@@ -262,6 +265,8 @@ class Inputs:
         system = self._system
         if name == "body":
             return self._writes_of_torque(given, effect)
+        if name == "winch":
+            return effect.writes(system)
         if name == "reel":
             at = next(i for i, (_, table) in enumerate(system.net.factors) if table is given.factor)
             return [(system.lengths.tables[at], np.array(flattened(effect.factor)))]

@@ -146,8 +146,9 @@ class SteppedRun:
         ----------
         path : str
             ``load.N.force`` [N], ``thrust.N.force`` [N], ``pressure.N.value`` [Pa], ``gravity.acceleration`` [m/s²],
-            ``body.NAME.axle.torque`` [N m]; or a rate, ``reel.N.rate`` [1/s] of the factor, ``motion.N.velocity``
-            [m/s], ``motion.N.angular_velocity`` [rad/s] of a body on an axle. N counts from 0.
+            ``body.NAME.axle.torque`` [N m], of a winch ``winch.N.speed`` [m/s], ``limit`` [N], ``tension`` [N] or
+            ``power`` [W], whichever the scene gives; or a rate, ``reel.N.rate`` [1/s] of the factor,
+            ``motion.N.velocity`` [m/s], ``motion.N.angular_velocity`` [rad/s] of a body on an axle. N counts from 0.
         value : float or sequence of 3 float
             The value; a rate continues the present value of the table.
 

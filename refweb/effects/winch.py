@@ -27,6 +27,7 @@ from ..tables import Several, Table, checked, choice, field, nodes, real, rows, 
 
 if TYPE_CHECKING:
     from ..net.net import Net
+    from ..system.system import System
 
 _speed, _speeds = real(unit="m/s"), rows(2, increasing=True, unit="m/s")
 
@@ -70,9 +71,9 @@ class Winch(Table):
         Tension at which a winch with ``speed`` slips and pays out [N], as a brake does. A brake alone is a winch of
         ``speed = 0``.
     tension : float, optional
-        Tension that the winch holds [N], at any speed up to ``speed_limit``. In statics it holds it whatever length of
-        thread that takes; with ``start = "equilibrium"`` as well, but for one with a ``speed_limit``, which begins as
-        the web is.
+        Tension that the winch holds [N], at any speed up to ``speed_limit``; at 0 it takes slack in. In statics it
+        holds it whatever length of thread that takes; with ``start = "equilibrium"`` as well, but for one with a
+        ``speed_limit``, which begins as the web is.
     power : float, optional
         Power that the web gets [W], without the strain energy of what is wound; negative to pay out. The speed is power
         over tension, up to ``speed_limit``. A load that sinks at a constant power goes faster and faster, up to the
@@ -107,7 +108,7 @@ class Winch(Table):
     at: Several = nodes(default=None)
     speed: Any = field(_one_or_table, default=None, unit="m/s")
     limit: float | None = real(default=None, above=0.0, unit="N")
-    tension: float | None = real(default=None, above=0.0, unit="N")
+    tension: float | None = real(default=None, at_least=0.0, unit="N")
     power: float | None = real(default=None, unit="W")
     speed_limit: float | None = real(default=None, above=0.0, unit="m/s")
 
@@ -214,6 +215,28 @@ class Winch(Table):
         if self.power is not None and not quasi_static:
             flat += [self.power, self.speed_limit]
         return (*holds, largest, float(quasi_static), float(len(speeds)), *flat)
+
+    def commanded(self, key: str, value: float) -> Winch:
+        """The winch with another number from now on, in place of a table as well; a tension below 0 is 0.
+
+        Raises
+        ------
+        InputError
+            For a key that the winch does not have in the scene.
+        """
+        given = getattr(self, key)
+        if given is None:
+            keys = " or ".join(key for key in ("speed", "limit", "tension", "power") if getattr(self, key) is not None)
+            raise InputError(f"{key} is not a key of this winch in the scene, which has {keys}")
+        value = max(value, 0.0) if key == "tension" else value
+        of_table = [(t, value) for t, _ in given] if isinstance(given, tuple) else value
+        return replace(self, **{key: of_table})
+
+    def writes(self, system: System) -> list[Any]:
+        """(Array, numbers) of the thread in a system, with the numbers of this winch."""
+        number = next(number for number, thread in system.threads.items() if thread.name == self.thread)
+        array, numbers = system.terms[number].data, self._numbers(system.net.quasi_static)
+        return [(array, np.append(array[:, : -len(numbers)], [numbers], axis=1))]
 
     def on(self, net: Net) -> list[Any]:
         """No term: its thread has them."""

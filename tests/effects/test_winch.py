@@ -376,6 +376,57 @@ def test_power_goes_on(tmp_path, method):
     np.testing.assert_array_equal(stepped.history["z"], whole.history["z"][:7])
 
 
+@pytest.mark.parametrize("method", ["central-difference", "bdf"])
+def test_no_tension(method):
+    """A winch that holds 0 N lets a load fly: it takes in the slack of a rise, and pays it out again."""
+    history = lifted({"tension": 0.0}, {**STEPS[method], **TIGHT[method]}, start=2.0)
+    height = 2.0 * history["time"] - 0.5 * G * history["time"] ** 2
+    np.testing.assert_allclose(history["z"], height, atol=2e-6)
+    np.testing.assert_allclose(-history["wound"], height, atol=2e-6)
+    assert np.abs(history["pull"]).max() < 1e-9 and np.abs(history["winch_energy"]).max() < 1e-9
+
+
+def test_commands():
+    """A winch whose power or speed is set goes on like one with a table; balances stay closed; others are refused."""
+    solve = {"step_size": 1e-4}
+    run = refweb.start(lifted_scene({"speed": [[0.0, 0.2], [1.0, 0.2]]}, solve, pull=2.0 * G))
+    run.advance(0.2)
+    run.set("winch.0.speed", -0.3)
+    run.advance(0.2)
+    by_hand = run.history
+    table = [[0.0, 0.2], [0.2, 0.2], [0.2 + 1e-9, -0.3]]
+    np.testing.assert_allclose(by_hand["z"], lifted({"speed": table}, solve, pull=2.0 * G)["z"], atol=1e-8)
+    closed(by_hand, 1e-3)
+    for keys in (solve, {"method": "cvode", "family": "adams", "rtol": 1e-8}):
+        run = refweb.start(lifted_scene({"power": 20.0, "speed_limit": 9.0}, keys, pull=2.0 * G))
+        run.advance(0.2)
+        run.set("winch.0.power", 40.0)
+        run.advance(0.2)
+        taken = run.history["winch_energy"]
+        assert taken[-1] == pytest.approx(-0.2 * 20.0 - 0.2 * 40.0, rel=1e-9)
+        closed(run.history, 1e-3)
+    for path, value, text in (
+        ("winch.0.tension", 3.0, "tension is not a key of this winch in the scene, which has power"),
+        ("winch.0.power", "much", "must be a finite number"),
+        ("winch.0.end", 3.0, '"end" is not a key of \\[winch\\] that a command may set'),
+    ):
+        with pytest.raises(refweb.InputError, match=text):
+            run.set(path, value)
+
+
+def test_controlled_tension():
+    """A control that sets the tension of a winch brings a load to a height and keeps it there."""
+    control = {
+        "name": "hoist", "law": "pid", "parameters": {"proportional": 60.0, "derivative": 25.0, "integral": 60.0},
+        "period": 0.01, "sets": "winch.0.tension", "measures": ["z"], "rates": ["u"], "target": 0.2,
+    }  # fmt: skip
+    given = {"control": [control], "output": {"interval": 0.01}}
+    solve = {"step_size": 1e-4, "duration": 4.0}
+    history = lifted({"tension": 2.0 * G}, solve, pull=2.0 * G, **given)
+    assert history["z"][-1] == pytest.approx(0.2, abs=5e-3)
+    closed(history, 1e-2)
+
+
 def test_power_in_statics():
     """It stays as it is: W = EA (l/L − 1)."""
     run = refweb.run(
