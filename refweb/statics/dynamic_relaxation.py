@@ -167,7 +167,8 @@ class Relaxation:
                     {"nsteps": done},
                     x,
                 )
-                raise with_reason(system, t, failed, 'use method = "newton", by which both share its push, or ')
+                remedy = 'use method = "newton", by which both share its push, or '
+                raise with_reason(system, t, failed, remedy, tangents=False)
             if system.carried.any():
                 self._weigh_bodies(f, inverse)
             self._relax(LOOK, t, x, v, f, inverse, self._kernels, self._cells, data, self._per_cell, *turning)

@@ -182,10 +182,10 @@ def refuse_half_turns(system, t, x, before):
     return refuse_half_turns(system, t, x, before)
 
 
-def with_reason(system, t, error, remedy=""):
+def with_reason(system, t, error, remedy="", tangents=True):
     """The error with what it may come from: rings together, two contacts alike, or parts that nothing else holds.
 
-    ``remedy`` is another one for two contacts alike.
+    ``remedy`` is another one for two contacts alike; ``tangents`` is True for Newton's method.
     """
     from ..system.unsupported_parts import find_parts
     from .contact_kinks import kink_remark
@@ -194,8 +194,14 @@ def with_reason(system, t, error, remedy=""):
         from ..net.threads import coincident_nodes
 
         if (together := coincident_nodes(system.net, error.x, system.supported)) is not None:
-            text = f'no equilibrium found at step {t:g}: {together}, or try method = "relaxation"'
-            return NotFound(text, error.stats)
+            rubs = any(any(thread.friction) for thread in system.net.threads)
+            way_out = "; or rings slip where nothing holds both sides of them: raise friction or lower loads"
+            if not rubs:
+                way_out = ', or try method = "relaxation"' if tangents else ""
+            return NotFound(f"no equilibrium found at step {t:g}: {together}{way_out}", error.stats)
+        if any(thread.winch and thread.winch[0] > 0.0 for thread in system.net.threads):  # at a tension
+            text = "a winch pulls in all that is not held against its tension: lower its tension, or give it a speed"
+            return NotFound(f"{error}; {text}", error.stats)
     if system.contact and error.x is not None and (kink := kink_remark(system, error.x, remedy)) is not None:
         return NotFound(f"no equilibrium found at step {t:g}: {kink}", error.stats)
     if error.x is not None and (body := gone(system, error.x)) is not None:

@@ -273,7 +273,14 @@ class Newton:
             if self._descends(r, p):
                 return p, shift
             shift = max(4.0 * shift, 1e-12 * self.axial)
-        raise NotFound(f"singular tangent at step {t:g}: no shift up to {shift:.3g} N makes it definite", stats)
+        row = self.system.sizes(np.where(self.system.supported, 0, iterate.force)).argmax()
+        along = "xyz"[np.abs(iterate.force[row]).argmax()]
+        raise NotFound(
+            f"singular tangent at step {t:g}: the largest force that nothing balances is on "
+            f"{self.system.row_name(row)}, {np.abs(iterate.force[row]).max():.4g} N along {along}: balance the loads, "
+            "add a support, or start nearer",
+            stats,
+        )
 
     def _step_by_factor_at_hand(self, t, iterate, r, shift, error, stats, ahead):
         """The same step by the factorization of an earlier tangent; None if that takes long or leads uphill."""

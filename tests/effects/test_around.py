@@ -219,6 +219,13 @@ def test_the_hoist():
     assert [finding.code for finding in run.findings if finding.code == "body-not-felt"] == []
 
 
+def test_unequal_masses_over_a_drum_have_no_equilibrium():
+    """The message names a node and its force."""
+    rope = {"nodes": [0, "drum", 1], "around": [OVER]}
+    with pytest.raises(refweb.SolverError, match=r"nothing balances is on node [01], [\d.]+ N along z: balance"):
+        refweb.run(scene(TWO, [], rope, DRUM | {"fixed": True}, {"kind": "static"}, {0: 3.0, 1: 1.0}))
+
+
 # Half turns
 
 

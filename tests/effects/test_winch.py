@@ -241,6 +241,18 @@ def test_a_load_that_no_winch_carries(winch):
         refweb.run(given)
 
 
+def test_a_load_that_a_winch_pulls_in():
+    """A weight below the tension of a winch has no equilibrium but at the drum."""
+    given = scene(
+        [[0, 0, 0], [0, 0, -3.0]], [0], {"end": "first", "tension": 10.0}, {"kind": "static"}, rope={"nodes": [0, 1]},
+        load=[{"node": 1, "force": [0.0, 0.0, -6.0]}],
+    )  # fmt: skip
+    with pytest.raises(refweb.SolverError, match="a winch pulls in all that is not held|come together"):
+        refweb.run(given)
+    with pytest.raises(refweb.InputError, match=r"modes take no friction of \[\[thread\]\], also not 0"):
+        refweb.modes(given)
+
+
 def test_speed_in_statics():
     """A winch with a speed is at its starting length: W = EA (l/L − 1)."""
     run = refweb.run(
