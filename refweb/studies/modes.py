@@ -153,6 +153,8 @@ def modes(
         check_folder(out, force)
     clock = Clock()
     system = scene.build()
+    if any(thread.friction and not any(thread.friction) for thread in system.net.threads):
+        system = _without_slips(scene).build()
     with in_file(scene.file):
         rest = _at_rest(system)
     if announce is not None:
@@ -170,6 +172,15 @@ def modes(
     return result
 
 
+def _without_slips(scene):
+    """The scene with one tension in threads whose friction is 0, a force with a potential, and what modes look at."""
+    effects = tuple(
+        replace(effect, friction=None) if type(effect).__name__ == "Thread" and not np.any(effect.friction) else effect
+        for effect in scene.effects
+    )
+    return scene.replace(effects=effects, observe=(), event=(), control=())
+
+
 def _at_rest(system):
     """The system that vibrates; refuse links, forces without a potential, and webs without free nodes."""
     rest = at_rest(system)
@@ -180,7 +191,7 @@ def _at_rest(system):
     for term in rest.terms:
         if term.tangent.stiffness is not None and not rest.is_symmetric(term):
             if term.name == "thread":
-                raise InputError("modes take no friction of [[thread]], also not 0, and no [[winch]]: leave them out")
+                raise InputError("modes take no friction of [[thread]] above 0, and no [[winch]]: leave them out")
             raise InputError(f"{term.name} has no potential, so there are no natural modes: leave it out")
     if not len(rest.free):
         raise InputError("no node is free, so there are no modes: support fewer of them")

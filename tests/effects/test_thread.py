@@ -340,7 +340,8 @@ def test_pulling_a_drawstring():
 # Modes
 
 
-def test_modes_of_a_ring():
+@pytest.mark.parametrize("friction", [{}, {"friction": 0.0}])
+def test_modes_of_a_ring(friction):
     """EA/L (2 sin α)² + 2 T cos² α/l up and down, 2 T sin² α/l along and 2 T/l across."""
     pull, half, mass = 200.0, 1.3, 2.0
     sine = 0.5
@@ -348,9 +349,8 @@ def test_modes_of_a_ring():
     points = [[-half * cosine, 0, 0], [half * cosine, 0, 0], [0, 0, -half * sine]]
     natural = 2.0 * half / (1.0 + pull / EA)
     load = {"node": 2, "force": [0.0, 0.0, -2.0 * pull * sine]}
-    given = scene(
-        points, [0, 1], {"nodes": [0, 2, 1], "length": natural}, {"kind": "static"}, {2: mass}, load=[load], gravity=[]
-    )
+    rope = {"nodes": [0, 2, 1], "length": natural, **friction}
+    given = scene(points, [0, 1], rope, {"kind": "static"}, {2: mass}, load=[load], gravity=[])
     stiffness = [2.0 * pull / half * part for part in (sine**2, 1.0, cosine**2)]
     stiffness[2] += EA / natural * (2.0 * sine) ** 2
     frequencies = np.sqrt(np.array(stiffness) / mass) / (2.0 * np.pi)

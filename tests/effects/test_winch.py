@@ -249,7 +249,7 @@ def test_a_load_that_a_winch_pulls_in():
     )  # fmt: skip
     with pytest.raises(refweb.SolverError, match="a winch pulls in all that is not held|come together"):
         refweb.run(given)
-    with pytest.raises(refweb.InputError, match=r"modes take no friction of \[\[thread\]\], also not 0"):
+    with pytest.raises(refweb.InputError, match=r"modes take no friction of \[\[thread\]\] above 0, and no"):
         refweb.modes(given)
 
 
