@@ -436,15 +436,13 @@ def term(net: Net, thread: ThreadLine) -> ForceTerm:
     numbers = line.line_data.matrix
     segments, bases, bears = segments_of(net, thread)
     force, energy, stiffness, bound = kernels(line.law, line.law_record, numbers.shape[1], len(bases))
-    across = np.zeros((1, 3 * (len(thread.rows) + len(bases)), 3 * (len(thread.rows) + len(bases))))
-    across[:, : 3 * len(thread.rows), : 3 * len(thread.rows)] = thread.across
     return ForceTerm(
         name="thread",
         cells=np.array([[*thread.rows, *bases]], dtype=np.int32),
         data=np.concatenate([numbers[0], [1.0 / line.area[0]], segments.view(float).ravel()])[None, :],
         force=force,
         energy=energy,
-        tangent=Tangent(stiffness, bound, across=across),
+        tangent=Tangent(stiffness, bound, across=thread.across),
         balance=Balance("strain_energy", internal=True, twists=bears),
         observed=COLUMNS,
     )

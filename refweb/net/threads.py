@@ -157,12 +157,18 @@ class ThreadLine(NamedTuple):
 
     @property
     def across(self) -> NDArray[np.float64]:
-        """Stiffness across itself by a unit tension, in the web's position [1/m], shape (1, 3 nodes, 3 nodes)."""
-        number = np.arange(len(self.distances))
+        """Stiffness across itself by a unit tension, in the web's position [1/m].
+
+        Of shape (1, 3 rows, 3 rows), the rows those of its nodes and then of the bodies of ``wraps``: a segment on a
+        body goes from either end to this.
+        """
         inverse = 1.0 / np.maximum(self.distances, 1e-3 * self.distances.mean())
-        chain = np.zeros((len(self.rows), len(self.rows)))
-        for i, j, sign in ((0, 0, 1.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)):
-            chain[number + i, number + j] += sign * inverse
+        over = {wrap.segment: len(self.rows) + n for n, wrap in enumerate(self.wraps)}
+        chain = np.zeros((len(self.rows) + len(self.wraps),) * 2)
+        for s, stiffness in enumerate(inverse):
+            for i, j in ((s, over[s]), (over[s], s + 1)) if s in over else ((s, s + 1),):
+                chain[[i, j], [i, j]] += stiffness
+                chain[[i, j], [j, i]] -= stiffness
         return np.asarray(np.kron(chain, np.eye(3))[None], dtype=np.float64)
 
 

@@ -191,17 +191,10 @@ def with_reason(system, t, error, remedy="", tangents=True):
     from .contact_kinks import kink_remark
 
     if system.net.threads and error.x is not None:
-        from ..net.threads import coincident_nodes
+        from .thread_reasons import reason_of
 
-        if (together := coincident_nodes(system.net, error.x, system.supported)) is not None:
-            rubs = any(any(thread.friction) for thread in system.net.threads)
-            way_out = "; or rings slip where nothing holds both sides of them: raise friction or lower loads"
-            if not rubs:
-                way_out = ', or try method = "relaxation"' if tangents else ""
-            return NotFound(f"no equilibrium found at step {t:g}: {together}{way_out}", error.stats)
-        if any(thread.winch and thread.winch[0] > 0.0 for thread in system.net.threads):  # at a tension
-            text = "a winch pulls in all that is not held against its tension: lower its tension, or give it a speed"
-            return NotFound(f"{error}; {text}", error.stats)
+        if (reason := reason_of(system, error.x, tangents)) is not None:
+            return NotFound(f"no equilibrium found at step {t:g}: {reason}", error.stats)
     if system.contact and error.x is not None and (kink := kink_remark(system, error.x, remedy)) is not None:
         return NotFound(f"no equilibrium found at step {t:g}: {kink}", error.stats)
     if error.x is not None and (body := gone(system, error.x)) is not None:

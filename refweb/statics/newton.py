@@ -341,8 +341,8 @@ class Newton:
 
     @property
     def _tiny(self):
-        """Tension of all lines that counts as none [N]."""
-        return 1e-12 * self.axial
+        """Tension of all lines and threads that counts as none [N]."""
+        return 1e-12 * max([self.axial, *(float(thread.line.axial[0]) for thread in self.system.net.threads)])
 
     def factorize_at(self, state):
         """Factorize K at an equilibrium, plus a negligible stiffness."""

@@ -219,10 +219,17 @@ def test_the_hoist():
     assert [finding.code for finding in run.findings if finding.code == "body-not-felt"] == []
 
 
-def test_unequal_masses_over_a_drum_have_no_equilibrium():
-    """The message names a node and its force."""
+def test_equal_masses_over_a_drum_are_in_neutral_equilibrium():
+    """The tension is m g; which of them is higher is open, and so is the place along the axis."""
     rope = {"nodes": [0, "drum", 1], "around": [OVER]}
-    with pytest.raises(refweb.SolverError, match=r"nothing balances is on node [01], [\d.]+ N along z: balance"):
+    run = refweb.run(scene(TWO, [], rope, DRUM | {"fixed": True}, {"kind": "static"}, {0: 2.0, 1: 2.0}))
+    agrees(run.results["pull"], 2.0 * G, 2.0 * G)
+    assert {"loose-nodes"} <= {finding.code for finding in run.findings} and "saddle" not in " ".join(run.warnings)
+
+
+def test_unequal_masses_over_a_drum_have_no_equilibrium():
+    rope, text = {"nodes": [0, "drum", 1], "around": [OVER]}, 'node 1, is at body "drum": the load at node 0 is more'
+    with pytest.raises(refweb.SolverError, match=text):
         refweb.run(scene(TWO, [], rope, DRUM | {"fixed": True}, {"kind": "static"}, {0: 3.0, 1: 1.0}))
 
 

@@ -100,6 +100,20 @@ def test_capstan():
     assert 0.0 < slips[0] < slips[1] < slips[2]
 
 
+@pytest.mark.parametrize("friction", [{}, {"friction": 0.3}])
+def test_a_load_beyond_the_capstan(friction):
+    """The thread runs through; the message names the end that is pulled to its ring, and the load."""
+    heavy = 1.01 * np.exp(0.3 * np.pi)
+    points = [[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.2, 0.0, -1.0]]
+    given = scene(
+        points, [1, 2], {"nodes": [0, 1, 2, 3], **friction}, {"kind": "static"}, {0: heavy, 3: 1.0},
+        gravity={"acceleration": [0.0, 0.0, -G]},
+    )  # fmt: skip
+    text = "node 3, is at node 2: the load at node 0 is more than that end"
+    with pytest.raises(refweb.SolverError, match=f"{text} and friction" if friction else f"{text} can hold; lower it"):
+        refweb.run(given)
+
+
 def test_limits_of_friction():
     """Without friction one tension, as a thread that has none; with much, four separate lines."""
     free, tied = on_posts(0.0), on_posts(1e3)

@@ -1,0 +1,59 @@
+"""Reasons why a net with threads may have no equilibrium: a load that pulls a thread through, or rings together.
+
+`equilibrium.with_reason` asks for them where an iteration has failed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..net.threads import NEAR, coincident_nodes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..net.threads import ThreadLine
+    from ..system.system import System
+
+
+def reason_of(system: System, x: NDArray[np.float64], tangents: bool) -> str | None:
+    """Text of the reason by the displacement at which an iteration ended, (rows, 3) [m]; None without one.
+
+    ``tangents`` is True for Newton's method.
+    """
+    threads = system.net.threads
+    for thread in threads:
+        for end, ring in ((0, 1), (-1, -2)) if not (thread.closed or thread.winch) else ():
+            if not system.supported[thread.rows[end]].all() and (at := _pulled_to(system, thread, x, end, ring)):
+                rubs = any(thread.friction)
+                return (
+                    f"{thread.title} slides until its end, node {thread.rows[end]}, is {at}: the load at node "
+                    f"{thread.rows[-1 - end]} is more than that end{' and friction' if rubs else ''} can hold; lower "
+                    f"it, or {'raise friction' if rubs else 'support the end'}"
+                )
+    if (together := coincident_nodes(system.net, x, system.supported)) is not None:
+        way_out = ', or try method = "relaxation"' if tangents else ""
+        if any(any(thread.friction) for thread in threads):
+            way_out = "; or rings slip where nothing holds both sides of them: raise friction or lower loads"
+        return f"{together}{way_out}"
+    if any(thread.winch and thread.winch[0] > 0.0 for thread in threads):  # at a tension
+        return "a winch pulls in all that is not held against its tension: lower its tension, or give it a speed"
+    return None
+
+
+def _pulled_to(system, thread: ThreadLine, x, end, ring):
+    """Words that say where an end of a thread has been pulled to, its next ring or body; "" where it is clear."""
+    place = system.net.points + x
+    node, segment = place[thread.rows[end]], 0 if end == 0 else len(thread.distances) - 1
+    for wrap in thread.wraps:
+        if wrap.segment == segment:
+            body = next(body for body in system.net.bodies if body.name == wrap.body)
+            away = node - place[body.row]
+            if type(body.shape).__name__ != "Sphere":
+                away = away - (away @ body.axes[2]) * body.axes[2]
+            return f'at body "{body.name}"' if np.linalg.norm(away) < body.shape.radius * (1.0 + NEAR) else ""
+    at = thread.rows[ring]
+    near = len(thread.rows) > 2 and np.linalg.norm(node - place[at]) < NEAR * thread.natural_length
+    return f"at node {at}" if near else ""
