@@ -429,6 +429,7 @@ MUTANTS = [
     Mutant("effects/winding", "near += segment.sense * x[turn, 1]", "near -= segment.sense * x[turn, 1]"),
     Mutant("effects/winding", "if lies <= 0.0:", "if lies <= 1e-3:"),
     Mutant("effects/winding", "f[spin, k] += first[k] + second[k]", "f[spin, k] += first[k] - second[k]"),
+    Mutant("effects/winding", "touch.force[k] = press[k] if path.wound", "touch.force[k] = press[k] if not path.wound"),
     Mutant("effects/winding", "cotangent = math.cos(path.angle) / sine", "cotangent = 1.0 / sine"),
     Mutant("effects/winding", "turned += 4.0 * max(tension, soon) * segment.radius / square", "turned *= 0.01"),
     Mutant("net/threads", "np.roll(over, 1) - over", "over - np.roll(over, 1)"),

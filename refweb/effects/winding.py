@@ -16,8 +16,9 @@ The angle θ follows from the azimuths of both ends. Each is within half a turn 
 node on a body that turns about its axle, within half a turn of the one that it turns to. So any number of turns is
 counted, and nothing is remembered from step to step.
 
-Columns of ``out`` are those of `net.threads.COLUMNS`; length, gradient and tangent change together, and the bound may
-be too large, never too small.
+Columns of ``out`` are those of `net.threads.COLUMNS`, and then a `base.TOUCH` for each segment on a body with the force
+on this, which `system.contact_forces` adds up; length, gradient and tangent change together, and the bound may be too
+large, never too small.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from ..compiled.rows import record_at, width_of
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..net.threads import COLUMNS, TAUT
 from .around import CYLINDER, KINDS, SPHERE, STRAIGHT, refuse_free, steady
-from .base import Balance, ForceTerm, Tangent
+from .base import CONTACT_COLUMNS, TOUCH, Balance, ForceTerm, Tangent
 from .line_kernels import line_at
 from .thread_segments import energy_kernel
 from .vectors import cross, dot
@@ -327,6 +328,12 @@ def kernels(law, record, width, wraps):
                     f[j, k] -= tension * path.second[k]
                     if path.wound:
                         f[b, k] += press[k]
+                if segment.kind != STRAIGHT:
+                    number = int(segment.body) + wraps - cells.shape[1]
+                    touch = record_at(TOUCH, out, c, COLUMNS + CONTACT_COLUMNS * number)
+                    touch.value = 0.0
+                    for k in range(3):
+                        touch.force[k] = press[k] if path.wound else 0.0
                 if path.wound and spin >= 0:
                     p, q = ends_of(x, i, j, b, segment)
                     off = segment.off[0], segment.off[1], segment.off[2]
@@ -444,5 +451,5 @@ def term(net: Net, thread: ThreadLine) -> ForceTerm:
         energy=energy,
         tangent=Tangent(stiffness, bound, across=thread.across),
         balance=Balance("strain_energy", internal=True, twists=bears),
-        observed=COLUMNS,
+        observed=COLUMNS + CONTACT_COLUMNS * len(bases),
     )

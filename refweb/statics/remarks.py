@@ -146,8 +146,9 @@ def remarks_on(state, stats, utilisation, equilibrium):
 
 def _other_rests(state):
     """Find bodies on axles that rest on lines or bodies: they may also rest beyond these."""
+    under = {wrap.body for thread in state.system.net.threads for wrap in thread.wraps}
     for body in state.system.resting:
-        if body.pivot is not None and state.reaction[body.row].any():
+        if body.pivot is not None and body.name not in under and state.reaction[body.row].any():
             text = f'body "{body.name}" rests by contact, and its axle lets it rest elsewhere as well, as hanging free'
             text += ": this is the rest that is reached downhill from the start; start elsewhere for another one"
             yield Finding("other-rests", text, "body")

@@ -1,8 +1,9 @@
 """Contact of bodies: the force on each body, the depth of lines in it, and the depth of pairs of bodies.
 
 Each contact writes its depth and its force on the touched body to its cell, see
-`refweb.effects.base.ContactForce.felt`; of two bodies that is the force on the second. The contact force on a body is
-the sum over its cells alone. It is zero if nothing touches the body, whatever else acts. One kernel computes this sum
+`refweb.effects.base.ContactForce.felt`; of two bodies that is the force on the second. A thread that runs over bodies
+writes a force for each. The contact force on a body is the sum of these alone. It is zero if nothing touches the body,
+whatever else acts. One kernel computes this sum
 for all bodies: over the near cells in a step of the compiled loop, over all cells in a state.
 
 `integrators.contacts` calls the same kernels; results are those of the rows behind the nodes, and then of pairs.
@@ -16,13 +17,17 @@ import numpy as np
 from numba import from_dtype, types
 
 from ..compiled.rows import record_at, records_of
-from ..effects.base import FELT, FELT_COLUMNS, TOUCH, pairs_of
+from ..effects.base import CONTACT_COLUMNS, FELT, FELT_COLUMNS, TOUCH, pairs_of
 from ..kernels import kernel
+from ..net.threads import COLUMNS
 
-CONTACT_TERM = np.dtype([(name, np.int64) for name in ("number", "body", "partner", "elements", "pairs", "chosen")])
+CONTACT_TERM = np.dtype(
+    [(name, np.int64) for name in ("number", "body", "partner", "elements", "pairs", "chosen", "row", "column")]
+)
 """A term of contact: its number; the columns of its cells with the row of the touched body and of the other body, −1
 for none; the number of elements for contact of lines, else 0; the row of the depth of its first pair for contact of
-bodies, else −1; and the position of the numbers of chosen cells, −1 for none."""
+bodies, else −1; the position of the numbers of chosen cells, −1 for none; the result row of the touched body where
+``body`` is −1; and the column of ``out`` at which its `TOUCH` begins."""
 ContactTermArray = Annotated[np.ndarray, types.Array(from_dtype(CONTACT_TERM), 1, "C")]
 
 
@@ -53,8 +58,12 @@ class ContactForces:
             if term.contact.felt:
                 body, partner = (*term.contact.felt, -1)[:2]
                 lines = elements if term.contact.with_lines and term.energy is not None else 0
-                terms.append((i, body, partner, lines, pairs if term.contact.pairs else -1, -1))
+                terms.append((i, body, partner, lines, pairs if term.contact.pairs else -1, -1, -1, 0))
                 pairs += len(term.contact.pairs)
+        for i, thread in system.threads.items() if system.net.threads else ():
+            for n, wrap in enumerate(thread.wraps):
+                (row,) = (self.row(body) for body in system.net.bodies if body.name == wrap.body)
+                terms.append((i, -1, -1, 0, -1, -1, row, COLUMNS + n * CONTACT_COLUMNS))
         self.terms = np.array(terms, dtype=CONTACT_TERM)
         for n, pair in enumerate(pairs_of(system)):
             self._pairs[frozenset(body.row for body in pair)] = self.rows + n
@@ -105,11 +114,12 @@ def forget(felt):
 def add_felt(first, term, cells, chosen, out, felt):
     """Add forces and depths of the cells of a term; with ``chosen``, shape (cells, 1), of those cells only."""
     for c in range(cells.shape[0]):
-        touch = record_at(TOUCH, out, c, 0)
+        touch = record_at(TOUCH, out, c, term.column)
         depth, force = touch.value, touch.force
         if depth == 0.0 and force[0] == 0.0 and force[1] == 0.0 and force[2] == 0.0:
             continue
-        body, cell = record_at(FELT, felt, cells[c, term.body] - first, 0), chosen[c, 0] if chosen.shape[0] else c
+        row = cells[c, term.body] - first if term.body >= 0 else term.row
+        body, cell = record_at(FELT, felt, row, 0), chosen[c, 0] if chosen.shape[0] else c
         for k in range(3):
             body.force[k] += force[k]
         if term.partner >= 0:

@@ -166,6 +166,18 @@ def test_a_load_hangs_over_a_drum(method):
     assert run.results["z"].value == pytest.approx(-3.0 * G / EA * (2.5 + np.pi * R), rel=1e-9)
 
 
+@pytest.mark.parametrize("body", [DRUM | {"fixed": True}, ON_AXLE | {"mass": 2.0}])
+@pytest.mark.parametrize("kind", ["static", "central-difference", "cvode"])
+def test_reaction_of_a_drum(kind, body):
+    """Both strands press on it with m g; nothing turns it, and its weight is no force of contact."""
+    solve = {"kind": "static"} if kind == "static" else {"kind": "dynamic", "duration": 0.02, "method": kind}
+    rope, seen = HUNG[2] | {"prestrain": 3.0 * G / EA}, {"quantity": "reaction", "body": "drum"}
+    seen = [{"name": "press", "component": "z", **seen}, {"name": "size", **seen}, *PULL["observe"]]
+    run = refweb.run(scene(*HUNG[:2], rope, body, solve, {1: 3.0}, observe=seen))
+    agrees(run.results["press"], -6.0 * G, 6.0 * G)
+    agrees(run.results["size"], 6.0 * G, 6.0 * G)
+
+
 def test_modes_of_a_load_over_a_drum():
     """Up and down by EA/L, across by T/t of the hanging part t, along the axis by T/l of the whole, a helix."""
     mass, natural = 3.0, 2.5 + np.pi * R
@@ -202,9 +214,11 @@ def test_a_ring_is_a_movable_pulley():
     rope = {"nodes": [0, "drum", 1, 2, 3], "around": [OVER | {"side": [0, 0, -1]}], "prestrain": pull / EA}
     body = {"name": "drum", "shape": "ring", "radius": R, "normal": [0, 1, 0], "mass": ring, "position": [0, 0, 0]}
     seen = [{"name": "z", "quantity": "position", "body": "drum", "component": "z"}]
+    seen += [{"name": "press", "quantity": "reaction", "body": "drum", "component": "z"}]
     solve = {"kind": "dynamic", "duration": 0.3, "method": "explicit", "order": 4}
     run = refweb.run(scene(points, [0, 1, 2], rope, body, solve, {3: mass}, observe=seen, output={"interval": 0.1}))
     agrees(run.results["z"], 0.5 * (2.0 * pull / ring - G) * 0.3**2, 1.0)
+    agrees(run.results["press"], 2.0 * pull, 2.0 * pull)
 
 
 def test_the_hoist():

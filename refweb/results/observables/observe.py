@@ -58,9 +58,9 @@ class Observe(Table):
     node : int, str or list, optional
         Node of a nodal quantity, or several, see ``select``; without ``node`` all.
     body : str or list of str, optional
-        Body of a nodal quantity, or several. Its reaction is the force of contact on it, of lines and other bodies
-        together: 0 where nothing touches it, whatever drag, gravity, a frame or the lines that it holds by
-        ``[[attach]]`` do to it. The force with which it holds these is the reaction of their nodes.
+        Body of a nodal quantity, or several. Its reaction is the force of contact on it, of lines, other bodies and
+        threads that run over it together: 0 where nothing touches it, whatever drag, gravity, a frame or what it holds
+        by ``[[attach]]`` do to it. The force with which it holds these is the reaction of their nodes.
     to : str, optional
         Body at the end of a distance from one node or another body. Without it, the distance is that of two nodes.
     line : int, str or list, optional

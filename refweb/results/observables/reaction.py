@@ -1,7 +1,8 @@
 """Reactions: the force of supports on nodes and of contact on bodies, of several their sum or that of one.
 
 A kernel gets the total force f on each row; the force of a support is −f. The contact force on a body is the sum over
-its contacts, see `refweb.system.contact_forces`: it is zero without contact, whatever else acts.
+its contacts and the threads that run over it, see `refweb.system.contact_forces`: it is zero without these, whatever
+else acts.
 
 `of` adds up forces as the kernels of `probes` do; the class docstring is text of `refweb help`.
 """
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Reaction(Nodal):
-    """Force of the supports, or of contact on a body."""
+    """Force of the supports, or of contact on a body and of threads that run over it."""
 
     unit = "N"
 
