@@ -21,6 +21,7 @@ CODES = {
     "digits-not-reached": "The digits asked for are not reached.",
     "event-not-seen": "A threshold is passed and passed back within a step.",
     "flies-past": "A body whose straight path does not meet the web.",
+    "half-turn": "An end of a thread about half a turn round a cylinder from where it was, where turns are lost.",
     "idle-load": "Something acts on supports alone and moves nothing.",
     "integration": "A method of dynamics cannot finish.",
     "kink": "Elements between slack and taut, of which no vibration is linear.",

@@ -70,6 +70,10 @@ def _probes_of_warnings(system, followed, step_size):
     for i in (i for i, term in enumerate(system.terms) if term.contact.crossing is not None):
         cells = len(system.terms[i].cells)
         by_name["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, term=i)
+    if any(thread.wraps for thread in net.threads):
+        from ..effects.half_turns import probe_of as probe_of_turns
+
+        by_name |= {"half turns": probe} if (probe := probe_of_turns(net)) is not None else {}
     if pairs_of(system):
         from ..results.observables.overlap import probe_of_speed, probes_between
 
@@ -415,6 +419,15 @@ class Watch:
         threads = [thread for thread in self.system.net.threads if self._of_warning(thread.title) is not None]
         values = course.extremes.values
         return [(t, float(values[self._of_warning(t.title)] * t.line.curve_scale[0])) for t in threads]
+
+    def half_turns(self, course, drifts=False):
+        """Text on the end of a thread that goes about half a turn round a cylinder, or "", see `half_turn_remark`."""
+        if (at := self._of_warning("half turns")) is None:
+            return ""
+        from ..effects.half_turns import half_turn_remark
+
+        turns, place, time = (getattr(course.extremes, name)[at] for name in ("values", "places", "times"))
+        return half_turn_remark(self.system.net, float(turns), int(place), float(time), drifts)
 
     def overlap_of_lines(self, course):
         """(Deepest overlap of lines in all steps [m], its time [s], its cell), None where lines do not touch lines."""

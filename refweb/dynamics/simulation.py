@@ -260,10 +260,8 @@ class Simulation:
                 report(course.time)
         except SolverError as error:
             self._refuse_overlap(course)  # whatever stopped it: what comes of a line within a body is nonsense
-            if isinstance(error, EnergyDriftError) and any(thread.wraps for thread in self.system.net.threads):
-                from ..effects.half_turns import half_turn_remark
-
-                error.args = (f"{error}{half_turn_remark(self.system.net, course.x)}",)
+            if isinstance(error, EnergyDriftError) and (text := self.watch.half_turns(course, drifts=True)):
+                error.args = (f"{error}; {text}",)
             raise
         finally:
             self._record(course)
@@ -355,6 +353,7 @@ class Simulation:
             solution.utilisation, solution.margin = used, watch.margin(course)
         self._strain, self._share_of_curve = watch.strain(course), watch.share_of_curve(course)
         self._shares_of_threads = watch.shares_of_threads(course)
+        self._half_turns = watch.half_turns(course)
         if self.overlaps is not None:
             solution.bodies = self.overlaps.plain()
             if (pairs := self.overlaps.pairs) is not None:
@@ -429,6 +428,8 @@ class Simulation:
             yield from curve_remark(self.system.net, *self._share_of_curve)
         for thread, share in self._shares_of_threads:
             yield from curve_remark(thread.line, share, 0, thread.title)
+        if self._half_turns:
+            yield Finding("half-turn", self._half_turns, "thread")
         yield from self.system.remarks()
         if self.overlaps is not None:
             yield from self.overlaps.remarks()

@@ -1,17 +1,20 @@
 """Half turns of threads about cylinders: how far ends are from where `winding` counts their turns.
 
 The azimuth of an end is within half a turn of that in the web's position, so an end that goes farther would change the
-length by a whole turn. `statics` refuses an equilibrium near there, and dynamics names it beside an energy drift.
+length by a whole turn. `statics` refuses an equilibrium near there; dynamics follows the farthest end in every step,
+warns of it, and names it beside an energy drift.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..errors import SolverError
+from ..kernels import kernel
+from ..results.probes import PROBE, Probe
 from .around import CYLINDER, body_of
 from .winding import segments_of
 
@@ -22,37 +25,78 @@ if TYPE_CHECKING:
     from ..system.system import System
 
 MOST = 0.45
-"""Turns from where they are counted up to which an equilibrium is taken."""
+"""Turns from where they are counted up to which an equilibrium is taken, and a run has no warning."""
+DOUBT = 0.25
+"""Turns from which on an energy drift may come of them."""
 REMEDY = (
     "as turns are counted up to half a turn from the web: let the body turn about an axle with that end on it, move "
     "the end less, or start from a web in which it is nearer, with around.turns"
 )
 
 
-def half_turns(net: Net, x: NDArray[np.float64]) -> list[tuple[str, int, int, float]]:
-    """(Name of the body, its base, node, turns from where they are counted) of each end on a cylinder.
+class End(NamedTuple):
+    """An end of a segment on a cylinder.
 
-    Parameters
+    Attributes
     ----------
-    net : refweb.net.net.Net
-        The net.
-    x : ndarray, shape (rows, 3)
-        Displacement of every row [m].
+    body : str
+        Name of the body.
+    rows : tuple of 3 int
+        Rows of the node, of the base of the body, and of its angle about its axle, −1 where this does not count.
+    numbers : ndarray, shape (11,)
+        Vector from the middle of the body in the web's position [m], first and second axis of the body, azimuth from
+        which turns are counted [rad], and the sense of the axle.
     """
+
+    body: str
+    rows: tuple[int, int, int]
+    numbers: NDArray[np.float64]
+
+
+def ends_of(net: Net) -> list[End]:
+    """Ends of all segments of threads that are on cylinders."""
     ends = []
     for thread in net.threads:
         segments = segments_of(net, thread)[0] if thread.wraps else None
         for wrap in thread.wraps:
             body, segment = body_of(net, wrap.body), segments[wrap.segment]
-            if segment["kind"] != CYLINDER:
-                continue
-            for n, key in enumerate(("first", "second")):
-                row, turn, near = int(thread.rows[wrap.segment + n]), int(segment["turns"][n]), segment["angles"][n]
-                near += segment["sense"] * x[turn, 1] if turn >= 0 else 0.0
-                across = body.axes @ (segment[key] + x[row] - x[body.base])
-                apart = math.remainder(math.atan2(across[1], across[0]) - near, 2.0 * math.pi)
-                ends.append((wrap.body, body.base, row, apart / (2.0 * math.pi)))
+            for n, key in enumerate(("first", "second") if segment["kind"] == CYLINDER else ()):
+                rows = int(thread.rows[wrap.segment + n]), body.base, int(segment["turns"][n])
+                numbers = [*segment[key], *segment["axes"][:6], segment["angles"][n], segment["sense"]]
+                ends.append(End(wrap.body, rows, np.array(numbers)))
     return ends
+
+
+@kernel()
+def turns_of(x, node, base, turn, numbers):
+    """Turns of an `End` from where they are counted, from −½ to ½."""
+    near, first, second = numbers[9], 0.0, 0.0
+    if turn >= 0:
+        near += numbers[10] * x[turn, 1]
+    for k in range(3):
+        place = numbers[k] + x[node, k] - x[base, k]
+        first, second = first + place * numbers[3 + k], second + place * numbers[6 + k]
+    apart = (math.atan2(second, first) - near) / (2.0 * math.pi)
+    return apart - round(apart)
+
+
+@kernel(PROBE)
+def farthest(t, x, v, f, lines, rows, data, where):
+    """Largest distance of an end from where turns are counted; ``rows`` are those of each `End`, ``data`` numbers."""
+    most = -1.0
+    for n in range(data.shape[0]):
+        turns = abs(turns_of(x, rows[3 * n], rows[3 * n + 1], rows[3 * n + 2], data[n]))
+        if turns > most:
+            most, where[0] = turns, n
+    return most
+
+
+def probe_of(net: Net) -> Probe | None:
+    """Probe of the `farthest` end; None without one."""
+    ends = ends_of(net)
+    if not ends:
+        return None
+    return Probe(farthest, [row for end in ends for row in end.rows], np.array([end.numbers for end in ends]), sign=1.0)
 
 
 def refuse_half_turns(system: System, t: float, x: NDArray[np.float64], before: list[float]) -> list[float]:
@@ -75,10 +119,12 @@ def refuse_half_turns(system: System, t: float, x: NDArray[np.float64], before: 
         For such an end, and one that goes by more than half a turn in a load step, or, where a table moves it or the
         body, by more than a quarter.
     """
-    ends = half_turns(system.net, x)
-    driven = {int(row) for drive in system.drives for row in drive.cells[:, 0]}
-    for (name, base, node, turns), last in zip(ends, before or [0.0] * len(ends), strict=True):
-        about = f'node {node} goes about body "{name}"'
+    ends = ends_of(system.net)
+    driven, now = {int(row) for drive in system.drives for row in drive.cells[:, 0]}, []
+    for end, last in zip(ends, before or [0.0] * len(ends), strict=True):
+        turns, (node, base, _) = turns_of(x, *end.rows, end.numbers), end.rows
+        now.append(turns)
+        about = f'node {node} goes about body "{end.body}"'
         if abs(turns) > MOST:
             raise SolverError(f"step {t:g}: {about} by {turns:.2f} of a turn, limit {MOST:g}, {REMEDY}")
         if abs(turns - last) > (0.25 if {base, node} & driven else 0.5):
@@ -86,15 +132,18 @@ def refuse_half_turns(system: System, t: float, x: NDArray[np.float64], before: 
                 f"step {t:g}: {about} from {last:.2f} to {turns:.2f} of a turn in one load step, by which way is "
                 "open: use more load_steps"
             )
-    return [turns for *_, turns in ends]
+    return now
 
 
-def half_turn_remark(net: Net, x: NDArray[np.float64]) -> str:
-    """Text that names an end far from where turns are counted, which may cause an energy drift; "" without one."""
-    name, _, node, turns = max(half_turns(net, x), key=lambda end: abs(end[3]), default=("", 0, 0, 0.0))
-    if abs(turns) < 0.25:
+def half_turn_remark(net: Net, turns: float, place: int, t: float, drifts: bool) -> str:
+    """Text that names the `farthest` end of a run, by its turns, its number and the time [s]; "" for few turns.
+
+    ``drifts`` is True beside an energy drift, which it may be the cause of.
+    """
+    if turns < (DOUBT if drifts else MOST):
         return ""
+    end = ends_of(net)[place]
     return (
-        f'; node {node} is {turns:.2f} of a turn about body "{name}" from where it was in the web, and its thread may '
-        f"have jumped, {REMEDY}"
+        f'node {end.rows[0]} comes to {turns:.2f} of a turn about body "{end.body}" from where it was in the web, at '
+        f"t = {t:.6g} s, and its thread may have gained or lost a turn there, {REMEDY}"
     )
