@@ -1,4 +1,4 @@
-"""Drawstrings: a thread through the rings of a mouth, and through the rim of a thrown net.
+"""Drawstrings: a thread through the rings of a mouth, and through the rim of thrown nets.
 
 The mouth of ``refweb run drawstring`` is a circle of 1 m of 20 rings, each on a cord. A hand pulls both ends of a
 thread that runs through all rings. Half of the run is integrated by a program of its own: rings with the one tension
@@ -14,6 +14,10 @@ The winch is then run for other coefficients of friction, ``FRICTION``. The cinc
 where the winch starts, to the end: of the segment that it winds, of the one behind the opposite corner, and of the one
 that is tied to it. Without any pull, by a winch that stands still, the weights alone bring the mouth together, but
 later.
+
+The nets of ``refweb run capture-stage`` and ``refweb run capture-satellite`` have rings at their four corners, and a
+winch at one of them. Beside it stands a reel, which pulls as hard as its table asks for. How these nets fold is
+chaotic; forces and times are those of one motion each.
 """
 
 from __future__ import annotations
@@ -33,6 +37,14 @@ SEGMENTS = {"wound": 0, "across": 4, "tied": 7}
 START, NARROW = 0.1, 0.05
 """Time at which the winch starts [s], and the share of its area from which on the mouth counts as closed."""
 REEL = {"lines": "rim", "factor": [[START, 1.0], [0.45, 0.53]]}
+STAGE, RUBBED, HAULED = "capture-stage", (0.0, 0.1, 0.3, 1.0), 0.7
+"""Capture that is run for other coefficients of friction, these, and the time at which its winch starts [s]."""
+CAPTURES = STAGE, "capture-satellite"
+"""Captures that a drawstring closes."""
+CORNERS = {"wound": 0, "across": 2, "tied": 3}
+"""`SEGMENTS` of their drawstrings."""
+RIM = {"lines": "rim", "factor": [[0.7, 1.0], [3.3, 0.28]]}
+"""Reel that closes them."""
 HALF, TAU, STIFFNESS = 0.5, 1e-4, 3e3
 """Time of the comparison [s], damping time of the cords [s], and EA [N]."""
 BEHIND, BACK = 2.0, ((0.1, 0.0, 0.0, 0.0), (0.45, 0.0, 0.0, -1.0))
@@ -67,6 +79,35 @@ def mouth_by_itself(net):
     return 0.5 * np.linalg.norm(np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)), end[120]
 
 
+def seen(given, segments):
+    """Observables of the mean tensions of some segments of the drawstring over a row."""
+    shared = {"quantity": "tension", "thread": "drawstring", "average": given["output"]["interval"]}
+    return [{"name": name, "segment": number, **shared} for name, number in segments.items()]
+
+
+def captured(name, values, reel=False, friction=None, **winch):
+    """Solution of a capture by its name and values, with other friction or keys of its winch, or closed by a reel."""
+    given = refweb.Scene.load(name, values).to_dict() | {"accuracy": {"error": "none"}}
+    if reel:
+        given = {key: value for key, value in given.items() if key not in ("thread", "winch")} | {"reel": [RIM]}
+        given["observe"] = [observe for observe in given["observe"] if observe["name"] in ("mouth", "max_tension")]
+    else:
+        given["thread"][0]["friction"] = given["thread"][0]["friction"] if friction is None else friction
+        given["winch"][0] |= winch
+        given["observe"] += seen(given, CORNERS)
+    return refweb.run(refweb.Scene.from_dict(given))
+
+
+def captures(quick):
+    """Solutions of captures: by scene and way, and those of the stage by friction and with a winch at rest."""
+    values = {"web.layers": 3, "web.cell_area": 4.0, "self_contact": False} if quick else {}
+    caught = {(name, way): captured(name, values, way == "reel") for name in CAPTURES for way in ("winch", "reel")}
+    rubbed = {mu: caught[STAGE, "winch"] if mu == 0.1 else captured(STAGE, values, friction=mu) for mu in RUBBED}
+    return caught, {f"{mu:g}": solution for mu, solution in rubbed.items()} | {
+        "winch stands still": captured(STAGE, values, speed=0.0)
+    }
+
+
 def closing(way, **winch):
     """Solution of the closing net: its rim closed by its "winch", a "reel", or a drawstring "held" or "pulled".
 
@@ -77,8 +118,7 @@ def closing(way, **winch):
     if way == "winch":
         given["thread"][0]["friction"] = winch.pop("friction", given["thread"][0]["friction"])
         given["winch"][0] |= winch
-        seen = {"quantity": "tension", "thread": "drawstring", "average": given["output"]["interval"]}
-        given["observe"] += [{"name": name, "segment": number, **seen} for name, number in SEGMENTS.items()]
+        given["observe"] += seen(given, SEGMENTS)
         return refweb.run(refweb.Scene.from_dict(given))
     of_winch = ("pull", "energy_of_winch", "mouth")
     given["observe"] = [observe for observe in given["observe"] if observe["name"] not in of_winch]
@@ -131,12 +171,12 @@ def narrow(solution):
     return float(solution.history["time"][small.argmax()]) if small.any() else None
 
 
-def by_friction(runs):
-    """Table of the cinch force and the mouth by coefficient of friction."""
+def by_friction(title, runs, start):
+    """Table of the cinch force from the start of the winch on [s], and of the mouth, by coefficient of friction."""
     table = []
     for name, solution in runs.items():
         history = solution.history
-        pulls = [history[segment][history["time"] > START].mean() for segment in SEGMENTS]
+        pulls = [history[segment][history["time"] > start].mean() for segment in SEGMENTS]
         mouth, when = history["mouth"], narrow(solution)
         table.append(
             [
@@ -149,8 +189,30 @@ def by_friction(runs):
                 f"{100.0 * mouth.min() / mouth[0]:.2g} %",
             ]
         )
-    columns = ["friction", *(f"pull, {name}" for name in SEGMENTS), "lost half-way", "work", "heat at the rings"]
-    return Table("Cinch force by friction at the rings", [*columns, "mouth at 5 %", "least mouth"], table)
+    columns = ["friction", *(f"pull, {name}" for name in SEGMENTS), "lost half-way", "work", "heat"]
+    return Table(title, [*columns, "mouth at 5 %", "least mouth"], table)
+
+
+def by_way(runs):
+    """Table of captures, each closed by its drawstring and by a reel."""
+    table = []
+    for (name, way), solution in runs.items():
+        mouth, found = solution.history["mouth"], solution.results
+        table.append(
+            [
+                name,
+                "drawstring, μ = 0.1" if way == "winch" else "reel on every line of the rim",
+                f"{100.0 * mouth.min() / mouth[0]:.2g} %",
+                f"{100.0 * mouth[-1] / mouth[0]:.2g} %",
+                f"{found['max_tension'].value:.0f} N",
+                f"{found['pull'].value:.0f} N" if "pull" in found else "none",
+                f"{work_of(solution):.0f} J",
+                f"{solution.throw['covered']['value']:.3f}",
+                f"{solution.cost['cpu_s'] - solution.cost['compile_s']:.0f} s",
+            ]
+        )
+    columns = ["capture", "closed by", "least mouth", "mouth at the end", "largest tension", "pull on the drawstring"]
+    return Table("Captures", [*columns, "work", "covered", "CPU time"], table)
 
 
 def case(quick):
@@ -205,6 +267,8 @@ def case(quick):
                 f"{found['debris_speed'].value:.2f} m/s",
             ]
         )
+    caught, by_mu = captures(quick)
+    ends = {key: solution.history["mouth"][-1] / solution.history["mouth"][0] for key, solution in caught.items()}
     held = runs["drawstring, ends held"]
     wound, across = (rubbed["0.3"].history[name].mean() for name in ("wound", "across"))
     lost, earlier = 1.0 - across / wound, narrow(still) - narrow(rubbed["0.3"])
@@ -234,10 +298,23 @@ def case(quick):
                 f"to {100.0 * NARROW:g} % of its area {1e3 * earlier:.0f} ms earlier than without any pull",
                 checked=bool(lost > 0.3 and earlier > 0.0),
             ),
+            Verdict(
+                "a drawstring through rings at the corners closes the captures",
+                "holds",
+                "at the end the mouth has "
+                + ", ".join(
+                    f"{100.0 * ends[name, 'winch']:.2g} % of its area in {name} (by the reel "
+                    f"{100.0 * ends[name, 'reel']:.2g} %)"
+                    for name in CAPTURES
+                ),
+                checked=quick or all(ends[name, "winch"] < NARROW for name in CAPTURES),
+            ),
         ],
         tables=[
             Table("A net closes around debris", [*columns, "speed of the debris"], table),
-            by_friction(rubbed | {"winch stands still": still}),
+            by_friction("Cinch force by friction at the rings", rubbed | {"winch stands still": still}, START),
+            by_way(caught),
+            by_friction("Cinch force in the capture of the stage", by_mu, HAULED),
         ],
         figures=[Figure("Mouth of the net over time.", drawn)],
     )

@@ -24,10 +24,17 @@ MASS = 600.0
 """Of the satellite [kg]."""
 
 
+def outside(points):
+    """Distance of points to the three boxes [m], see `capture.clearance`."""
+    centres, sizes = ([[at, 0.0, 0.0] for _, at in BOXES], [size for size, _ in BOXES])
+    over = np.abs(points[:, None, :] - centres) - 0.5 * np.array(sizes)
+    return np.linalg.norm(np.maximum(over, 0.0), axis=2).min(axis=1)
+
+
 def case(quick):
     values = {"web.layers": 3, "web.cell_area": 4.0, "self_contact": False} if quick else {}
     solution = refweb.run(refweb.Scene.load("capture-satellite", values))
-    rows, verdicts = judged(solution, "satellite")
+    rows, verdicts = judged(solution, "satellite", None if quick else outside)
     volumes = [float(np.prod(size)) for size, _ in BOXES]
     moments = np.zeros(3)
     for volume, (size, at) in zip(volumes, BOXES, strict=True):
