@@ -9,6 +9,8 @@ from __future__ import annotations
 def one_line(text):
     """A text without line breaks and control characters."""
     text = " ".join(str(text).split())
+    if text.isprintable():
+        return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 

@@ -148,9 +148,11 @@ class Inputs:
         InputError
             For a path or a value that a command cannot have.
         """
-        with refused_at(f"{short(command.path)} = {quote(command.value)}:"):
+        try:
             name, number, effect = self._changed(command, command.time)
             writes = self._writes(name, self._given[name][number], effect)
+        except InputError as error:
+            raise InputError(f"{short(command.path)} = {quote(command.value)}: {error}") from None
         self.present[name, number] = effect
         return writes
 
@@ -165,12 +167,22 @@ class Inputs:
         """Write the numbers of checked commands in a run, and keep the balances of the run closed."""
         system, t, x, v = self._system, course.time, course.x, course.v
         terms = [term for term in system.terms if any(term.data is array for array, _ in writes)]
-        before = system.forces(t, x, v).force, *self._booked(terms, t, x)
+        acting = terms if len(terms) == len(writes) else system.terms  # a motion or a length acts on all
+        before = self._force_of(acting, t, x, v), *self._booked(terms, t, x)
         self._write(writes)
-        force, energy, impulse = system.forces(t, x, v).force, *self._booked(terms, t, x)
+        force, energy, impulse = self._force_of(acting, t, x, v), *self._booked(terms, t, x)
         course.work[-1] += energy - before[1]
         course.ledger.given[:] += impulse - before[2]
         integrator.renew(course, force - before[0])
+
+    def _force_of(self, terms, t, x, v):
+        """Force of some terms on every row [N]."""
+        force = np.zeros_like(x)
+        for term in terms:
+            force += self._system.force_of(term, t, x, v)
+        if self._system.carriers:
+            self._system.carriers.add_forces_to_bodies(x, force)
+        return force
 
     def _booked(self, terms, t, x):
         """Energy of terms that are booked by it [J], and the values of their formulas of impulses [N s]."""
@@ -211,7 +223,7 @@ class Inputs:
             raise InputError(f"{quote(key)} is not a key of [{name}] that a command may set, {nearest(key, keys)}")
         if name == "winch":
             return name, number, effect.commanded(key, _finite(command.value, 1)[0])
-        return name, number, replace(effect, **{key: command.value})
+        return name, number, effect.with_value(key, command.value)
 
     @staticmethod
     def _number(name, word, effects):

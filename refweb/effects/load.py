@@ -54,4 +54,4 @@ class Load(Table):
     def on(self, net: Net) -> ForceTerm:
         """The term of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
-        return nodal_load(net, "load", loaded, np.tile(self.force, (len(loaded), 1)), self.factor)
+        return nodal_load(net, "load", loaded, np.broadcast_to(self.force, (len(loaded), 3)), self.factor)

@@ -70,10 +70,13 @@ def outer_load(
     table = factor or ()
     largest = max((abs(value) for _, value in table), default=1.0)
     numbers = [largest, *((0.0, 1.0) if net.quasi_static else (1.0, 0.0)), *flattened(table)]
+    columns = data.shape[1]
+    with_factor = np.empty((len(cells), columns + len(numbers)))
+    with_factor[:, :columns], with_factor[:, columns:] = data, numbers
     return ForceTerm(
         name=name,
         cells=cells,
-        data=np.hstack([data, np.tile(numbers, (len(cells), 1))]),
+        data=with_factor,
         balance=Balance("work", power=0, impulse=impulse),
         timing=Timing(tuple(t for t, _ in table)),
         **parts,

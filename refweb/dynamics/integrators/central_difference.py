@@ -111,12 +111,8 @@ class CentralDifference(Integrator):
         self.model = Model.of(system, outs)
         self._observed = Observed.of(probes, sums, len(outs), outs, self.model.contacts)
         self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])
-        self._events, self._least_energy, self._taken, self._prepared = (
-            event_rows(events),
-            least_energy(net),
-            None,
-            False,
-        )
+        self._events, self._least_energy = event_rows(events), least_energy(net)
+        self._taken, self._prepared, self._kept = None, False, ()
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
@@ -235,15 +231,23 @@ class CentralDifference(Integrator):
         numbers = (self.safety * self.stretch, least_steps, step, self.finer)
         return Scheme(self.kicks, self.drifts, *map(float, numbers))
 
-    def _running(self, course):
-        clock = np.zeros(1, dtype=CLOCK)
+    def _records(self, course):
+        """(`Running`, `Workspace`) of a course; those of the last one where it has the same arrays."""
+        state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
+        written = *state, course.extremes, course.events, course.averages, course.power, course.crossings
+        if not self._kept or any(array is not known for array, known in zip(written, self._kept[0], strict=True)):
+            lengths = np.zeros((2, len(self.model.lengths.elements)))
+            carried = course.power, lengths, course.crossings, *self._contacts
+            running = Running(np.zeros(1, dtype=CLOCK), *written[:-2], *carried)
+            self._kept = written, running, Workspace.of(self.model, running)
+        _, running, workspace = self._kept
+        clock = running.clock
+        clock[...] = np.zeros(1, dtype=CLOCK)
         for name in SHARED:
             clock[name] = getattr(course, name)
         clock["least_energy"] = self._least_energy
-        changing = len(self.model.lengths.elements)
-        state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
-        carried = course.power, np.zeros((2, changing)), course.crossings, *self._contacts
-        return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
+        running.length_force[...] = 0.0
+        return running, workspace
 
     def advance(self, course: ExplicitState, times):
         """Take a course to each of some times; equal steps lead to each.
@@ -255,8 +259,8 @@ class CentralDifference(Integrator):
         history = History.empty(len(times), len(self.observed[0]), self.system.terms)
         work = len(self.drifts) * sum(len(term.cells) for term in self.system.terms)
         done, breath = 0, max(BREATH // max(work, 1), 1)
-        running = self._running(course)
-        records = self._scheme, self.model, self._observed, running, Workspace.of(self.model, running)
+        running, workspace = self._records(course)
+        records = self._scheme, self.model, self._observed, running, workspace
         clock = running.clock
         if len(self.model.ccd.checks):
             reset_checks.call(self.model.ccd)
