@@ -68,6 +68,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .studies.modes import Modes as Modes
     from .studies.modes import modes as modes
     from .studies.work_precision import cost as cost
+    from .sweeps.episodes import Gym as Gym
     from .sweeps.study import Study as Study
     from .sweeps.study_result import Sweep as Sweep
     from .sweeps.sweep import sweep as sweep

@@ -71,6 +71,7 @@ PARTS = {
     "output": "refweb.settings:Output",
     "accuracy": "refweb.settings:Accuracy",
     "throw": "refweb.results.throw:Throw",
+    "gym": "refweb.sweeps.episodes:Gym",
 }
 """Tables of a scene besides webs, effects and ``[solve]`` that stand once."""
 LISTS = {
@@ -234,6 +235,7 @@ EXPORTS = (
     "refweb.settings:Event",
     "refweb.settings:Control",
     "refweb.results.throw:Throw",
+    "refweb.sweeps.episodes:Gym",
     "refweb.results.observables.observe:Observe",
     "refweb.solution:Solution",
     "refweb.net.cable:Cable",

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from .results.observables.observe import Observe
     from .results.throw import Throw
     from .solution import Solution
+    from .sweeps.episodes import Gym
     from .system.system import System
 
 CLASSES_OF_PARTS = {
@@ -54,6 +55,7 @@ CLASSES_OF_PARTS = {
     "output": ("Output",),
     "accuracy": ("Accuracy", "NoneType"),
     "throw": ("Throw", "NoneType"),
+    "gym": ("Gym", "NoneType"),
     "observe": ("Observe",),
     "event": ("Event",),
     "control": ("Control",),
@@ -96,6 +98,8 @@ class Scene:
         How errors are found.
     throw : refweb.Throw, optional
         Numbers that a throw is judged by.
+    gym : refweb.Gym, optional
+        Learning environment, in dynamics.
     observe : sequence of refweb.Observe
         Numbers to follow; `refweb.results.observables.observe.default` without any.
     event : sequence of Event
@@ -124,6 +128,7 @@ class Scene:
     output: Output = field(default_factory=Output)
     accuracy: Accuracy = field(default_factory=Accuracy)
     throw: Throw | None = None
+    gym: Gym | None = None
     observe: Several = ()
     event: Several = ()
     control: Several = ()
@@ -169,7 +174,10 @@ class Scene:
         for key, given in (("event", self.event), ("control", self.control)):
             if not dynamic and given:
                 raise InputError(f"[[{key}]] {quote(given[0].name)} has no meaning in statics: leave it out")
-        interval = output.interval or min((control.period for control in self.control), default=None)
+        acting = [*self.control, *([self.gym] if self.gym else [])]
+        if not dynamic and acting:
+            raise InputError("[gym] has no meaning in statics: leave it out")
+        interval = output.interval or min((part.period for part in acting), default=None)
         interval = (interval or default_interval(solve)) if dynamic else None
         frames = output.frames or (10 if dynamic else 1)
         object.__setattr__(self, "output", Output(interval=interval, frames=frames))
@@ -235,7 +243,7 @@ class Scene:
                 raise InputError(f"{_as_given(key, given[key])}: unknown table or key, {hint}")
         Head(schema=given.get("schema", 1))
         parts = {key: given[key] for key in ("title", "seed") if key in given}
-        parts |= {"folder": folder, "file": file}
+        parts |= {"folder": None if folder is None else pathlib.Path(folder), "file": file}
         for key in ("web", "cable", "solve"):
             if key not in given:
                 raise InputError(f"[{key}] is missing: every scene has one")
@@ -282,6 +290,8 @@ class Scene:
             given["accuracy"] = self.accuracy.to_dict()
         if self.throw is not None:
             given["throw"] = self.throw.to_dict()
+        if self.gym is not None:
+            given["gym"] = self.gym.to_dict()
         given["observe"] = [o.to_dict() for o in self.observables]
         if self.event:
             given["event"] = [event.to_dict() for event in self.event]
@@ -338,7 +348,7 @@ class Scene:
 
         Names of the bodies that it is chosen for, and "self_contact", stand in ``chosen``.
         """
-        return self.settle()[0] if self._left_out() else self
+        return self.settle()[0] if self.left_out() else self
 
     def build(self) -> System:
         """The `refweb.system.system.System` of this scene, with the stiffness of contact that it leaves out chosen.
@@ -350,7 +360,7 @@ class Scene:
         """
         return self.settle()[1]
 
-    def _left_out(self):
+    def left_out(self) -> list[str]:
         """Names of the bodies, and "self_contact", whose stiffness is left out, a list."""
         lines = [e for e in self.effects if name_of(EFFECTS, e) == "self_contact" and e.stiffness is None]
         bodies = [effect for effect in self.effects if name_of(EFFECTS, effect) == "body"] if self.contact else []
@@ -358,7 +368,7 @@ class Scene:
 
     def settle(self) -> tuple[Scene, System]:
         """(`settled`, `build`) of it: it is built once, with any stiffness, and contact again with those chosen."""
-        missing, chosen = self._left_out(), {}
+        missing, chosen = self.left_out(), {}
         if not missing:
             return self, self._built()
         system = self.with_stiffness(dict.fromkeys(missing, 1.0))._built()
@@ -384,7 +394,7 @@ class Scene:
         """The system of a scene that leaves out no stiffness."""
         from .build import build
 
-        scene = load("refweb.dynamics.commands:widened")(self) if self.control else self
+        scene = load("refweb.dynamics.commands:widened")(self) if self.control or self.gym else self
         with in_file(self.file):
             system = build(
                 web=self.web,
@@ -401,6 +411,9 @@ class Scene:
             )
             if self.control:
                 load("refweb.dynamics.controllers:check")(self, system)
+            if self.gym is not None:
+                with refused_at("[gym]"):
+                    self.gym.check_in(self, system)
             if self.throw is not None:
                 with refused_at("[throw]"):
                     self.throw.on(self.observables, system, self.solve)

@@ -99,6 +99,11 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
         "*",
         "Many runs of one scene: cases, workers, rows and statistics; it knows scenes and runs, and no command line.",
     ),
+    (
+        "gym",
+        "*",
+        "Gymnasium environments of scenes: spaces, episodes, images; they know stepped runs, and no command line.",
+    ),
     ("commands", "*", "The verbs of the command line, one file each; they know everything, and nothing knows them."),
     ("the door", "__main__", ""),
 ]

@@ -132,6 +132,8 @@ def roots(given, method):
         yield "results.throw"
     if any("axle" in body for body in bodies):
         yield "effects.axle"
+    if "gym" in given:
+        yield from ("sweeps.episodes", "dynamics.controllers")  # inputs are checked as those of controls are
     if any("around" in thread for thread in given.get("thread", ())):
         yield from ("effects.around", "effects.half_turns", "effects.winding")
     if "winch" in given or any("friction" in thread for thread in given.get("thread", ())):

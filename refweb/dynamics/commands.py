@@ -14,14 +14,14 @@ its term follow from the new table of the effect.
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..effects.base import ForceTerm
 from ..effects.time_tables import flattened
-from ..errors import InputError, refused_at
+from ..errors import InputError
 from ..messages import nearest, quote, short
 from ..registry import EFFECTS, name_of
 
@@ -89,6 +89,29 @@ def widened(scene: Scene) -> Scene:
     return scene.replace(effects=tuple(effects))
 
 
+def only_numbers_differ(scene: Scene, changed: Scene) -> list[tuple[str, int, Any]] | None:
+    """Effects of a changed scene that differ in initial velocities or in `INPUTS`, by name and number.
+
+    None where the scenes differ in more, and where an equilibrium or a stiffness of contact follows from such numbers.
+    """
+    compared = [f.name for f in fields(scene) if f.compare and f.name != "effects"]
+    same = all(getattr(scene, name) == getattr(changed, name) for name in compared)
+    if not same or len(scene.effects) != len(changed.effects) or scene.solve.start != "web" or scene.left_out():
+        return None
+    changes, counts = [], {}
+    for given, effect in zip(scene.effects, changed.effects, strict=True):
+        name = str(name_of(EFFECTS, given))
+        counts[name] = counts.get(name, -1) + 1
+        if given == effect:
+            continue
+        key = INPUTS.get(name)
+        alike = key and type(given) is type(effect) and given.with_value(key, getattr(effect, key)) == effect
+        if not alike and not (name == "velocity" and type(given) is type(effect)):
+            return None
+        changes.append((name, counts[name], effect))
+    return changes
+
+
 class Inputs:
     """Values of the effects of a system that commands may set.
 
@@ -113,10 +136,13 @@ class Inputs:
             raise InputError("commands cannot stand beside [rupture]: leave out one of them")
         self._system, self._first = system, {}
         self._given: dict[str, list[Any]] = {}
+        self._acting: dict[str, list[Any]] = {}
         for acting, _ in system.acting:
             effect = getattr(acting, "effect", None)
             if effect is not None:
-                self._given.setdefault(str(name_of(EFFECTS, effect)), []).append(effect)
+                name = str(name_of(EFFECTS, effect))
+                self._given.setdefault(name, []).append(effect)
+                self._acting.setdefault(name, []).append(acting)
         self.present: dict[tuple[str, int], Any] = {}
 
     def reset(self) -> None:
@@ -125,6 +151,15 @@ class Inputs:
             array[...] = values
         self.present.clear()
         self._system.forget_lengths()
+
+    def take_on(self, changes: list[tuple[str, int, Any]]) -> None:
+        """Take other effects as those of the scene, by name and number, as `only_numbers_differ` gives them."""
+        self.reset()
+        for name, number, effect in changes:
+            for array, numbers in self._writes(name, self._given[name][number], effect) if name in INPUTS else ():
+                array[...] = numbers
+            self._given[name][number] = self._acting[name][number].effect = effect
+        self._first.clear()
 
     def restore(self, present: dict[tuple[str, int], Any]) -> None:
         """Take the values of another `Inputs` of the same scene."""

@@ -16,7 +16,7 @@ from ..registry import load
 from ..results.provenance import versions, web_of
 from ..results.solution import as_history
 from ..scene import Scene
-from .commands import NEAR, Command, Inputs, row_at, widened
+from .commands import NEAR, Command, Inputs, only_numbers_differ, row_at, widened
 from .schedule import Schedule, block_of, times_of
 from .simulation import Simulation
 
@@ -63,8 +63,38 @@ class SteppedRun:
         self.scene: Scene = scene
         self.commands: list[Command] = []
         self._make(None)
+        self._set_off()
+
+    def _set_off(self):
+        """Go to the first row, at t = 0."""
+        self._pending, self._tables, self._row = [], [], 0
         self._course = self._simulation.integrator.start(*self._simulation.begin.motion)
         self._go_to_row(1)
+
+    def restart(self, scene: Scene | None = None) -> None:
+        """Begin again at t = 0 with the values of the scene, and without commands; it costs less than a new run.
+
+        Parameters
+        ----------
+        scene : Scene, optional
+            Another scene. Where it differs from that of the run in initial velocities, and in values that `set` may
+            change other than rates and torques, alone, the system is used again.
+
+        Raises
+        ------
+        InputError, SolverError
+            As `SteppedRun`.
+        """
+        changes = [] if scene is None else only_numbers_differ(self.scene, scene)
+        self.scene, self.commands = scene or self.scene, []
+        if changes is None:
+            self._make(None)
+        else:
+            self._inputs.take_on(changes)
+            self._schedule.reset()
+            self._simulation.scene = self.scene if scene is not None else self._simulation.scene
+            self._simulation.again(None)
+        self._set_off()
 
     def _make(self, begin):
         """Make the simulation, at the start of another one or at its own."""
@@ -77,7 +107,6 @@ class SteppedRun:
             self._simulation.begin = begin
         commands = self._schedule.commands
         self._inputs = Inputs(system) if commands is None else commands.inputs
-        self._pending, self._tables, self._row = [], [], 0
         prepare = getattr(self._simulation.integrator, "prepare", None)
         if prepare is not None:
             prepare()
@@ -112,6 +141,23 @@ class SteppedRun:
         return self._course.stopped or self._row == len(self._schedule.times)
 
     @property
+    def drift(self) -> float:
+        """Energy drift until now over the largest energy, see `refweb.dynamics.integrators.energy_balance`."""
+        return float(self._course.drift)
+
+    @property
+    def steps(self) -> int:
+        """Number of steps until now."""
+        return int(self._course.nsteps)
+
+    @property
+    def event(self) -> str | None:
+        """Name of the event that has ended the run; None where none has."""
+        times = self._course.events["time"] if self._course.stopped else ()
+        named = zip(self.scene.event, times, strict=False)
+        return next((event.name for event, time in named if event.stop and np.isfinite(time)), None)
+
+    @property
     def state(self) -> State:
         """The present `refweb.results.state.State`; it shares its arrays with the run, and holds until it goes on."""
         return self._simulation.watch.state(self._course)
@@ -120,6 +166,12 @@ class SteppedRun:
     def history(self) -> dict[str, NDArray[np.float64]]:
         """Columns of ``history.csv`` until now by name, arrays of shape (rows,)."""
         return as_history(self._simulation.columns, np.concatenate(self._tables))
+
+    @property
+    def observed(self) -> dict[str, float]:
+        """The present values of all observables of the scene by name."""
+        names = (o.name for o in self._simulation.watch.observables)
+        return dict(zip(names, self._tables[-1][-1, 1:].tolist(), strict=False))
 
     def observe(self, name: str) -> float:
         """The present value of an observable of the scene.
@@ -134,10 +186,10 @@ class SteppedRun:
         InputError
             For a name that the scene does not have.
         """
-        names = [o.name for o in self._simulation.watch.observables]
-        if name not in names:
-            raise InputError(f"{quote(name)} is not an observable of the scene, {nearest(name, names)}")
-        return float(self._tables[-1][-1, 1 + names.index(name)])
+        observed = self.observed
+        if name not in observed:
+            raise InputError(f"{quote(name)} is not an observable of the scene, {nearest(name, observed)}")
+        return observed[name]
 
     def set(self, path: str, value: Any) -> None:
         """Set a value from now on; it takes effect when the run goes ahead.

@@ -105,14 +105,14 @@ def _samples(study):
     if not drawn:
         return []
     if not study.indices:
-        return [(n, "", row) for n, row in enumerate(_placed(drawn, _uniform(study, len(drawn))))]
+        return [(n, "", row) for n, row in enumerate(placed(drawn, _uniform(study, len(drawn))))]
     both = _uniform(study, 2 * len(drawn))
     first, second = both[:, : len(drawn)], both[:, len(drawn) :]
     parts = {"A": first, "B": second}
     for column, path in enumerate(drawn):
         parts[path] = first.copy()
         parts[path][:, column] = second[:, column]
-    return [(n, part, row) for part, shares in parts.items() for n, row in enumerate(_placed(drawn, shares))]
+    return [(n, part, row) for part, shares in parts.items() for n, row in enumerate(placed(drawn, shares))]
 
 
 def _uniform(study, width):
@@ -128,7 +128,7 @@ def _uniform(study, width):
         return kind(width, scramble=True, seed=generator).random(study.count)
 
 
-def _placed(drawn, shares):
+def placed(drawn, shares):
     """Values by path, a dict for each sample, from probabilities of the distributions, shape (samples, paths)."""
     columns = []
     for distribution, column in zip(drawn.values(), shares.T, strict=True):

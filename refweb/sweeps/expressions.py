@@ -1,11 +1,12 @@
-"""Conditions such as ``max_stress > 2e8 and speed < 3``: a parser and interval evaluation, without Python's eval.
+"""Conditions such as ``max_stress > 2e8 and speed < 3``: a parser, and their evaluation by intervals.
 
 A condition holds arithmetic, comparisons, ``and``, ``or``, ``not``, the functions `FUNCTIONS`, numbers, texts in quotes
 and names. Names may contain dots and numbers, as the paths of scenes do, ``body.0.mass``, and may have an index,
 ``body.0.velocity[2]``. The value of a name is a number or an `Interval`, a result with its ±. Expressions are evaluated
 by interval arithmetic. A comparison is true or false only if it is so for all values in the intervals; otherwise it is
 None, undecided (Kleene's logic). A computed interval may be wider than the exact one if a name occurs twice. It is
-never narrower, except for rounding.
+never narrower, except for rounding. A `Formula` of numbers without ± is compiled, since it is evaluated at each step of
+an environment: the compiled code holds what has been read here, and nothing else.
 
 The library simpleeval 1.0, with functions of intervals, evaluates ``and`` by Python's truth values: with y from 1 to 3
 and x = 2 it leaves ``y > 2 and x > 3`` undecided, though it is false. Its methods for ``and``, ``or`` and comparisons
@@ -114,6 +115,8 @@ class Expression:
         The condition.
     names : collection of str
         Names that it may use; the last part of a path is an abbreviation of the path if no other path has it.
+    number : bool
+        True for a number, such as ``2*speed``, which may also be a condition.
 
     Raises
     ------
@@ -121,7 +124,7 @@ class Expression:
         For a text that is no condition, and for an unknown name, with the nearest known one.
     """
 
-    def __init__(self, text, names):
+    def __init__(self, text, names, number=False):
         self.text, self._aliases = text, {}
         if len(text) > LONGEST:
             raise InputError(f"a condition must have at most {LONGEST} characters, not {len(text)}")
@@ -145,7 +148,7 @@ class Expression:
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise InputError(f"{quote(text)}: is not a condition, such as max_stress > 2e8") from None
         self._check(self._tree, 0)
-        if not isinstance(self._tree, ast.Compare | ast.BoolOp) and not (
+        if not (number or isinstance(self._tree, ast.Compare | ast.BoolOp)) and not (
             isinstance(self._tree, ast.UnaryOp) and isinstance(self._tree.op, ast.Not)
         ):
             raise InputError(f"{quote(text)}: compares nothing: a condition is such as max_stress > 2e8")
@@ -225,6 +228,53 @@ class Expression:
             inner = _number(self._value(node.operand, values))
             return inner if isinstance(node.op, ast.UAdd) else Interval(-inner.high, -inner.low)
         return self._truth(node, values)
+
+
+class Formula(Expression):
+    """A number or a condition of numbers without ±, compiled; a condition in a sum counts as 1 or 0.
+
+    Parameters
+    ----------
+    text, names, number
+        See `Expression`.
+
+    Raises
+    ------
+    InputError
+        As `Expression`.
+    """
+
+    def __init__(self, text, names, number=False):
+        super().__init__(text, names, number)
+        tree = ast.fix_missing_locations(ast.Expression(_Floats().visit(self._tree)))
+        self._code = compile(tree, "<formula>", "eval")
+
+    def __call__(self, values):
+        """Evaluate with numbers by name; NaN where it has no value, as of 1/0 and of the root of −1."""
+        names = {alias: values[name] for alias, name in self._aliases.items()}
+        try:
+            value = eval(self._code, dict(_PLAIN), names)  # of what `_check` has let through alone
+        except (ArithmeticError, ValueError):
+            return math.nan
+        except (TypeError, IndexError):
+            raise InputError(f"{quote(self.text)}: cannot be computed of {_values_text(values, self.used)}") from None
+        return math.nan if isinstance(value, complex) else float(value)
+
+
+class _Floats(ast.NodeTransformer):
+    """Whole numbers as floats, whose powers stay short; indices stay whole."""
+
+    def visit_Subscript(self, node):
+        """Leave an index as it is."""
+        return node
+
+    def visit_Constant(self, node):
+        """Make a whole number a float."""
+        return ast.Constant(float(str(node.value))) if type(node.value) is int else node
+
+
+_PLAIN = {"__builtins__": {}, "abs": abs, "sqrt": math.sqrt, "min": min, "max": max}
+"""`FUNCTIONS` of plain numbers."""
 
 
 def _with_short(names):

@@ -5,6 +5,7 @@ Keys are the format of study files, and the docstring of `Study` is text of `ref
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import pathlib
@@ -18,6 +19,7 @@ from ..messages import nearest, quote, short
 from ..tables import Several, Table, boolean, checked, choice, field, integer, numbers_list, real, table, text
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from os import PathLike
 
 SHIPPED_STUDIES = pathlib.Path(__file__).parent / "shipped"
@@ -56,9 +58,7 @@ class Distribution(NamedTuple):
     @property
     def frozen(self) -> Any:
         """Frozen distribution of `scipy.stats`, with its parameters."""
-        from scipy import stats
-
-        return getattr(stats, self.name)(**dict(self.keys))
+        return _frozen(self)
 
     @property
     def discrete(self) -> bool:
@@ -68,22 +68,29 @@ class Distribution(NamedTuple):
         return isinstance(getattr(stats, self.name), stats.rv_discrete)
 
 
+@functools.lru_cache
+def _frozen(distribution):
+    from scipy import stats
+
+    return getattr(stats, distribution.name)(**dict(distribution.keys))
+
+
 def read_parameters(name: str, given: Any) -> dict[str, Any]:
     """Parameters of a study by path: a list of cases, a `Range` or a `Distribution`."""
     if not isinstance(given, dict) or not given:
         raise InputError(f'{name} = {quote(given)} must be a table of values by path, "solve.duration" = [0.1, 0.2]')
-    return {path: _parameter(f"{name}: {short(path)}", value) for path, value in _flat(given)}
+    return {path: _parameter(f"{name}: {short(path)}", value) for path, value in by_path(given)}
 
 
 _KEYS = {"from", "to", "count", "spacing", "distribution"}
 
 
-def _flat(given, above=""):
+def by_path(given: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
     """Pairs of path and value; TOML reads dotted keys without quotes as nested tables."""
     for key, value in given.items():
         path = f"{above}.{key}" if above else str(key)
         if isinstance(value, dict) and value and all(isinstance(item, dict | list) for item in value.values()):
-            yield from _flat(value, path)
+            yield from by_path(value, path)
         else:
             yield path, value
 
@@ -306,7 +313,7 @@ class Study(Table):
         """The study as plain TOML values."""
         given = {key: value for key, value in super().to_dict().items() if key not in ("folder", "parameters")}
         return {key: value for key, value in given.items() if value != {}} | {
-            "parameters": {path: _plain(parameter) for path, parameter in self.parameters.items()}
+            "parameters": {path: plain(parameter) for path, parameter in self.parameters.items()}
         }
 
 
@@ -318,7 +325,8 @@ def _values(parameter: Any):
     return [parameter.at(n / max(count - 1, 1)) for n in range(count)]
 
 
-def _plain(parameter):
+def plain(parameter):
+    """A parameter as plain TOML values."""
     if isinstance(parameter, Range):
         count = {"count": parameter.count} if parameter.count else {}
         return {"from": parameter.low, "to": parameter.high} | count | ({"spacing": "log"} if parameter.log else {})

@@ -290,3 +290,25 @@ def test_a_scene_by_name_and_an_equilibrium():
     run.advance()
     begun.advance(0.2)
     assert abs(begun.observe("x2") - 2.0 / EA) < 1e-6
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_a_restarted_run_is_a_new_one(name):
+    """With other loads and velocities, for which the system is used again, with other masses, and as before."""
+    drifting = {"velocity": [{"node": 4, "value": [0.1, 0.0, 0.0]}]}
+    one = scene(STEPS[name], **MOVED, **drifting)
+    run = driven(refweb.start(one), until=0.1)
+    loaded = scene(STEPS[name], **{**MOVED, "gravity": {"acceleration": [0, 0, -0.2]}},
+                   velocity=[{"node": 4, "value": [-0.3, 0.2, 0.0]}],
+                   load=[{"node": node, "force": [0.5, 0.0, 0.0]} for node in (2, 4)])  # fmt: skip
+    heavier = scene(STEPS[name], point_mass=[{"node": node, "mass": 2.0} for node in (2, 4)], **MOVED, **drifting)
+    system = run.state.system
+    for changed in (None, loaded, loaded, one, heavier, None):
+        run.restart(changed)
+        expected = driven(refweb.start(changed or run.scene), until=0.1)
+        assert run.time == 0.0 and run.commands == [] and run.scene == expected.scene
+        driven(run, until=0.1)
+        for column, values in expected.history.items():
+            np.testing.assert_array_equal(run.history[column], values, err_msg=column)
+        assert (run.state.system is system) == (run.scene != heavier)
+    assert run.observed["x2"] == run.observe("x2") and run.steps > 0 and run.event is None

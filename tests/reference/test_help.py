@@ -57,6 +57,14 @@ AROUND = {
         "load": [{"node": 4, "force": [0, 0, 1]}],
         "observe": [{"name": "height", "quantity": "position", "node": 4, "component": "z"}],
     },
+    "gym": {
+        "load": [{"node": 4, "force": [0, 0, 1]}],
+        "point_mass": [{"node": 4, "mass": 1.0}],
+        "observe": [
+            {"name": name, "quantity": quantity, "node": 4, "component": "z"}
+            for name, quantity in (("height", "position"), ("speed", "velocity"))
+        ],
+    },
     "throw": {
         "observe": [
             {"name": "mouth", "quantity": "mouth_area", "node": [0, 1, 2]},

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import refweb
-from refweb.sweeps.expressions import FUNCTIONS, Expression, Interval
+from refweb.sweeps.expressions import FUNCTIONS, Expression, Formula, Interval
 
 NAMES = ("a", "b", "c")
 NUMBERS = st.floats(-4.0, 4.0, allow_nan=False).map(lambda x: round(x, 2))
@@ -126,3 +126,49 @@ def test_a_short_name_of_two_paths_is_none():
     with pytest.raises(refweb.InputError, match='"mass" is not known here'):
         Expression("mass > 1", ["body.0.mass", "body.1.mass"])
     assert sorted(FUNCTIONS) == ["abs", "max", "min", "sqrt"]
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.one_of(TERMS, CONDITIONS), st.tuples(NUMBERS, NUMBERS, NUMBERS))
+def test_a_formula_has_the_value_of_its_text(text, numbers):
+    """As Python computes it; where intervals of no width are finite they agree, but for the sum of rounding."""
+    values = dict(zip(NAMES, numbers, strict=True))
+    try:
+        expected = float(eval(text, {}, dict(values)))
+    except ArithmeticError:
+        expected = math.nan
+    found = Formula(text, NAMES, number=True)(values)
+    assert found == expected or math.isnan(found) and math.isnan(expected)
+    if "<" in text or ">" in text:
+        verdict = Expression(text, NAMES)({name: Interval(value, value) for name, value in values.items()})
+        assert verdict is None or math.isnan(expected) or bool(found) == verdict
+
+
+@pytest.mark.parametrize(
+    "text, value",
+    [
+        ("1/a", math.nan),
+        ("sqrt(a - 1)", math.nan),
+        ("(a - 8)**0.5", math.nan),
+        ("10**400", math.nan),
+        ("2*(a < 1)", 2.0),
+    ],
+)
+def test_formulas_without_a_value(text, value):
+    """NaN, also of a complex root and beyond the largest number: whole numbers are floats."""
+    found = Formula(text, ("a",), number=True)({"a": 0.0})
+    assert found == value or math.isnan(found) and math.isnan(value)
+
+
+def test_formulas_are_read_as_conditions_are():
+    assert (
+        Formula("force[1] + x.before", ("force", "x.before"), number=True)({"force": [1.0, 2.0], "x.before": 3.0})
+        == 5.0
+    )
+    for text in ("a.__class__", "__import__('os')", "[a][0]", "(lambda: a)()", "a if a else a", "a + b"):
+        with pytest.raises(refweb.InputError):
+            Formula(text, ("a",), number=True)
+    with pytest.raises(refweb.InputError, match="compares nothing"):
+        Formula("a + 1", ("a",))
+    with pytest.raises(refweb.InputError, match="cannot be computed"):
+        Formula("a[3]", ("a",), number=True)({"a": [1.0]})

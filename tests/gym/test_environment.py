@@ -1,0 +1,381 @@
+"""Environments of scenes: closed forms of a free mass, seeds, ends, failures, Gymnasium's checker, vectors, images."""
+
+import re
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+
+gymnasium = pytest.importorskip("gymnasium")
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+import refweb  # noqa: E402
+from refweb.errors import InputError, SolverError  # noqa: E402
+from refweb.gym import SHIPPED, SceneEnv  # noqa: E402
+
+MASS, FORCE, PERIOD = 2.0, 3.0, 0.1
+TASK = {
+    "period": PERIOD,
+    "reward": "10*v.before - abs(x) + (time > 0.25) + load.0.force[0]",
+    "inputs": {"load.0.force": [[-FORCE, 0.5, 0.0], [FORCE, 0.5, 0.0]]},
+    "observations": {"x": [-1.0, 1.0], "v": [-9.0, 9.0]},
+}
+
+
+def scene(task=(), duration=0.5, **tables):
+    """A mass that nothing holds, with a slack rope of next to no mass, and its load."""
+    given = {
+        "web": {"kind": "inline", "points": [[0, 0, 0], [0.5, 0, 0]], "lines": [[0, 1]], "natural_length": [50.0]},
+        "cable": {"law": "tension-only", "modulus": 1e6, "area": 1e-4, "density": 1e-6},
+        "supports": {"nodes": [0]},
+        "point_mass": [{"node": 1, "mass": MASS}],
+        "velocity": [{"node": 1, "value": [0.0, 0.0, 0.0]}],
+        "load": [{"node": 1, "force": [0.0, 0.0, 0.0]}],
+        "observe": [
+            {"name": "x", "quantity": "displacement", "node": 1, "component": "x"},
+            {"name": "v", "quantity": "velocity", "node": 1, "component": "x"},
+            {"name": "y", "quantity": "displacement", "node": 1, "component": "y"},
+        ],
+        "solve": {"kind": "dynamic", "duration": duration},
+        "gym": {**TASK, **dict(task)},
+    }
+    return refweb.Scene.from_dict({**given, **tables})
+
+
+def episode(env, seed=None, options=None, scale=0.3):
+    """Observations, rewards and ends of an episode of random actions that follow from the seed alone."""
+    random = np.random.default_rng(seed)
+    observation, info = env.reset(seed=seed, options=options)
+    rows = [(observation, 0.0, False, False, info)]
+    while not (rows[-1][2] or rows[-1][3]):
+        rows.append(env.step(scale * random.uniform(-1.0, 1.0, env.action_space.shape)))
+    return rows
+
+
+def assert_same(rows, others):
+    """Bit for bit."""
+    for row, other in zip(rows, others, strict=True):
+        np.testing.assert_array_equal(row[0], other[0])
+        assert row[1:] == other[1:]
+
+
+def test_a_free_mass_is_a_double_integrator():
+    """Held between periods: matrices are exact, and so are steps at constant force. Rewards follow from the states."""
+    env = SceneEnv(scene())
+    observation, info = env.reset(seed=1)
+    assert info == {"time": 0.0, "values": {}} and env.action_space.shape == (1,)
+    x = v = 0.0
+    for n, action in enumerate([1.0, -0.25, 3.0, 0.5, -1.0], start=1):  # 3 is set to 1
+        force = FORCE * min(action, 1.0)
+        reward = 10.0 * v + (n > 2) + force
+        x, v = x + PERIOD * v + 0.5 * PERIOD**2 * force / MASS, v + PERIOD * force / MASS
+        observation, found, terminated, truncated, info = env.step(np.array([action], dtype=np.float32))
+        # Half of the line's mass, 2.5e-9 kg, is with the point mass.
+        np.testing.assert_allclose(observation, [x, v], rtol=1e-8, atol=1e-12)
+        assert found == pytest.approx(reward - abs(x), rel=1e-8) and not terminated and truncated == (n == 5)
+    assert info["time"] == 0.5 and 0.0 <= info["energy_drift"] < 1e-9 and info.keys() == {"time", "energy_drift"}
+    assert env.run.observe("y") == pytest.approx(0.5 * 0.5**2 * 0.5 / MASS, rel=1e-8)  # the constant component
+    with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
+        env.step(np.zeros(1))
+
+
+def test_observations_stay_within_their_bounds():
+    env = SceneEnv(scene({"observations": {"v": [-0.1, 0.1]}}))
+    env.reset()
+    observation, *_ = env.step(np.ones(1))
+    assert observation.tolist() == [0.1] and env.run.observe("v") == pytest.approx(PERIOD * FORCE / MASS)
+    unbounded = SceneEnv(scene({"observations": ["v", "x"]})).observation_space
+    assert np.isinf(unbounded.high).all() and unbounded.shape == (2,)
+
+
+FAR = {"name": "far", "kind": "threshold", "observe": "v", "value": 0.2, "stop": True}
+
+
+def test_ends():
+    """By success, by another condition, by an event, which is part of the task, and at the end of the duration."""
+    fast = np.ones(1)
+    for task, tables, expected in [
+        ({"terminated": "v > 0.2"}, {}, (True, False, 2)),
+        ({"truncated": "v > 0.2"}, {}, (False, True, 2)),
+        ({"terminated": "v > 0.2", "truncated": "v > 0.2"}, {}, (True, False, 2)),
+        ({}, {"event": [FAR]}, (True, False, 2)),
+        ({}, {}, (False, True, 5)),
+        ({"period": 0.2}, {"output": {"interval": 0.1}}, (False, True, 3)),
+    ]:
+        env, count, ended = SceneEnv(scene(task, **tables)), 0, False
+        env.reset()
+        while not ended:
+            _, _, terminated, truncated, info = env.step(fast)
+            count, ended = count + 1, terminated or truncated
+        assert (terminated, truncated, count) == expected
+        assert info.get("event") == ("far" if "event" in tables else None)
+
+
+DRAWN = {
+    "draw": {
+        "velocity.0.value.0": {"from": -0.5, "to": 0.5},
+        "load.0.force.2": [1.0, 2.0],
+        "velocity.0.value.1": {"distribution": "norm", "loc": 0.0, "scale": 0.1},
+    }
+}
+
+
+@pytest.mark.parametrize("draw", [DRAWN["draw"], {"point_mass.0.mass": {"from": 1.0, "to": 3.0}}])
+def test_an_episode_follows_from_its_seed(draw):
+    """On an environment that has had others before, whose system is used again, as on a new one."""
+    task = {"draw": draw, "inputs": {"load.0.force": [[-FORCE, 0.5, 0.0], [FORCE, 0.5, 0.5]]}}
+    used, new = SceneEnv(scene(task)), SceneEnv(scene(task))
+    first = episode(used, seed=1)
+    for seed in (2, 3):
+        rows = episode(used, seed=seed)
+        assert rows[0][4]["values"] != first[0][4]["values"]
+    assert_same(episode(used, seed=1), first)
+    assert_same(episode(new, seed=1), first)
+    (start,) = {row[4]["values"]["velocity.0.value.0"] for row in first[:1]} if "velocity.0.value.0" in draw else {0.0}
+    assert first[0][0][1] == start  # the drawn velocity is that of the first observation
+    used.reset(seed=1)
+    drawn = used.reset()[1]["values"]  # goes on with the generator
+    assert drawn.keys() == draw.keys() and drawn != first[0][4]["values"]
+
+
+def test_draws_are_those_of_studies():
+    """Ranges, whose ends are kept, distributions and lists; by Kolmogorov and Smirnov, with a fixed seed."""
+    from scipy import stats
+
+    gym, random = scene(DRAWN).gym, np.random.default_rng(5)
+    draws = [gym.drawn(random) for _ in range(400)]
+    columns = {path: np.array([draw[path] for draw in draws]) for path in DRAWN["draw"]}
+    assert stats.kstest(columns["velocity.0.value.0"] + 0.5, "uniform").pvalue > 0.05
+    assert stats.kstest(columns["velocity.0.value.1"] / 0.1, "norm").pvalue > 0.05
+    ones = int((columns["load.0.force.2"] == 1.0).sum())
+    assert set(columns["load.0.force.2"]) == {1.0, 2.0} and stats.binomtest(ones, 400, 0.5).pvalue > 0.05
+
+
+def test_options_and_values():
+    env = SceneEnv(scene(DRAWN), values={"point_mass.0.mass": 4.0})
+    options = {"set": {"velocity.0.value": [0.25, 0.0, 0.0]}, "draw": {"point_mass.0.mass": [1.0]}}
+    _, info = env.reset(seed=1, options=options)
+    assert info["values"] == {"point_mass.0.mass": 1.0, "velocity.0.value": [0.25, 0.0, 0.0]}
+    assert env.run.observe("v") == 0.25
+    env.step(np.zeros(1))
+    env.reset(seed=1, options={"draw": {}, "set": {"velocity.0.value": [0.0, 0.0, 0.0]}})
+    env.step(np.ones(1))
+    assert env.run.observe("v") == pytest.approx(PERIOD * FORCE / 4.0, rel=1e-8)
+    for options, message in [
+        ({"draws": {}}, 'options: "draws" is none, did you mean "draw"'),
+        ({"set": {"velocity.7.value": [1, 0, 0]}}, "velocity.7"),
+        ({"draw": {"velocity.0.value.0": {"from": 1}}}, "draw: velocity.0.value.0: to is missing"),
+    ]:
+        with pytest.raises(InputError, match=re.escape(message)):
+            env.reset(options=options)
+
+
+TAUT = {"kind": "inline", "points": [[0, 0, 0], [0.5, 0, 0]], "lines": [[0, 1]], "natural_length": [0.4]}
+COARSE = {"kind": "dynamic", "duration": 5.0, "safety": 1.0}
+FAILURES = [
+    ({"reward": "1/(time < 0.15)"}, {}, "reward = .* is nan at t = 0.2 s"),
+    ({}, {"web": TAUT, "solve": COARSE}, "energy drift"),  # a spring in steps of the length of its stability
+]
+
+
+@pytest.mark.parametrize("task, tables, message", FAILURES)
+def test_a_run_that_fails_ends_its_episode(task, tables, message):
+    """With the last observation and the reward that the scene names; or it raises, and an episode can follow."""
+    env = SceneEnv(scene({"failure_reward": -7.0, **task}, **tables))
+    action = np.ones(env.action_space.shape)
+    for _ in range(2):
+        env.reset()
+        while True:
+            observation, reward, terminated, truncated, info = env.step(action)
+            assert np.isfinite(observation).all() and np.isfinite(reward)
+            if terminated or truncated:
+                break
+        assert terminated and not truncated and reward == -7.0 and re.search(message, info["failure"])
+        assert env.observation_space.contains(observation)
+        with pytest.raises(gymnasium.error.ResetNeeded):
+            env.step(action)
+    raising = SceneEnv(scene({"raise_failure": True, **task}, **tables))
+    raising.reset()
+    with pytest.raises(SolverError, match=message):
+        while True:
+            raising.step(action)
+
+
+def test_an_episode_has_results_with_errors():
+    """`finish` repeats it with its commands; a reset forgets them."""
+    env = SceneEnv(scene(DRAWN))
+    rows = episode(env, seed=4)
+    solution = env.run.finish()
+    assert solution.results["v"].value == rows[-1][0][1] and solution.results["v"].error is not None
+    assert len(env.run.commands) == 5
+    env.reset(seed=4)
+    assert env.run.commands == []
+
+
+def test_wrong_actions():
+    env = SceneEnv(scene())
+    env.reset()
+    for action in (np.zeros(2), np.array([np.nan]), np.zeros((1, 1))):
+        with pytest.raises(InputError, match="must be 1 finite numbers"):
+            env.step(action)
+    assert env.run.time == 0.0
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_gymnasium_finds_nothing_to_warn_of(name):
+    env = gymnasium.make(name)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+    assert env.spec.id == name and env.unwrapped.metadata["render_fps"] == 10
+
+
+def test_an_id_imports_what_it_needs_and_any_scene_is_an_environment():
+    env = gymnasium.make("refweb.gym:refweb/Scene-v0", scene=scene())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True, skip_close_check=True)
+
+
+def test_images():
+    """Of its size, of different states, by one camera; the child that draws ends with the environment."""
+    env = SceneEnv(scene(duration=50.0), render_mode="rgb_array", size=(120, 80))
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.render()
+    env.reset()
+    first = env.render()
+    assert first.shape == (80, 120, 3) and first.dtype == np.uint8 and 1 < len(np.unique(first)) and first.max() == 255
+    np.testing.assert_array_equal(env.render(), first)
+    camera = env._images._stage.views[0]
+    env.step(np.ones(1))
+    near = env.render()
+    assert (near != first).any() and env._images._stage.views[0] is camera
+    for _ in range(40):
+        env.step(np.ones(1))
+    assert (env.render() != 255).any() and env._images._stage.views[0] is not camera  # it has left the view
+    env.close()
+    env.close()
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert SceneEnv(scene()).render() is None
+
+
+def test_vectors_of_environments():
+    """In this process and in processes of their own: the same rows as one after the other."""
+    actions = np.random.default_rng(1).uniform(-0.3, 0.3, (3, 2, 12)).astype(np.float32)
+    found = {}
+    for mode in ("sync", "async"):
+        envs = gymnasium.make_vec("refweb.gym:refweb/CornerControl-v0", num_envs=2, vectorization_mode=mode)
+        rows = [envs.reset(seed=[3, 4])[0]]
+        for action in actions:
+            observation, reward, terminated, truncated, _ = envs.step(action)
+            rows += [observation, reward]
+            assert not (terminated | truncated).any()
+        envs.close()
+        found[mode] = rows
+    alone = SceneEnv("corner-control")
+    alone.reset(seed=4)
+    for n, action in enumerate(actions):
+        observation, reward, *_ = alone.step(action[1])
+        for rows in found.values():
+            np.testing.assert_array_equal(rows[1 + 2 * n][1], observation)
+            assert rows[2 + 2 * n][1] == reward
+
+
+def test_corners_are_flown_to_their_targets():
+    """By proportional and derivative feedback, critically damped at 1 rad/s, of 0.5 kg."""
+    env = SceneEnv("corner-control")
+    state, _ = env.reset(seed=2)
+    targets, ended, rewards = np.array([[0.2, 0.2, 1], [-0.2, 0.2, 1], [0.2, -0.2, 1], [-0.2, -0.2, 1]]), False, []
+    while not ended:
+        corners = state.reshape(4, 6)
+        force = 0.5 * ((targets - corners[:, :3]) - 2.0 * corners[:, 3:])
+        state, reward, terminated, truncated, _ = env.step((force / 0.5).ravel())
+        ended = terminated or truncated
+        rewards.append(reward)
+    # (1 + t) e^−t at 6 s is 0.017 of 1 m; the thrusters' limit and the net, a tenth of the mass, are the rest.
+    assert np.abs(state.reshape(4, 6)[:, :3] - targets).max() < 0.1 and rewards[-1] > 0.95 > rewards[0]
+
+
+def test_a_hub_deploys_its_web_by_a_torque_that_falls_with_its_speed():
+    """M = M₀ (1 − ω/ω₀); without torque the arms take the spin of the hub, and it stands still."""
+
+    def run(law):
+        env, total, count, ended = SceneEnv("hub-deployment"), 0.0, 0, False
+        state, _ = env.reset(seed=1)
+        while not ended:
+            state, reward, terminated, truncated, _ = env.step(np.array([law(state[0])]))
+            total, count, ended = total + reward, count + 1, terminated or truncated
+        return total, count, terminated
+
+    total, count, terminated = run(lambda rate: 2.0 * (1.0 - rate / 2.0))
+    assert count == 100 and not terminated and total > 90.0  # cos φ near 1 for most of the time
+    _, count, terminated = run(lambda rate: 0.0)
+    assert terminated and count < 20
+
+
+WRONG = [
+    ({"inputs": {}}, "inputs is empty"),
+    ({"inputs": {"load.0.force": [1.0, 1.0]}}, r"inputs: load.0.force = \[1.0, 1.0\] must be .* with low < high"),
+    ({"inputs": {"load.0.force": [2.0, 1.0]}}, "low < high"),
+    ({"inputs": {"load.0.force": [1.0]}}, r"must be \[low, high\]"),
+    ({"inputs": {"load.0.forc": [0.0, 1.0]}}, 'did you mean "force"'),
+    ({"inputs": {"load.1.force": [0.0, 1.0]}}, '"1" is not the number or name of a'),
+    ({"inputs": {"gravity.acceleration": [0.0, 1.0]}}, r"the scene has no \[gravity\]"),
+    ({"observations": []}, "observations is empty"),
+    ({"observations": ["z"]}, 'observations: "z" is not an observable'),
+    ({"observations": {"x": [1.0, 0.0]}}, "low < high"),
+    ({"reward": "x + z"}, 'reward: "x . z": "z" is not known here'),
+    ({"reward": "__import__('os')"}, "reward: .* is not known here"),
+    ({"reward": "x.__class__"}, "reward: .* is not known here"),
+    ({"reward": "x +"}, "is not a condition|is not a number"),
+    ({"terminated": "x"}, "compares nothing"),
+    ({"period": 0.15, "draw": {}}, "period = 0.15: t = 0.15 s is not the time of a history row"),
+    ({"draw": {"velocity.0.value.0": {"from": 0.0, "to": 1.0, "count": 3}}}, "count = 3 has no meaning: an"),
+    ({"draw": {"velocity.4.value": [1.0]}}, "draw: velocity.4"),
+    ({"draw": {"velocity.0.value.0": 3.0}}, "must be a list of cases"),
+    ({"rewards": "x"}, 'rewards = "x": unknown key, did you mean "reward"'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("task, message", WRONG)
+def test_wrong_tables(task, message):
+    with pytest.raises(InputError, match=message) as error:
+        scene(task, output={"interval": 0.1}).build()
+    assert str(error.value).startswith("[gym] ") and "\n" not in str(error.value)
+
+
+def test_wrong_scenes():
+    for tables, message in [
+        ({"solve": {"kind": "static"}}, r"\[gym\] has no meaning in statics"),
+        ({"load": [{"node": 1, "force": [0, 0, 0], "factor": [[0, 1]]}]}, "its factor would multiply"),
+        (
+            {"control": [{"name": "c", "law": "pid", "period": 0.1, "sets": "load.0.force", "measures": ["x"],
+                          "direction": [1, 0, 0]}]},
+            r'load.0.force is set by \[\[control\]\] "c"',
+        ),
+    ]:  # fmt: skip
+        with pytest.raises(InputError, match=message):
+            scene(**tables).build()
+    with pytest.raises(InputError, match=r"square-impact.toml: \[gym\] is missing"):
+        SceneEnv("square-impact")
+    with pytest.raises(InputError, match="render_mode"):
+        SceneEnv(scene(), render_mode="human")
+
+
+def test_a_scene_without_it_loads_nothing_of_it_and_one_with_it_runs_without_gymnasium():
+    code = """
+import sys
+sys.modules["gymnasium"] = None
+import refweb
+refweb.Scene.load("square-load")
+assert not any(name.startswith(("refweb.gym", "refweb.sweeps")) for name in sys.modules)
+refweb.Scene.load("corner-control").build()
+try:
+    import refweb.gym
+except ImportError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 'pip install "refweb[gym]"' in done.stdout
