@@ -1,5 +1,7 @@
 """``python -m validation`` without what its cases import: said at once, with the command that brings it."""
 
+import sys
+
 import pytest
 
 from validation import __main__ as validation
@@ -30,3 +32,25 @@ def test_a_cost_above_its_limit_is_no_success(ratio, status, monkeypatch, capsys
     assert limits["lean"] == 1.5 and explicit.main() == status
     told = capsys.readouterr().out
     assert ("EXCEEDED" in told) == (f"{scene}, lean" in told) == bool(status) and "-O3 -march=native" in told
+
+
+def test_environments_without_mujoco(monkeypatch, capsys):
+    """What is measured then, and the reason why the rest is not."""
+    pytest.importorskip("gymnasium")
+    from validation.cost import environments
+
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    for name, value in (("LAYERS", (3,)), ("PERIODS", 2), ("ROUNDS", 1), ("ENVIRONMENTS", 1)):
+        monkeypatch.setattr(environments, name, value)
+    assert environments.main() == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert "60 lines" in first and "MuJoCo is left out: " in first and "1 environments of 60 lines" in second
+
+
+@pytest.mark.slow
+def test_the_learning_curve_is_drawn(tmp_path, capsys):
+    pytest.importorskip("gymnasium")
+    from validation.cost import learning
+
+    assert learning.main("1", tmp_path / "curve.png") == 0
+    assert (tmp_path / "curve.png").stat().st_size > 1000 and "CPU time" in capsys.readouterr().out

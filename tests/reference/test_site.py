@@ -1,8 +1,8 @@
 """The documentation site: every block of code of its pages runs, in the order of a page, and the site can be built.
 
 Blocks are found by their fences, so that a new one is run as well. A ``title`` is the name of the file that a block is
-written to; lines of ``sh`` begin with ``refweb`` and are run in this process; ``python`` blocks of a page share names.
-Blocks that take long are ``{ .sh .slow }``.
+written to; lines of ``sh`` begin with ``refweb`` and are run in this process, or are those of another program;
+``python`` blocks of a page share names. Blocks that take long are ``{ .sh .slow }``.
 """
 
 import contextlib
@@ -53,7 +53,8 @@ def shell(line, folder):
         if words[0] == "pip":
             pytest.importorskip("setuptools", minversion="70.1")  # builds without the network
             words = ["pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--target", str(target), "."]
-        subprocess.run([sys.executable, "-m", *words], check=True, env={**os.environ, "PYTHONPATH": path})
+        words = words[1:] if words[0] == "python" else ["-m", *words]
+        subprocess.run([sys.executable, *words], check=True, env={**os.environ, "PYTHONPATH": path})
 
 
 def follow(path, folder, slow):
