@@ -119,6 +119,8 @@ OBSERVABLES = {
     "total_energy": "refweb.results.observables.balances:TotalEnergy",
     "work": "refweb.results.observables.balances:Work",
     "overlap": "refweb.results.observables.overlap:Overlap",
+    "fuel": "refweb.results.observables.fuel:Fuel",
+    "delta_v": "refweb.results.observables.fuel:DeltaV",
     "slack_fraction": "refweb.results.observables.slack_fraction:SlackFraction",
     "step_size": "refweb.results.observables.balances:StepSize",
 }

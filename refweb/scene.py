@@ -177,6 +177,13 @@ class Scene:
         acting = [*self.control, *([self.gym] if self.gym else [])]
         if not dynamic and acting:
             raise InputError("[gym] has no meaning in statics: leave it out")
+        controls = [control.name for control in self.control]
+        for observe in self.observe:
+            if observe.control is not None and observe.control not in controls:
+                hint = nearest(observe.control, controls) if controls else "the scene has none"
+                raise InputError(
+                    f"[[observe]] {quote(observe.name)} control = {quote(observe.control)} is not a [[control]], {hint}"
+                )
         interval = output.interval or min((part.period for part in acting), default=None)
         interval = (interval or default_interval(solve)) if dynamic else None
         frames = output.frames or (10 if dynamic else 1)

@@ -6,6 +6,7 @@ of classes are the text of `refweb help` and of the schema.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal
 
 from .accepted import accepts, any_of, array
@@ -390,8 +391,8 @@ class Accuracy(Table):
 
 
 _number, _numbers, _names = real(), numbers_list(), texts()
-_rows = tuple(rows(width, increasing=True) for width in (2, 4))
-_kinds = [kind.metadata["read"].accepts for kind in (_number, _numbers, *_rows)]
+_rows = {width: rows(width, increasing=True) for width in (2, 4, 5)}
+_kinds = [kind.metadata["read"].accepts for kind in (_number, _numbers, *_rows.values())]
 
 
 @accepts(any_of({"type": "string"}, array({"type": "string"}, 1), *_kinds))
@@ -404,7 +405,7 @@ def _target(name, value):
     if value and isinstance(value[0], str):
         return checked(name, value, _names)
     if value and isinstance(value[0], (list, tuple)):
-        return checked(name, value, _rows[len(value[0]) > 2])
+        return checked(name, value, _rows.get(len(value[0]), _rows[4 if len(value[0]) > 2 else 2]))
     return checked(name, value, _numbers)
 
 
@@ -416,13 +417,18 @@ class Control(Table):
     torque or a rate. The value stays until the next period. The step-refinement run has the same law with its own
     measurements, so that ± holds its effect as well. A run with controls goes on after it was stopped.
 
-    The control sets what a scene has: ``load.N.force``, ``thrust.N.force``, ``pressure.N.value``,
+    The control sets what a scene has: ``load.N.force`` and ``load.N.torque``, ``thrust.N.force``, ``pressure.N.value``,
     ``gravity.acceleration``, ``body.NAME.axle.torque``, of a winch ``winch.N.speed``, ``limit``, ``tension`` or
     ``power``, whichever the scene gives, or the rate of a table, ``reel.N.rate`` of the factor [1/s],
-    ``motion.N.velocity``, ``motion.N.angular_velocity``. N counts from 0.
+    ``motion.N.velocity``, ``motion.N.angular_velocity``. N counts from 0. Laws give vectors along x, y and z; a load
+    with ``axes = "body"`` has the same vector at the measurement, and turns with its body until the next.
 
-    The run says the integral over time of the size of the value; for a load it is that of the force on one node. A reel
-    stops at a hundredth of its factor.
+    The run says the integral over time of the size of the value; for a load it is that of the force on one node.
+    ``quantity = "fuel"`` and ``"delta_v"`` of ``[[observe]]`` have it over time. A reel stops at a hundredth of its
+    factor.
+
+    Four measures are an attitude: the components w, x, y, z of the orientation of a body. Its error e is the vector of
+    the shortest rotation to the target, and its rate is an angular velocity; laws get ``value`` = 0 and ``target`` = e.
 
     With the error e = target − measured and its rate e', "pid" gives proportional · e + integral · ∫e dt + derivative
     · e'; the integral waits while the limit acts. "sliding-mode" gives strength · s/width, at most strength, with the
@@ -447,29 +453,34 @@ class Control(Table):
     sets : str
         Path of the value that it sets.
     measures : list of str
-        Names of the observables that it measures: one, or three for a vector.
+        Names of the observables that it measures: one, three for a vector, or four for an attitude.
     rates : list of str, optional
         Names of the observables of their rates; by default the difference over the period before, 0 at the start. The
-        rate of a target is that difference, too.
+        rate of a target is that difference, too. Those of an attitude are the three components of an angular velocity.
     direction : sequence of 3 float, optional
-        Direction of a vector that is set by one observable, of length 1.
+        Direction of a vector that is set by one observable, of length 1; or the axis of a cone.
+    angle : float, optional
+        Half angle of a cone [rad], at most π/2: of a vector the nearest one in the cone about ``direction`` is set. The
+        cone is along the axes of the load, so that with ``axes = "body"`` it turns with the body.
     target : float, list or table
         Number, numbers, names of observables, such as those of the place of another body; or a table over time,
-        [[t, ...], ...], linear in between. 0 by default.
+        [[t, ...], ...], linear in between. 0 by default. Of an attitude a quaternion [w, x, y, z] of any length but 0,
+        four names, or a table of quaternions, with constant angular velocities in between.
     limit : float, optional
         Largest size of the value; a larger vector keeps its direction.
     delay : float
         Time from a measurement to its effect [s], a multiple of the period. Until the first measurement is so old, it
         acts at once.
     noise : float
-        Standard deviation of what is added to each measurement; it follows from the seed of the scene.
+        Standard deviation of what is added to each measurement; it follows from the seed of the scene. An attitude is
+        turned by so much about each axis [rad].
 
     Raises
     ------
     InputError
-        For numbers of measures, rates and targets that differ, and a direction that is zero. From `Scene.build`, for
-        names that the scene does not have, what cannot be set, periods that are no multiples, and parameters that the
-        law does not have.
+        For numbers of measures, rates and targets that differ, a direction or a quaternion that is zero, and an angle
+        without direction. From `Scene.build`, for names that the scene does not have, four that are no orientation,
+        what cannot be set, periods that are no multiples, and parameters that the law does not have.
 
     Examples
     --------
@@ -493,6 +504,7 @@ class Control(Table):
     measures: Several = texts()
     rates: Several = texts(default=())
     direction: Several = vector(default=None)
+    angle: float | None = real(default=None, above=0, at_most=0.5 * math.pi, unit="rad")
     target: Several = field(_target, default=0.0)
     limit: float | None = real(default=None, above=0)
     delay: float = real(default=0.0, at_least=0, unit="s")
@@ -501,14 +513,32 @@ class Control(Table):
     def check(self) -> None:
         """Refuse numbers of measures, rates and targets that do not fit, and a direction beside several measures."""
         count = len(self.measures)
-        if count not in (1, 3):
-            raise InputError(f"measures = {quote(self.measures)} must be one name, or three of a vector")
-        if self.rates and len(self.rates) != count:
-            raise InputError(f"rates = {quote(self.rates)} must be as many as measures, {count}")
+        if count not in (1, 3, 4):
+            raise InputError(
+                f"measures = {quote(self.measures)} must be one name, three of a vector, or four of an attitude"
+            )
+        if self.rates and len(self.rates) != min(count, 3):
+            raise InputError(f"rates = {quote(self.rates)} must be {min(count, 3)}, by the number of measures")
         target = self.target
         if isinstance(target, tuple):
             width = len(target[0]) - 1 if isinstance(target[0], tuple) else len(target)
             if width != count:
                 raise InputError(f"target = {quote(target)} has {width} values, and measures has {count}")
-        if self.direction is not None and (count > 1 or not any(self.direction)):
-            raise InputError(f"direction = {quote(self.direction)} is for one measure, and must not be zero")
+        if count == 4:
+            self._refuse_no_attitude()
+        if self.direction is not None and not any(self.direction):
+            raise InputError(f"direction = {quote(self.direction)} must not be zero")
+        if self.direction is not None and count > 1 and self.angle is None:
+            raise InputError(f"direction = {quote(self.direction)} is for one measure, or needs the angle of a cone")
+        if self.angle is not None and self.direction is None:
+            raise InputError(f"angle = {self.angle:g} needs a direction, the axis of its cone")
+
+    def _refuse_no_attitude(self):
+        """Refuse targets that are no quaternions, and a law that has no meaning for an attitude."""
+        if self.law == "spin-up":
+            raise InputError(f'law = "spin-up" leads to a speed, and measures = {quote(self.measures)} is an attitude')
+        if not isinstance(self.target, tuple):
+            raise InputError("target is missing: an attitude needs a quaternion [w, x, y, z], names or a table")
+        rows = self.target if isinstance(self.target[0], tuple) else (("", *self.target),)
+        if not all(any(row[1:]) for row in rows):
+            raise InputError(f"target = {quote(self.target)} must not be a quaternion of zeros")

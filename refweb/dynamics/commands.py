@@ -36,8 +36,13 @@ if TYPE_CHECKING:
     from .integrators.integrator import History, Integrator, IntegratorState
     from .schedule import Schedule
 
-INPUTS = {"load": ("force",), "thrust": ("force",), "pressure": ("value",), "gravity": ("acceleration",)}
-INPUTS["winch"] = "speed", "limit", "tension", "power"
+INPUTS = {
+    "load": ("force", "torque"),
+    "thrust": ("force",),
+    "pressure": ("value",),
+    "gravity": ("acceleration",),
+    "winch": ("speed", "limit", "tension", "power"),
+}
 """Keys of each effect that a command may set."""
 RATES = {
     "reel": {"rate": ("factor", 1)},
@@ -258,6 +263,8 @@ class Inputs:
             raise InputError(f"{quote(key)} is not a key of [{name}] that a command may set, {nearest(key, keys)}")
         if name == "winch":
             return name, number, effect.commanded(key, _finite(command.value, 1)[0])
+        if getattr(effect, key) is None:
+            raise InputError(f"there is no {key} that it could change: give one in the scene, such as [0, 0, 0]")
         return name, number, effect.with_value(key, command.value)
 
     @staticmethod
@@ -413,7 +420,7 @@ class Commands:
     def act_on(self, row: int, integrator: Integrator, course: IntegratorState, values: Any) -> None:
         """Apply the commands of a row of ``history.csv`` with these values."""
         due = [] if course.stopped else [controller for controller in self.controllers if controller.due(row)]
-        for commands in ([controller.command(row, values) for controller in due], self._by_row.get(row)):
+        for commands in ([controller.command(row, values, course.x) for controller in due], self._by_row.get(row)):
             if commands:
                 writes = [write for command in commands for write in self.inputs.checked(command)]
                 self.inputs.apply(writes, integrator, course)

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..kernels import FORCE, kernel
 from ..messages import nearest, quote
+from ..net.quaternions import of_vector, product
 from ..tables import Several, Table, nodes, rows, table, text
 from .base import PrescribedMotion, column
 from .time_tables import flattened, interpolate
@@ -184,28 +185,17 @@ def rotations_over_time(table, direction):
     axis, of as many full turns more as bring it nearest to the difference of the vectors.
     """
     numbers = np.zeros((len(table), ROW))
-    q = _quaternion(table[0, 1:])
+    q = of_vector(table[0, 1:])
     for n, (t, *vector) in enumerate(table):
         numbers[n, 0], numbers[n, 1:5], numbers[n, 8] = t, q, direction @ vector
         if n + 1 == len(table):
             break
         change = table[n + 1, 1:] - vector
-        w, *along = _product(_quaternion(table[n + 1, 1:]), q * [1.0, -1.0, -1.0, -1.0])
+        w, *along = product(of_vector(table[n + 1, 1:]), q * [1.0, -1.0, -1.0, -1.0])
         size = np.linalg.norm(along)
         axis = np.array(along) / size if size > 1e-12 else change / (np.linalg.norm(change) or 1.0)
         angle = 2.0 * np.arctan2(size, w)
         angle += 2.0 * np.pi * np.round((change @ axis - angle) / (2.0 * np.pi))
         numbers[n, 5:8] = angle / (table[n + 1, 0] - t) * axis
-        q = _product(np.array([np.cos(0.5 * angle), *np.sin(0.5 * angle) * axis]), q)
+        q = product(np.array([np.cos(0.5 * angle), *np.sin(0.5 * angle) * axis]), q)
     return numbers
-
-
-def _quaternion(vector):
-    """Unit quaternion of a rotation vector, by its direction and half of its size."""
-    size = np.linalg.norm(vector)
-    return np.array([np.cos(0.5 * size), *(0.5 * np.sinc(0.5 * size / np.pi) * np.asarray(vector))])
-
-
-def _product(p, q):
-    """Product of two quaternions."""
-    return np.array([p[0] * q[0] - p[1:] @ q[1:], *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))])

@@ -314,6 +314,78 @@ def test_what_is_spent_ends_with_the_run():
     assert abs(run.controls[0]["spent"] - exact) <= run.controls[0]["error"] + 1e-6 < 1e-2
 
 
+SPENT = [
+    {"name": "x", "quantity": "displacement", "node": 1, "component": "x"},
+    {"name": "vx", "quantity": "velocity", "node": 1, "component": "x"},
+    {"name": "fuel", "quantity": "fuel", "control": "hover"},
+    {"name": "delta_v", "quantity": "delta_v", "control": "hover"},
+]
+
+
+@pytest.mark.parametrize("method", ["central-difference", "ida"])
+def test_fuel_over_time(method):
+    """∫ abs(F) dt in each row, over the point mass; it ends a run where it reaches a limit, linear between periods."""
+    keys = {} if method == "central-difference" else {"method": method, "rtol": 1e-7}
+    _, _, forces = held(lambda x, v, n: 40.0 * (0.3 - x) - 6.0 * v, 20)
+    exact = np.append(0.0, 0.05 * np.cumsum(np.abs(forces)))
+    event = [{"name": "empty", "kind": "threshold", "observe": "fuel", "value": 2.0, "stop": True}]
+    heavy = [{"node": 1, "mass": 0.4}, {"node": 1, "mass": 0.6}]
+    solve = {"kind": "dynamic", "duration": 1.0, **keys}
+    run = refweb.run(scene(observe=SPENT, event=event, point_mass=heavy, solve=solve, interval=0.025))
+    empty = np.interp(2.0, exact, 0.05 * np.arange(21))
+    assert abs(run.events[0]["time"] - empty) <= run.events[0]["error"] + 1e-6
+    times = run.history["time"]
+    tight = 1e-9 if method == "central-difference" else 1e-3
+    np.testing.assert_allclose(run.history["fuel"], np.interp(times, 0.05 * np.arange(21), exact), atol=tight)
+    np.testing.assert_allclose(run.history["delta_v"], run.history["fuel"] / 1.0, rtol=1e-12)
+    fuel, (control,) = run.results["fuel"], run.controls
+    np.testing.assert_allclose(fuel.value, control["spent"], rtol=1e-12)
+    late = 3.0 * fuel.value / run.history["time"][-1] * 0.025  # explicit runs end with the step of an event
+    assert abs(fuel.value - 2.0) <= fuel.error + 1e-9 < (late if tight < 1e-6 else 0.01) and fuel.unit == "N s"
+
+
+def test_fuel_of_several_nodes_and_of_bodies(tmp_path):
+    """That of a load on two nodes is twice that of one, and goes on bit for bit; Δv has their masses."""
+    two = {"web": {"kind": "inline", "points": [[0, 0, 0], [0.5, 0, 0], [0.5, 1, 0]], "lines": [[0, 1], [0, 2]],
+                   "natural_length": [50.0, 50.0], "supports": [0]},
+           "load": [{"node": [1, 2], "force": [0.0, 0.0, 0.0]}],
+           "point_mass": [{"node": 1, "mass": 1.0}, {"node": 2, "mass": 3.0}],
+           "observe": SPENT, "output": {"interval": 0.05, "frames": 7}}  # fmt: skip
+    whole, resumed = nets.whole_and_resumed(refweb.Scene.from_dict(scene().to_dict() | two), tmp_path)
+    np.testing.assert_allclose(whole.history["fuel"][-1], 2.0 * whole.controls[0]["spent"], rtol=1e-12)
+    np.testing.assert_allclose(whole.history["delta_v"], whole.history["fuel"] / 4.0, rtol=1e-12)
+    for name in ("x", "fuel", "delta_v"):
+        np.testing.assert_array_equal(resumed.history[name], whole.history[name])
+    body = {"name": "ship", "shape": "box", "size": [1, 1, 1], "mass": 8.0, "position": [0, 5, 0]}
+    place = [{"name": "x", "quantity": "position", "body": "ship", "component": "x"}, *SPENT[2:]]
+    load = [{"body": "ship", "force": [0.0, 0.0, 0.0]}]
+    run = refweb.run(scene({"rates": []}, body=[body], load=load, observe=place))
+    np.testing.assert_allclose(run.history["delta_v"], run.history["fuel"] / 8.0, rtol=1e-12)
+    np.testing.assert_allclose(run.history["fuel"][-1], run.controls[0]["spent"], rtol=1e-12)
+
+
+FUELS = [
+    ({"control": "hovre"}, 'control = "hovre" is not a [[control]], did you mean "hover"'),
+    ({}, 'control is missing: quantity = "fuel"'),
+    ({"quantity": "delta_v", "control": "hover"}, 'quantity = "delta_v" needs a mass: give node = 1 a [[point_mass]]'),
+]
+
+
+@pytest.mark.parametrize("keys, words", FUELS, ids=[words for _, words in FUELS])
+def test_fuel_that_is_none_is_refused(keys, words):
+    given = scene(observe=SPENT).to_dict()
+    del given["point_mass"]
+    given["observe"] = [*SPENT[:2], {"name": "fuel", "quantity": "fuel", **keys}]
+    with pytest.raises(InputError, match=re.escape(words)):
+        refweb.Scene.from_dict(given).build()
+
+
+def test_fuel_of_what_is_no_force_is_refused():
+    with pytest.raises(InputError, match="sets gravity.acceleration, which is no force"):
+        fuel = [*SPENT[:2], {"name": "fuel", "quantity": "fuel", "control": "hover"}]
+        scene({"sets": "gravity.acceleration"}, gravity={"acceleration": [0, 0, 0]}, observe=fuel).build()
+
+
 def test_a_switch_within_its_error_is_told():
     """At rest at its target the number whose sign decides is zero."""
     law = {"law": "bang-bang", "parameters": {"strength": 1.0, "mass": MASS}}
@@ -347,7 +419,7 @@ WRONG = [
     ({"parameters": {"proportionel": 1.0}}, 'did you mean "proportional"'),
     ({"law": "bang-bang", "parameters": {}}, "parameters.strength is missing"),
     ({"measures": ["xx"]}, "is not an observable"),
-    ({"measures": ["x", "y"], "rates": []}, "must be one name, or three"),
+    ({"measures": ["x", "y"], "rates": []}, "must be one name, three of a vector, or four"),
     ({"sets": "load.1.force"}, "is not the number or name of a [[load]]"),
     ({"sets": "laod.0.force"}, 'did you mean "load"'),
     ({"direction": None}, "direction is missing"),
@@ -369,9 +441,35 @@ def test_what_does_not_fit_is_refused(control, words):
         scene({key: value for key, value in control.items()}, interval=interval, law={}).build()
 
 
+def test_the_horizon_has_what_feedback_makes_of_differences():
+    """A force that drives away from the target: all differences grow as the held motion from rest does."""
+    law = {"law": "pid", "parameters": {"proportional": -90.0}}
+    loop = np.array([[1.0, 0.05], [0.0, 1.0]]) + np.outer([0.5 * 0.05**2, 0.05], [90.0, 0.0]) / MASS
+    ways = [np.linalg.matrix_power(loop, n)[0, 0] for n in range(31)]
+    accuracy = {"horizon": True, "ensemble": 3}
+    away = {"measures": ["x", "y", "z"], "rates": [], "target": [-1e-6, 0.0, 0.0]}
+    driven = refweb.run(scene(away, law=law | {"direction": None}, duration=1.5, accuracy=accuracy))
+    rate = np.polyfit(0.05 * np.arange(31), np.log(ways), 1)[0]
+    np.testing.assert_allclose(driven.horizon["growth"], rate, rtol=1e-3)
+    spread = driven.horizon["ensemble"]["x"]
+    assert 0.0 < spread["deviation"] < driven.horizon["perturbation"] * ways[-1]
+    np.testing.assert_allclose(spread["mean"], driven.results["x"].value, rtol=1e-3)
+    # Across x nothing acts: differences stay.
+    led = refweb.run(scene(duration=1.5, accuracy={"horizon": True}))
+    assert abs(led.horizon["growth"]) < 1e-6 and led.horizon["digits"][-1] == (1, None)
+
+
+def test_all_parts_of_the_error_beside_controls():
+    """Further runs have their own controls, and leave results and what is spent as they are."""
+    given = scene(observe=SPENT)
+    whole, trusted = refweb.run(given), refweb.trust(given, budget=20.0, progress=None)
+    for name, result in whole.results.items():
+        assert trusted.results[name].value == result.value
+        assert trusted.results[name].verdict is not None
+    assert trusted.controls == whole.controls and trusted.horizon["growth"] is not None
+
+
 def test_what_has_no_controls_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"\[accuracy\] horizon = true cannot stand beside \[\[control\]\]"):
-        refweb.run(scene(accuracy={"horizon": True}))
     with pytest.raises(InputError, match=r"\[\[control\]\] cannot be compared by all methods"):
         refweb.cost(scene())
     with pytest.raises(InputError, match=r'\[\[control\]\] "hover" has no meaning in statics'):

@@ -45,6 +45,7 @@ AROUND = {
     "drag.bodies": {"body": [BALL | {"name": "hub"}], "drag": {"density": 1.2}},
     "event": {"body": [BALL], "contact": {}},
     "temperature.groups": {"temperature": {"expansion": 1e-6, "change": 0.0}},
+    "load": {"body": [BALL | {"name": "hub"}]},
     "link": {"solve": {**SCENE["solve"], "method": "ida"}},
     "motion": {"body": [{"name": "drum", "radius": 0.1, "position": [0, 0, -0.2]}]},
     "thread.around": {

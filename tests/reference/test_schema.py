@@ -66,7 +66,7 @@ TEXTS = [
     "a" * 81,
 ]
 TEXTS += ["a" * 201, "a" * 4097, "middle", "dyneema", "contact", "twin", "lumped", "bdf", "dynamic", "static", "stays"]
-TEXTS += ["square", *WEBS]
+TEXTS += ["square", "space", *WEBS]
 LISTS_OF = [
     [],
     [1],

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
 """Sign of the peaks that a probe follows, by ``reduce``."""
+PARTS = ("part", "select")
+"""Keys that choose among several values."""
 
 
 @accepts(lambda: {"type": "string", "enum": list(OBSERVABLES)})
@@ -73,6 +75,8 @@ class Observe(Table):
     ring : int, optional
         Ring of a ``slip``, the length of thread that has gone over it since the start: its number in the list ``nodes``
         of the thread, from 0 on. It is positive where material goes in the order of the list.
+    control : str, optional
+        Control whose fuel or Δv it is: a ``[[control]]`` that sets a force.
     part : {"start", "middle", "end"}, optional
         Element of each line that a line quantity is looked at in: that at its first node, that at its middle or behind
         it, or that at its last node; without it all elements. A value of an element of order 1 is that of its middle;
@@ -124,6 +128,7 @@ class Observe(Table):
     thread: str | None = text(default=None, limit=80)
     segment: int | None = integer(default=None, at_least=0)
     ring: int | None = integer(default=None, at_least=0)
+    control: str | None = text(default=None, limit=80)
     part: str | None = choice("start", "middle", "end", default=None)
     select: str | None = choice("max", "min", "abs", default=None)
     component: int | None = component(default=None, axes="xyzw")
@@ -136,7 +141,19 @@ class Observe(Table):
             raise InputError(
                 f"name = {quote(self.name)} must have no commas and no quotes: it heads a column of history.csv"
             )
-        for key in ("node", "body", "to", "component", "line", "thread", "segment", "ring", "part", "select"):
+        for key in (
+            "node",
+            "body",
+            "to",
+            "component",
+            "line",
+            "thread",
+            "segment",
+            "ring",
+            "control",
+            "part",
+            "select",
+        ):
             if getattr(self, key) is not None and key not in self.observable.keys:
                 value = quote(getattr(self, key))
                 beside = " of a thread" if self.thread is not None and key != "thread" else ""
