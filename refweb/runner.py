@@ -215,8 +215,6 @@ def _attempt(scene, system, out, tell, announce, clock, repeats, kept=None, summ
         solution.findings += [*repeats, *notices(scene, system)]
     else:
         solution.findings += _before(kept, summary, system, solution.versions)
-    if scene.control and scene.accuracy.horizon:
-        raise InputError("[accuracy] horizon = true cannot stand beside [[control]]: its runs have none")
     simulation = simulation_of(scene, system, solution, kept, commands)
     solution.commands = [list(command) for command in commands]
     solution.columns = simulation.columns

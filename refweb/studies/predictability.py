@@ -1,10 +1,10 @@
 """Horizon of a motion: growth of a small difference between two runs.
 
 A slack net is chaotic: the smallest difference grows until no digit of a position is correct. A second run starts with
-every free unknown moved at random by up to `PERTURBATION` of the shortest element. It has the same steps. The
-separation of the two motions shows how errors of this size grow, rounding included, for any integrator. After the time
-at which less than one digit is left, results are statistical: several runs have a mean and a spread, and no run has
-more.
+every free unknown moved at random by up to `PERTURBATION` of the shortest element. It has the same steps, and controls
+act on its own state. The separation of the two motions shows how errors of this size grow, rounding included, for any
+integrator. After the time at which less than one digit is left, results are statistical: several runs have a mean and a
+spread, and no run has more.
 
 Keys of `horizon` and `ensemble` stand in `run.json`; `further_runs` and `sweeps.case` read them by name.
 """
@@ -44,19 +44,15 @@ def horizon(simulation, results, members=None, tell=None):
         behind the last of these times; ``ensemble``, of each result ``mean`` and ``deviation``, the standard one.
     """
     tell = tell or (lambda text, share: None)
-    times = simulation.schedule.times[1:]
-    pair = [_integrator(simulation) for _ in range(2)]
-    courses = [pair[0].start(*simulation.begin.motion), pair[1].start(*_beside(simulation, 1).motion)]
-    apart, size = [np.abs(courses[0].x - courses[1].x).max()], [np.abs(courses[0].x).max()]
-    for n, end in enumerate(times, 1):
-        for integrator, course in zip(pair, courses, strict=True):
-            integrator.advance(course, [end])
-        apart.append(np.abs(courses[0].x - courses[1].x).max())
-        size.append(np.abs(courses[0].x).max())
-        tell("horizon", n / len(times))
-        if any(course.stopped for course in courses):
-            break
-    when = np.append(0.0, times)[: len(apart)]
+    times = simulation.schedule.times
+    pair = _motion(simulation, simulation.begin), _motion(simulation, _beside(simulation, 1))
+    first = pair[0] if simulation.schedule.commands is None else [x.copy() for x in pair[0]]  # both set the same values
+    apart, size = [], []
+    for n, (x, x_beside) in enumerate(zip(first, pair[1], strict=False)):
+        apart.append(np.abs(x - x_beside).max())
+        size.append(np.abs(x).max())
+        tell("horizon", n / (len(times) - 1))
+    when = times[: len(apart)]
     left = -np.log10(np.maximum(apart, 1e-300) / np.maximum(max(size), 1e-300))
     digits = [(k, float(when[np.argmax(left < k)]) if (left < k).any() else None) for k in range(12, 0, -1)]
     end = digits[-1][1]
@@ -71,6 +67,20 @@ def horizon(simulation, results, members=None, tell=None):
     if members is not None:
         horizon_data["ensemble"] = ensemble(simulation, members, tell)
     return horizon_data
+
+
+def _motion(simulation, begin):
+    """Yield the displacements of a run from a `Start`, the same array at each row."""
+    integrator, schedule = _integrator(simulation), simulation.schedule
+    schedule.reset()
+    course = integrator.start(*begin.motion)
+    for row, time in enumerate(schedule.times):
+        history = integrator.advance(course, [time])
+        yield course.x
+        if course.stopped:
+            return
+        if schedule.commands is not None:
+            schedule.commands.act(row, integrator, course, history)
 
 
 def _integrator(simulation):
@@ -97,6 +107,7 @@ def ensemble(simulation, count, tell, size=PERTURBATION):
     watch, values = simulation.watch, []
     for seed in range(1, count + 1):
         integrator = _integrator(simulation)
+        simulation.schedule.reset()
         course = integrator.start(*_beside(simulation, seed, size).motion)
         for block in blocks(integrator, course, simulation.schedule):
             table = watch.table(block.history)
