@@ -199,7 +199,7 @@ MIRRORS = {
     "pictures/histories": "pictures/test_plots.py",
     "pictures/sheet": "pictures/test_plots.py",
     "pictures/distances": "pictures/test_plots.py",
-    "studies/predictability": "studies/test_horizon.py",
+    "studies/predictability": "studies/test_horizon.py dynamics/test_control.py",
     "studies/further_runs": "studies/test_further_runs.py",
     "results/error_budget": "results/test_error_budget.py studies/test_further_runs.py",
     "dynamics/divergence": "results/test_error_budget.py",
@@ -405,9 +405,7 @@ MUTANTS = [
     Mutant("dynamics/controllers", "if not edge > 0.0:", "if False:"),
     Mutant("dynamics/controllers", "controller.meters.append(probe.data)", "pass"),
     Mutant("net/quaternions", "np.copysign(angle, w)", "angle"),
-    Mutant(
-        "effects/body_load", "balance = term.balance._replace(internal=moment, twists=moment)", "balance = term.balance"
-    ),
+    Mutant("effects/body_load", "internal=moment, twists=moment", "internal=moment, twists=False"),
     Mutant("effects/body_load", "blocks[c, first + i, 3 + j] = -change[i]", "blocks[c, first + i, 3 + j] = change[i]"),
     Mutant("results/observables/fuel", "data[0, 1] * (t - data[0, 2])", "data[0, 1] * t"),
     Mutant("studies/predictability", "schedule.commands.act(row, integrator, course, history)", "pass"),

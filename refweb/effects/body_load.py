@@ -127,19 +127,21 @@ def terms_of(
     factor : sequence of (t, factor) or None
         Factor over time of both.
     """
-    oriented = body.turn is not None
-    cells = np.array([[body.row, body.spin, body.turn][: 2 + oriented]], dtype=np.int32)
-    numbers = np.zeros(1, BODY_LOAD)
-    numbers["turned"], numbers["oriented"] = turned, oriented
-    numbers["mobility"] = body.axes.T @ body.mobility @ body.axes if oriented else np.eye(3)
     terms = []
     if force is not None and not turned:
         terms.append(nodal_load(net, "load", [body.row], np.array([force]), factor))
     for value, kernel_of, moment in ((force if turned else None, push, False), (torque, twist, True)):
         if value is not None:
-            numbers["value"] = value
             tangent = tangent_of(moment) if turned else Tangent()
-            term = outer_load(net, "load", cells, matrix_of(numbers), factor, force=kernel_of, tangent=tangent)
+            term = outer_load(net, "load", *_cell(body, value, turned), factor, force=kernel_of, tangent=tangent)
             balance = term.balance._replace(internal=moment, twists=moment)
             terms.append(replace(term, balance=balance))
     return [replace(term, timing=term.timing._replace(at_rest=False)) for term in terms]
+
+
+def _cell(body, value, turned):
+    """(Rows, numbers) of a load on a body that turns."""
+    oriented, numbers = body.turn is not None, np.zeros(1, BODY_LOAD)
+    numbers["value"], numbers["turned"], numbers["oriented"] = value, turned, oriented
+    numbers["mobility"] = body.axes.T @ body.mobility @ body.axes if oriented else np.eye(3)
+    return np.array([[body.row, body.spin, body.turn][: 2 + oriented]], dtype=np.int32), matrix_of(numbers)

@@ -90,7 +90,7 @@ class Load(Table):
             raise InputError("force is missing: give force = ... [N] or torque = ... [N m]")
 
     def extend(self, net: Net) -> Net:
-        """The net whose body turns."""
+        """The net whose body turns, unless a force in space leaves that alone."""
         if self.body is None:
             return net
         names = [body.name for body in net.bodies]
@@ -100,6 +100,8 @@ class Load(Table):
         if net.quasi_static:
             raise InputError(f"body = {quote(self.body)}: loads on bodies have no meaning in statics: load nodes")
         self._refuse(body)
+        if self.torque is None and self.axes == "space":
+            return net
         return replace(net, bodies=tuple(replace(b, turns=b.turns or b is body) for b in net.bodies))
 
     def _refuse(self, body: RigidBody) -> None:

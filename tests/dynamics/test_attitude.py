@@ -1,5 +1,6 @@
 """Attitude control of free bodies: closed forms and DOP853 in each period; forces in a cone; what controls spend."""
 
+import copy
 import re
 
 import nets
@@ -245,6 +246,18 @@ def test_a_thruster_pushes_within_its_cone(axes):
     np.testing.assert_allclose(run.controls[0]["spent"], np.linalg.norm(force), rtol=1e-12)
 
 
+def test_torques_are_set_step_by_step():
+    """About a principal axis, in a copy as well: φ ← φ + T ω + ½ T² M/J."""
+    run = refweb.start(refweb.Scene.from_dict(without_control({})))
+    run.advance(0.5)
+    run.set("load.0.torque", [0.0, 0.0, 2.5])
+    branch = copy.deepcopy(run)
+    for one in (run, branch):
+        one.advance(0.5)
+        np.testing.assert_allclose(one.observe("vz"), 0.5, rtol=1e-12)
+        np.testing.assert_allclose(2.0 * np.arctan2(one.observe("qz"), one.observe("qw")), 0.125, rtol=1e-12)
+
+
 def test_stiffness_of_loads_that_turn():
     """By differences of forces under rotations of the body."""
     given = scene(load={"force": [1.0, 2.0, -3.0], "torque": [0.4, -0.8, 0.3], "axes": "body"})
@@ -327,14 +340,18 @@ def without_control(tables):
 
 
 def test_torque_on_a_sphere_and_loads_on_bodies_in_statics():
-    """A sphere with one moment of inertia turns by M t/J; statics refuses loads on bodies."""
+    """A sphere with one moment of inertia turns by M t/J, without supports; statics refuses loads on bodies."""
     ball = {key: value for key, value in hub_of("hub", **SPHERE).items() if value is not None}
     given = without_control({"body": [ball]})
+    given["web"]["supports"] = []
     given["load"] = [{"body": "hub", "torque": [0.1, 0.0, -0.2], "force": [0.0, 4.0, 0.0]}]
     given["observe"] = [o for o in given["observe"] if o["quantity"] != "orientation"]
     run = refweb.run(refweb.Scene.from_dict(given))
     np.testing.assert_allclose(columns(run, ("vx", "vy", "vz"))[-1], [0.5, 0.0, -1.0], atol=1e-12)
     np.testing.assert_allclose(run.history["py"][-1], 5.0 + 0.5 * 2.0, atol=1e-12)
+    given["load"][0].pop("torque")
+    given["solve"] |= {"method": "explicit", "order": 4}  # which follows no rotation, and none is asked for
+    np.testing.assert_allclose(refweb.run(refweb.Scene.from_dict(given)).history["py"][-1], 6.0, atol=1e-12)
     given = {key: value for key, value in given.items() if key not in ("output", "observe", "solve")}
     with pytest.raises(InputError, match="loads on bodies have no meaning in statics"):
         refweb.Scene.from_dict(given | {"solve": {"kind": "static"}}).build()
