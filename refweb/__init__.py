@@ -61,6 +61,9 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .settings import Output as Output
     from .settings import Static as Static
     from .settings import Supports as Supports
+    from .sizing.requirements import Sizing as Sizing
+    from .sizing.size import Sized as Sized
+    from .sizing.size import size as size
     from .solution import Solution as Solution
     from .solution import load as load
     from .studies.cost import Cost as Cost

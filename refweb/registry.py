@@ -83,6 +83,8 @@ LISTS = {
 """Those that may stand several times."""
 STUDY = "refweb.sweeps.study:Study"
 """Class of a file for ``refweb sweep``."""
+SIZING = "refweb.sizing.requirements:Sizing"
+"""Class of a file for ``refweb size``."""
 OBSERVABLES = {
     "displacement": "refweb.results.observables.nodal:Displacement",
     "position": "refweb.results.observables.nodal:Position",
@@ -210,6 +212,7 @@ COMMANDS = {
     "cost": "refweb.commands.cost",
     "trust": "refweb.commands.trust",
     "sweep": "refweb.commands.sweep",
+    "size": "refweb.commands.size",
     "warm": "refweb.commands.warm",
 }
 """Verbs of the command line, in the order of its help."""
@@ -228,6 +231,9 @@ EXPORTS = (
     "refweb.sweeps.sweep:sweep",
     "refweb.sweeps.study_result:Sweep",
     STUDY,
+    "refweb.sizing.size:size",
+    "refweb.sizing.size:Sized",
+    SIZING,
     "refweb.scene:Scene",
     "refweb.settings:Static",
     "refweb.settings:Dynamic",

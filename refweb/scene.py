@@ -65,6 +65,9 @@ SHIPPED_SCENES = pathlib.Path(__file__).parent / "scenes"
 """Folder of the scenes shipped with refweb."""
 SHIPPED_STUDIES = pathlib.Path(__file__).parent / "sweeps" / "shipped"
 """Folder of the studies shipped with refweb."""
+SHIPPED_SIZINGS = pathlib.Path(__file__).parent / "sizing" / "shipped"
+"""Folder of the requirements files shipped with refweb."""
+HAS_REQUIREMENTS = "holds requirements, and is not a scene: refweb size {0} finds the least design that meets them"
 IS_STUDY = (
     "is a study, many runs of one scene, and not a scene: refweb sweep {0} runs it, refweb info {0} says what it varies"
 )
@@ -242,6 +245,8 @@ class Scene:
         if folder is not None:
             given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body", "fold", "cable"])
         tables = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS]
+        if "web" not in given and {"scene", "requirements"} <= given.keys():
+            raise InputError(HAS_REQUIREMENTS.format(file or "REQUIREMENTS"))
         if "web" not in given and {"scene", "parameters"} <= given.keys():
             raise InputError(IS_STUDY.format(file or "STUDY"))
         for key in given:
@@ -459,6 +464,8 @@ def file_of(source: Any) -> pathlib.Path:
         raise InputError(f"{short(str(source))}: is a folder, not a scene file{hint}")
     if path.stem in (study.stem for study in SHIPPED_STUDIES.glob("*.toml")):
         raise InputError(f"{short(str(source))}: {IS_STUDY.format(path.stem)}")
+    if path.stem in (sizing.stem for sizing in SHIPPED_SIZINGS.glob("*.toml")):
+        raise InputError(f"{short(str(source))}: {HAS_REQUIREMENTS.format(path.stem)}")
     raise InputError(f"{short(str(source))}: no such file and no shipped scene, {nearest(path.stem, known)}")
 
 

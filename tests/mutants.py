@@ -210,6 +210,7 @@ MIRRORS = {
     "sweeps/expressions": "sweeps/test_expressions.py",
     "sweeps/chances": "sweeps/test_chances.py",
     "sweeps": "sweeps/test_sweep.py sweeps/test_chances.py",
+    "sizing": "sizing/test_size.py",
     "results/case_rows": "sweeps/test_sweep.py",
     "studies": "studies/test_cost.py",
     "reference/paths": "reference/test_paths.py",
@@ -786,6 +787,15 @@ MUTANTS = [
     Mutant("results/observables/observable", "changes[0] + 3.0 * max(changes[1:])", "changes[0]"),
     Mutant("results/state", "self.element_strain <= self._slack_below", "self.element_strain <= 0.0"),
     # Studies and modes
+    Mutant("sizing/sqp", "penalty = max(penalty, 2.0 *", "penalty = min(penalty, 2.0 *"),
+    Mutant("sizing/formulas", "_less(a.low, b.high) / scale", "_less(a.low, b.low) / scale"),
+    Mutant("sizing/runs", "if case.given is not None and case.key not in self.rows:", "if case.given is not None:"),
+    Mutant("sizing/case", "-allowed / stress**2 * slope", "allowed / stress**2 * slope"),
+    Mutant(
+        "sizing/search",
+        "feasible = [j for j in judged if j.feasible is True]",
+        "feasible = [j for j in judged if j.feasible is not False]",
+    ),
     Mutant("sweeps/chances", "between + float(np.mean(np.square(within)))", "between"),
     Mutant("sweeps/expressions", "return True if holds(a.high, b.low)", "return True if holds(a.low, b.low)"),
     Mutant("sweeps/design", "[:, column] = second[:, column]", "[:, column] = first[:, column]"),

@@ -104,6 +104,12 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
         "*",
         "Gymnasium environments of scenes: spaces, episodes, images; they know stepped runs, and no command line.",
     ),
+    (
+        "sizing",
+        "*",
+        "Sizing: the least design of a scene that meets requirements; it knows studies and gradients, and no command "
+        "line.",
+    ),
     ("commands", "*", "The verbs of the command line, one file each; they know everything, and nothing knows them."),
     ("the door", "__main__", ""),
 ]

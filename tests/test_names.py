@@ -15,7 +15,7 @@ BARE = set(
     "there".split()
 )
 """Words that are no name by themselves."""
-CONTRACT = {"sweeps.study": {"keep"}}
+CONTRACT = {"sweeps.study": {"keep"}, "sizing.requirements": {"whole"}}
 """Keys of files that are read, whose names stay."""
 VAGUE = {"What", "Whether", "Of", "That", "How", "Where", "Which", "Who", "Why", "As", "One", "When", "If", "By"}
 """Words that begin no docstring: it begins with a verb, or with the quantity."""

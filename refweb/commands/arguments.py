@@ -63,6 +63,15 @@ def resumable(folder):
         raise KeyboardInterrupt(*([remedy(folder)] if begun else [])) from None
 
 
+def print_sizing(source):
+    """Print what a requirements file sizes, without running it; refuses what `refweb size` refuses."""
+    from ..sizing.size import prepared
+    from .console import print_size_begins
+
+    print_size_begins(prepared(source)[0])
+    print(f"requirements, of which refweb size {source} finds the least design")
+
+
 def print_study(source):
     """Print what a study runs, without running it; refuses what `refweb sweep` refuses."""
     from ..sweeps.study import load

@@ -3,7 +3,7 @@
 # This docstring is the help of the verb; a new check belongs in the scene, `runner.notices` or `doubts`.
 
 from ..errors import InputError
-from .arguments import add_scene, add_values, print_study, scene_of
+from .arguments import add_scene, add_values, print_sizing, print_study, scene_of
 
 
 def add_arguments(parser):
@@ -13,8 +13,9 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Refuse what a run would refuse, else print what it would solve and warn of before; studies as well."""
+    """Refuse what a run would refuse, else print what it would solve and warn of before; also of a study or sizing."""
     from ..runner import notices, simulation_of
+    from ..sizing.requirements import is_sizing
     from ..solution import Solution
     from ..sweeps.study import is_study
     from .console import print_scene
@@ -24,6 +25,11 @@ def run(arguments):
         if arguments.values:
             raise InputError(f"--set has no meaning for {arguments.scene}: it is a study, which has [parameters]")
         print_study(arguments.scene)
+        return
+    if is_sizing(arguments.scene):
+        if arguments.values:
+            raise InputError(f"--set has no meaning for {arguments.scene}: it has [parameters]")
+        print_sizing(arguments.scene)
         return
     scene, system = scene_of(arguments).settle()
     solution = Solution(scene)

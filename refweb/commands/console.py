@@ -357,6 +357,39 @@ def print_sweep(summary):
     _box(f"{summary['title']}: {summary['status']}", rows)
 
 
+def print_size_begins(sized):
+    """Print what is about to be sized."""
+    from ..results.sizing_text import on_free, on_requirement
+
+    sizing = sized.sizing.to_dict()
+    rows = [("scene", ", ".join(sized.sizing.scenes)), ("free", on_free(sizing)), ("least", sizing["minimise"])]
+    for name, requirement in sized.sizing.requirements.items():
+        rows.append((f"{name}", on_requirement(requirement._asdict())))
+    rows += [("draws", f"{sized.sizing.count} of {', '.join(sized.sizing.draws)}")] if sized.sizing.draws else []
+    rows += [("method", sized.method)]
+    rows += [("", f"{sized.recorded} runs are recorded")] if sized.recorded else []
+    _box(sized.title, rows)
+
+
+def print_size(summary):
+    """Print the box of a sizing from the content of its ``run.json``."""
+    from ..results import sizing_text as words
+
+    rows: list = []
+    if summary["requirements"]:
+        rows = [
+            ("design" * (not n), f"{name} = {text}")
+            for n, (name, text) in enumerate(words.on_design(summary["values"]))
+        ]
+        rows += [("least", words.on_objective(summary)), ("requires", _columns(words.rows_of_requirements(summary)))]
+    rows += [("search", words.on_search(summary))]
+    rows += [("note", text) for text in summary["notes"]]
+    rows.append(("cost", on_cost(summary["cost"])))
+    if summary["status"] != "solved":
+        rows.append((summary["status"], summary["message"]))
+    _box(f"{summary['title']}: {summary['status']}", rows)
+
+
 def print_gradients(solution, result, gradients, refused, limit):
     """Print the box of gradients of a result, at most so many entries of each; ``refused`` are texts."""
     computed, numbers = solution.results[result], [gradient for gradient in gradients if not gradient.by]

@@ -1,4 +1,4 @@
-"""Print the content of a scene, a study or a result folder."""
+"""Print the content of a scene, a study, requirements or a result folder."""
 
 # A verb named by `kind` in `run.json` has `show(summary)`; this docstring is help; keys of `--json` are for programs.
 
@@ -7,7 +7,7 @@ import pathlib
 
 from ..errors import InputError
 from ..registry import COMMANDS, known, load
-from .arguments import add_json, print_json, print_study
+from .arguments import add_json, print_json, print_sizing, print_study
 
 
 def add_arguments(parser):
@@ -19,6 +19,7 @@ def add_arguments(parser):
 def run(arguments):
     """Print what is there."""
     from ..scene import shipped
+    from ..sizing.requirements import is_sizing
     from ..sweeps.study import is_study
 
     folder = pathlib.Path(arguments.source)
@@ -26,6 +27,8 @@ def run(arguments):
         _folder(folder, arguments.json)
     elif is_study(arguments.source):
         _study(arguments.source, arguments.json)
+    elif is_sizing(arguments.source):
+        _sizing(arguments.source, arguments.json)
     else:
         _scene(arguments.source, arguments.json)
 
@@ -61,6 +64,15 @@ def _study(source, as_json):
 
     study = load(source).to_dict()
     print_json({"study": {key: value for key, value in study.items() if key != "folder"}})
+
+
+def _sizing(source, as_json):
+    if not as_json:
+        print_sizing(source)
+        return
+    from ..sizing.requirements import load
+
+    print_json({"sizing": load(source).to_dict()})
 
 
 def _scene(source, as_json):

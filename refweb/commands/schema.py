@@ -1,4 +1,4 @@
-"""Print the JSON Schema of scene files, by which editors check and complete them."""
+"""Print the JSON Schema of scene files, or of another kind, by which editors check and complete them."""
 
 # This docstring is the help of the verb; `reference.schema` makes all that is printed. The command line finds
 # the verb by the name of this file, and calls `add_arguments` and `run`.
@@ -9,7 +9,9 @@ from .arguments import print_json
 
 
 def add_arguments(parser):
-    """None."""
+    """The kind of file."""
+    kinds = ("scene", "study", "sizing")
+    parser.add_argument("file", nargs="?", default="scene", choices=kinds, help="kind of file (default: scene)")
 
 
 def run(arguments):
@@ -19,4 +21,4 @@ def run(arguments):
 
     for message in load_installed():
         print(f"refweb: {message}", file=sys.stderr)
-    print_json(schema())
+    print_json(schema(arguments.file))

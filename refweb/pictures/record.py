@@ -27,6 +27,7 @@ CLOCKS = {"modes": "mode {:g}", "static": "step {:g}", "dynamic": "t = {:.6g} s"
 OTHERS = {
     "cost": "its diagram is cost.png there, by refweb cost",
     "sweep": "its plots are there already, by refweb sweep, one a result; refweb report writes its page",
+    "size": "its trade-off is trade-off.png there, by refweb size, and its design the result folder design",
 }
 """Remedies for result folders of other kinds."""
 

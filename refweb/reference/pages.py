@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from ..errors import InputError
 from ..messages import nearest
-from ..registry import EFFECTS, INTEGRATORS, LAWS, LISTS, OBSERVABLES, PARTS, SHAPES, SOLVES, STUDY, WEBS, load
+from ..registry import EFFECTS, INTEGRATORS, LAWS, LISTS, OBSERVABLES, PARTS, SHAPES, SIZING, SOLVES, STUDY, WEBS, load
 from ..settings import Head
 from ..tables import Table, key_of
 from .docstrings import example, parameters, prose, refusals, summary
@@ -22,6 +22,8 @@ from .schema import accepted
 
 FIRST = ("web", "cable", "supports", "support")
 """Tables that the reference begins with."""
+FILES = {"study": STUDY, "sizing": SIZING}
+"""Classes of files of their own."""
 LARGE = 1e18
 """Bounds of this size and above are those of all numbers, and not told with each."""
 SUMMARIES = {
@@ -30,6 +32,7 @@ SUMMARIES = {
     "supports": "Supports in place of the web's own.",
     "support": "Supports in addition to others.",
     "study": "Many runs of one scene: a file of its own, for `refweb sweep`.",
+    "sizing": "The least design of a scene that meets requirements: a file of its own, for `refweb size`.",
 }
 """Summaries of tables that share a class, or that have a class for each kind."""
 
@@ -85,9 +88,9 @@ class Page(NamedTuple):
 
 
 def names():
-    """Names of the tables of a scene, in the order of the reference, and of a study."""
+    """Names of the tables of a scene, in the order of the reference, of a study and of a sizing."""
     rest = [name for name in (*PARTS, *LISTS) if name not in FIRST]
-    return ["scene", *FIRST, *EFFECTS, "solve", *rest, "study"]
+    return ["scene", *FIRST, *EFFECTS, "solve", *rest, *FILES]
 
 
 def pages_of(name):
@@ -130,8 +133,8 @@ def header_of(name):
     """Header of a table in a scene file."""
     if name == "scene":
         return "schema, title, seed"
-    if name == "study":
-        return "study"
+    if name in FILES:
+        return name
     several = name in LISTS or (name in EFFECTS and load(EFFECTS[name]).several)
     return f"[[{name}]]" if several else f"[{name}]"
 
@@ -214,13 +217,13 @@ def _scene(name):
     rows = [
         [f"`{header_of(table_name)}`", line_of(table_name)]
         for table_name in names()
-        if table_name not in ("scene", "study")
+        if table_name not in ("scene", *FILES)
     ]
     yield _page("scene", header_of("scene"), Head, example=example, listing=Listing(("table", "what it is"), rows))
 
 
-def _study(name):
-    yield _page(name, header_of(name), load(STUDY), without=["folder"], summary=SUMMARIES[name])
+def _file(name):
+    yield _page(name, header_of(name), load(FILES[name]), without=["folder"], summary=SUMMARIES[name])
 
 
 def _web(name):
@@ -284,5 +287,6 @@ _PAGES = {
     "thread": _thread,
     "observe": _observe,
     "solve": _solve,
-    "study": _study,
+    "study": _file,
+    "sizing": _file,
 }

@@ -9,16 +9,21 @@ import dataclasses
 from dataclasses import MISSING
 from typing import Any
 
-from ..registry import EFFECTS, INTEGRATORS, LISTS, PARTS, SHAPES, SOLVES, WEBS, load
+from ..registry import EFFECTS, INTEGRATORS, LISTS, PARTS, SHAPES, SIZING, SOLVES, STUDY, WEBS, load
 from ..settings import Head
 from ..tables import Table, key_of
 from .docstrings import parameters, summary
 
+OTHERS = {"study": STUDY, "sizing": SIZING}
+"""Classes of other files."""
 DRAFT = "http://json-schema.org/draft-04/schema#"
 
 
-def schema():
-    """The schema of scene files, a dict of plain values."""
+def schema(file="scene"):
+    """The schema of scene files, or of those of a "study" or a "sizing", a dict of plain values."""
+    if file in OTHERS:
+        kind = load(OTHERS[file])
+        return {"$schema": DRAFT, "title": f"A {file} of refweb", **_table(kind, without=["folder"])}
     head, tables = _table(Head), {"web": _webs(), "solve": _solves()}
     tables |= {key: _table(load(reference)) for key, reference in PARTS.items()}
     tables |= {key: _list(_table(load(reference))) for key, reference in LISTS.items()}

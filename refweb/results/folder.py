@@ -85,7 +85,7 @@ def so_far(folder, summary):
     """The summary of a run that has not ended: its last row, and if its process is alive."""
     alive, at = is_alive(folder), reached(folder)
     text = f"it has reached {at}" if at else "it has written no row"
-    if summary.get("kind") == "sweep":
+    if summary.get("kind") in ("sweep", "size"):
         text = _rows(folder)
     if alive is False:
         return {**summary, "status": "killed", "message": f"its process is dead; {text}; {remedy(folder)}"}
@@ -104,6 +104,8 @@ def _rows(folder):
 
 def remedy(folder):
     """Text on how to continue a run that has not ended."""
+    if (folder / "requirements.toml").exists():
+        return "refweb size with the same requirements and --out goes on, and runs nothing again"
     if (folder / "results.csv").exists():
         return "refweb sweep with the same study and --out goes on with what is missing"
     if (folder / "checkpoint.npz").exists():

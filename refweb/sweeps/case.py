@@ -44,6 +44,9 @@ class Job(NamedTuple):
         Machine and process that sent it.
     files : dict
         Content of files that the scene reads, by absolute path, for machines that do not have them.
+    task : callable, optional
+        Called with the scene in place of its run; returns the content of a ``run.json``, in which ``more`` may have
+        further cells.
     """
 
     key: str
@@ -53,6 +56,7 @@ class Job(NamedTuple):
     keeps: str
     home: tuple[Any, ...]
     files: dict[str, Any]
+    task: Any = None
 
 
 class Outcome(NamedTuple):
@@ -79,7 +83,7 @@ def solve(job):
     try:
         with warnings.catch_warnings() if job.home == machine() else contextlib.nullcontext():
             summary, archive = _run(job)
-        cells = cells_of(summary)
+        cells = cells_of(summary) | summary.get("more", {})
     except InputError as error:
         summary, archive, cells = None, None, {"status": "refused", "message": _values_text(job, error)}
     except SolverError as error:
@@ -118,6 +122,8 @@ def _run(job):
             directory = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-")))
             given = _brought(job, directory)
         scene = Scene.from_dict(given, folder, job.file)
+        if job.task is not None:
+            return job.task(scene), None
         if job.keeps != "all":
             return run(scene, progress=False).summary(), None
         directory = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-"))) / "run"

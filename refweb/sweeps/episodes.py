@@ -179,7 +179,7 @@ class Gym(Table):
         for key in ("reward", "terminated", "truncated"):
             given = getattr(self, key)
             with refused_at(f"{key}:"):
-                formulas.append(None if given is None else Formula(given, names, number=key == "reward"))
+                formulas.append(None if given is None else Formula(given, names, None if key == "reward" else True))
         return formulas
 
     def drawn(self, generator: np.random.Generator, draws: dict[str, Any] | None = None) -> dict[str, Any]:

@@ -115,8 +115,8 @@ class Expression:
         The condition.
     names : collection of str
         Names that it may use; the last part of a path is an abbreviation of the path if no other path has it.
-    number : bool
-        True for a number, such as ``2*speed``, which may also be a condition.
+    compares : bool, optional
+        True for a condition, False for a number, such as ``2*speed``, and None for either.
 
     Raises
     ------
@@ -124,7 +124,7 @@ class Expression:
         For a text that is no condition, and for an unknown name, with the nearest known one.
     """
 
-    def __init__(self, text, names, number=False):
+    def __init__(self, text, names, compares=True):
         self.text, self._aliases = text, {}
         if len(text) > LONGEST:
             raise InputError(f"a condition must have at most {LONGEST} characters, not {len(text)}")
@@ -148,9 +148,12 @@ class Expression:
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise InputError(f"{quote(text)}: is not a condition, such as max_stress > 2e8") from None
         self._check(self._tree, 0)
-        if not (number or isinstance(self._tree, ast.Compare | ast.BoolOp)) and not (
+        condition = isinstance(self._tree, ast.Compare | ast.BoolOp) or (
             isinstance(self._tree, ast.UnaryOp) and isinstance(self._tree.op, ast.Not)
-        ):
+        )
+        if condition and compares is False:
+            raise InputError(f"{quote(text)}: is a condition, and must be a number, such as total_mass")
+        if compares and not condition:
             raise InputError(f"{quote(text)}: compares nothing: a condition is such as max_stress > 2e8")
 
     def _check(self, node: Any, depth):
@@ -190,7 +193,11 @@ class Expression:
         try:
             return self._truth(self._tree, values)
         except (TypeError, AttributeError, ValueError, IndexError):
-            raise InputError(f"{quote(self.text)}: cannot be computed of {_values_text(values, self.used)}") from None
+            raise self._refused(values) from None
+
+    def _refused(self, values):
+        """The error of values of which it cannot be computed."""
+        return InputError(f"{quote(self.text)}: cannot be computed of {_values_text(values, self.used)}")
 
     def _truth(self, node, values):
         if isinstance(node, ast.BoolOp):
@@ -235,7 +242,7 @@ class Formula(Expression):
 
     Parameters
     ----------
-    text, names, number
+    text, names, compares
         See `Expression`.
 
     Raises
@@ -244,8 +251,8 @@ class Formula(Expression):
         As `Expression`.
     """
 
-    def __init__(self, text, names, number=False):
-        super().__init__(text, names, number)
+    def __init__(self, text, names, compares=True):
+        super().__init__(text, names, compares)
         tree = ast.fix_missing_locations(ast.Expression(_Floats().visit(self._tree)))
         self._code = compile(tree, "<formula>", "eval")
 

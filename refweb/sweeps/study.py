@@ -349,7 +349,7 @@ def is_study(source: Any) -> bool:
         given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except (ValueError, OSError, RecursionError):
         return False
-    return "web" not in given and {"scene", "parameters"} <= given.keys()
+    return not given.keys() & {"web", "requirements"} and {"scene", "parameters"} <= given.keys()
 
 
 def load(source: str | PathLike[str]) -> Study:
@@ -372,6 +372,8 @@ def load(source: str | PathLike[str]) -> Study:
     with in_file(path.name):
         if "web" in given and "parameters" not in given:
             raise InputError("is a scene, not a study, which has a scene and [parameters]: use refweb run")
+        if "requirements" in given:
+            raise InputError("holds requirements, and is no study: use refweb size")
         unknown = [key for key in given if key not in _study_keys()]
         if unknown:
             key = unknown[0]

@@ -4,7 +4,7 @@ A study can continue from the state of its folder at any time. The files of a ca
 is appended as a whole. Therefore a study that is killed loses only the cases that its workers were running. The key of
 a row is a digest of its scene: another study with the same case finds it.
 
-`_check_folder` knows a message of `results.folder.check_folder` by its words "is not empty", which stay.
+`holds_rows` knows a message of `results.folder.check_folder` by its words "is not empty", which stay.
 """
 
 from __future__ import annotations
@@ -36,6 +36,9 @@ from .workers import Given, Processes, through
 
 if TYPE_CHECKING:
     from os import PathLike
+
+STUDIES = {"sweep": "study", "size": "sizing"}
+"""Names of studies in messages, by ``kind`` of their ``run.json``."""
 
 
 def sweep(
@@ -129,20 +132,20 @@ def _asked(scene, parameters, options):
         if options:
             raise InputError(f"{next(iter(options))} has no meaning with a study, which has its own keys: leave it out")
         path = study.folder / study.scene if study.folder is not None else pathlib.Path(study.scene)
-        return study, _base(path if path.is_file() else study.scene)
+        return study, base_of(path if path.is_file() else study.scene)
     if isinstance(scene, Scene):
         given = scene.to_dict()
         title, base = scene.title, Base(given, scene.folder, scene.file or "scene")
         return Study(**{"scene": "scene.toml", "title": title, **options, "parameters": parameters}), base
-    base = _base(scene)
+    base = base_of(scene)
     path = pathlib.Path(scene)
     name = str(path.resolve() if path.is_file() else scene)
     title = f"{base.given.get('title', path.stem)}, sweep"[:200]
     return Study(**{"scene": name, "title": title, **options, "parameters": parameters}), base
 
 
-def _base(source):
-    """The scene of a file or a name."""
+def base_of(source):
+    """The `refweb.sweeps.design.Base` of a scene file, or of the name of a shipped scene."""
     path = file_of(source)
     Scene.load(path)  # says what is wrong with it alone
     given = {"title": path.stem, **tomllib.loads(path.read_bytes().decode("utf-8-sig"))}
@@ -175,7 +178,8 @@ def _run(study_run, base, kept, workers, tell):
     for case in study_run.cases:
         by_key.setdefault(case.key, []).append(case)
     total, left, began = sum(again.values()), sum(again[key] for key in missing), None
-    jobs = (_job(study_run.study, base, case, workers) for case in missing.values())
+    keeps = study_run.study.keep
+    jobs = (job_of(base, case, workers.local, keeps) for case in missing.values())
     tell(f"{total - left} of {total} cases", (total - left) / total)
     start = left
     with contextlib.closing(through(jobs, workers)) as outcomes:
@@ -191,16 +195,17 @@ def _run(study_run, base, kept, workers, tell):
             tell(words + (f", {duration(rest)} left" if rest is not None and left else ""), (total - left) / total)
 
 
-def _job(study, base, case, workers):
+def job_of(base, case, local, keeps="none", task=None):
+    """The `refweb.sweeps.case.Job` of a case of a base scene; where it is not ``local``, files go with it."""
     folder = None if base.folder is None else str(base.folder)
     files = {}
-    if not workers.local:
+    if not local:
         given, scene = base.scene(case.values)
         for path in files_of(scene.to_dict()):
             with contextlib.suppress(OSError):
                 files[path] = pathlib.Path(path).read_bytes()
     text = ", ".join(f"{short(key)} = {quote(value)}" for key, value in case.values.items())
-    return Job(case.key, case.given, folder, f"{base.file} with {text}", study.keep, machine(), files)
+    return Job(case.key, case.given, folder, f"{base.file} with {text}", keeps, machine(), files, task)
 
 
 def _done(study_run, kept):
@@ -229,7 +234,7 @@ class Kept:
         self.study_run, self.rows, self._aside, self._table = study_run, {}, [], None
         if self.path is None:
             return
-        full = _check_folder(folder)
+        full = holds_rows(folder, "sweep")
         asked = {case.key for case in study_run.cases}
         stored = [*case_rows.read(self.path / case_rows.ASIDE), *case_rows.read(self.path / case_rows.NAME)]
         for row in stored if full else ():
@@ -259,7 +264,7 @@ class Kept:
             return
         with case_rows.written(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
-            _tidy(self.path)
+            tidy(self.path)
             self.summary()
             if scene is not None:
                 write_text(self.path / "scene.toml", as_toml(scene.to_dict()))
@@ -297,10 +302,10 @@ class Kept:
                 write_text(self.path / "run.json", text)
 
 
-def _check_folder(folder):
-    """Tell if a folder contains a study; refuse a folder with other content or without write permission."""
+def holds_rows(folder, kind):
+    """Tell if a folder contains a study of a kind; refuse one with other content or without write permission."""
     path = pathlib.Path(folder)
-    if path.is_dir() and (read_summary(path) or {}).get("kind") == "sweep":
+    if path.is_dir() and (read_summary(path) or {}).get("kind") == kind:
         if is_alive(path):
             raise InputError(
                 f"folder {short(str(folder))}: a study that is alive writes there: wait for it, or stop it"
@@ -312,12 +317,12 @@ def _check_folder(folder):
         if "is not empty" not in str(error):
             raise
         raise InputError(
-            f"folder {short(str(folder))}: is not empty and holds no study: choose another with --out"
+            f"folder {short(str(folder))}: is not empty and holds no {STUDIES[kind]}: choose another with --out"
         ) from None
     return False
 
 
-def _tidy(folder):
+def tidy(folder):
     """Remove temporary files of a study that was killed."""
     for path in [*folder.glob(".refweb-*"), *(folder / "cases").glob(".refweb-*")]:
         shutil.rmtree(path) if path.is_dir() else path.unlink()

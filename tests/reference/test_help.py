@@ -16,7 +16,7 @@ from refweb.reference.glossary import GLOSSARY
 from refweb.reference.pages import names, pages_of, takes
 from refweb.reference.schema import schema
 from refweb.reference.words import as_markdown, as_text
-from refweb.registry import EFFECTS, LISTS, PARTS, SHAPES, SOLVES, STUDY, WEBS, load
+from refweb.registry import EFFECTS, LISTS, PARTS, SHAPES, SIZING, SOLVES, STUDY, WEBS, load
 from refweb.scene import shipped
 from refweb.tables import Table, key_of, real, table
 
@@ -82,7 +82,7 @@ def merged(given, more):
     return given | more | both
 
 
-@pytest.mark.parametrize("name", [name for name in PAGES if name != "study"])
+@pytest.mark.parametrize("name", [name for name in PAGES if name not in ("study", "sizing")])
 def test_examples_pass_the_check(name, tmp_path, monkeypatch, capsys):
     """In the smallest scene around them; they are of their own table, short, and they validate."""
     page = PAGES[name]
@@ -129,9 +129,19 @@ def test_the_example_of_a_study_is_one():
     assert {key.name for key in PAGES["study"].keys} == {*study.to_dict()} | {"count", "skip", "conditions", "indices"}
 
 
+def test_the_example_of_a_sizing_is_one():
+    sizing = refweb.Sizing(**tomllib.loads(PAGES["sizing"].example))
+    assert sizing.parameters and sizing.requirements and sizing.scene in shipped()
+    assert {key.name for key in PAGES["sizing"].keys} == {*sizing.to_dict()} | {"count", "draws"}
+    for file, page in (("study", PAGES["study"]), ("sizing", PAGES["sizing"])):
+        validator = Draft4Validator(schema(file))
+        assert list(validator.iter_errors(tomllib.loads(page.example))) == []
+        assert list(validator.iter_errors({**tomllib.loads(page.example), "sed": 1}))
+
+
 def test_every_table_has_a_page():
     tables = {*WEBS.values(), *EFFECTS.values(), *PARTS.values(), *LISTS.values(), *SOLVES.values(), *SHAPES.values()}
-    assert {*names()} == {"scene", "web", "solve", "study", *PARTS, *LISTS, *EFFECTS} and len(names()) == len(
+    assert {*names()} == {"scene", "web", "solve", "study", "sizing", *PARTS, *LISTS, *EFFECTS} and len(names()) == len(
         {*names()}
     )
     assert len(PAGES) >= len(tables) and {"cable.groups", "contact.bodies", "temperature.groups"} <= PAGES.keys()
@@ -144,7 +154,7 @@ def test_a_page_has_every_key_with_what_it_takes_and_means(name, capsys):
     printed = capsys.readouterr().out
     words = " ".join(printed.split())
     kinds = {f"web.{k}": r for k, r in WEBS.items()} | {f"solve.{k}": r for k, r in SOLVES.items()}
-    kinds |= {f"body.{k}": r for k, r in SHAPES.items()} | PARTS | LISTS | EFFECTS | {"study": STUDY}
+    kinds |= {f"body.{k}": r for k, r in SHAPES.items()} | PARTS | LISTS | EFFECTS | {"study": STUDY, "sizing": SIZING}
     for f in dataclasses.fields(load(kinds[name])) if name in kinds else ():
         assert f.name in ("kind", "form", "folder") or any(key.name == key_of(f) for key in page.keys)
     for key in page.keys:

@@ -1,0 +1,167 @@
+"""Run of a design in a worker: results, sizes of the web, margin, frequencies, and derivatives by free numbers.
+
+`Task` travels to workers by pickle; its cells are columns of `results.csv`, and `slope_of` names those of derivatives.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import replace
+from typing import NamedTuple
+
+from ..errors import InputError, SolverError
+
+SIZES = {"cable_mass": "kg", "net_mass": "kg", "total_mass": "kg", "cable_length": "m", "packed_volume": "m³"}
+"""Sizes of the web, with their units: they are known before a run."""
+STRENGTH = ("margin", "utilisation")
+"""Numbers of the strength of lines."""
+FREQUENCY = re.compile(r"frequency_([1-9]|10)")
+"""Names of natural frequencies."""
+QUANTITIES = (*SIZES, *STRENGTH, *(f"frequency_{n}" for n in range(1, 11)))
+"""Names that every scene has besides its results."""
+GOVERNING = "stress of the smallest margin"
+"""Name of the stress that margin and utilisation follow from."""
+STEP = 1e-3
+"""Step of a difference of a size over its number: sizes are polynomials of low degree, or close to them."""
+
+
+def slope_of(name, path):
+    """Column of the derivative of a result by the number at a path."""
+    return f"{name} by {path}"
+
+
+class Task(NamedTuple):
+    """Computation of a scene: its run, sizes, strength, frequencies and derivatives.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names among `QUANTITIES`.
+    results : tuple of str
+        Results and quantities whose derivatives are wanted.
+    numbers : tuple of (str, float)
+        Paths of the numbers by which they are differentiated, with the numbers.
+    """
+
+    names: tuple[str, ...]
+    results: tuple[str, ...] = ()
+    numbers: tuple[tuple[str, float], ...] = ()
+
+    def __call__(self, scene):
+        """The content of a ``run.json`` with `QUANTITIES` among the results; derivatives are ``more``."""
+        from ..runner import run
+
+        solution = run(scene, progress=False)
+        summary = solution.summary()
+        results, sizes = dict(summary["results"]), sizes_of(scene.build())
+        results |= {n: {"value": sizes[n], "error": 0.0, "unit": SIZES[n]} for n in self.names if n in SIZES}
+        results |= {n: _of_strength(n, summary) for n in self.names if n in STRENGTH}
+        if frequencies := [n for n in self.names if FREQUENCY.fullmatch(n)]:
+            results |= _frequencies(scene, frequencies)
+        return {**summary, "results": results, "more": self._slopes(scene, solution, summary)}
+
+    def _slopes(self, scene, solution, summary):
+        """Derivatives by column; one that no adjoint gives is left out."""
+        slopes, observed = {}, [o.name for o in scene.observables]
+        sizes, strength = ([n for n in self.results if n in known] for known in (SIZES, STRENGTH))
+        for path, number in self.numbers if sizes else ():
+            by_difference = _by_difference(scene, path, number)
+            slopes |= {slope_of(n, path): by_difference[n] for n in sizes}
+        governing = _Governing(scene, solution, summary) if strength and self.numbers else None
+        for name, (path, _) in itertools.product(self.results, self.numbers):
+            try:
+                if name in observed:
+                    slopes[slope_of(name, path)] = float(solution.gradient(name, path))
+                elif name in STRENGTH:
+                    slopes[slope_of(name, path)] = governing.slope(name, path)
+            except (InputError, SolverError):
+                continue
+        return slopes
+
+
+def sizes_of(system):
+    """`SIZES` of a system, by name."""
+    from ..pages.sheet_text import PACKING
+    from ..results.provenance import web_of
+
+    web, net = web_of(system), system.net
+    return {
+        "cable_mass": web["mass"],
+        "net_mass": float(net.mass[: net.nodes].sum()),
+        "total_mass": web["total_mass"],
+        "cable_length": web["cable_length"],
+        "packed_volume": web["volume"] / PACKING,
+    }
+
+
+def _of_strength(name, summary):
+    """Entry of the margin of safety or of the utilisation, with the interval of its ±."""
+    from ..pages.sheet_text import decision
+
+    margin, used = summary.get("margin"), summary.get("utilisation")
+    if margin is None or used is None:
+        raise InputError(f"{name}: no line has a strength: give [cable] strength [Pa]")
+    if name == "utilisation":
+        return {"value": used["value"], "error": used["error"], "unit": "1"}
+    if margin["value"] is None:
+        return {"value": float("inf"), "error": 0.0, "unit": "1", "interval": (float("inf"), float("inf"))}
+    error = margin.get("error")
+    if error is None:
+        return {"value": margin["value"], "error": None, "unit": "1"}
+    lower, upper, _ = decision(margin, error * margin["allowed"])
+    wide = max(margin["value"] - lower, upper - margin["value"])
+    return {"value": margin["value"], "error": wide, "unit": "1", "interval": (lower, upper)}
+
+
+def _frequencies(scene, names):
+    """Entries of natural frequencies."""
+    from ..studies.modes import modes
+
+    numbers = [int(FREQUENCY.fullmatch(name)[1]) for name in names]
+    computed, entries = modes(scene, max(numbers), progress=False), {}
+    for name, number in zip(names, numbers, strict=True):
+        if number > len(computed.frequency):
+            raise InputError(f"{name}: the web has {len(computed.frequency)} modes")
+        value, error = float(computed.frequency[number - 1]), float(computed.error[number - 1])
+        entries[name] = {"value": value, "error": error, "unit": "Hz"}
+    return entries
+
+
+def _by_difference(scene, path, number):
+    """Derivatives of `SIZES` by the number at a path, by differences of order 4."""
+    from ..reference.paths import with_value
+    from ..scene import Scene
+
+    given, step, by_step = scene.to_dict(), STEP * (abs(number) or 1.0), {}
+    for k in (-2, -1, 1, 2):
+        changed = Scene.from_dict(with_value(given, path, number + k * step), scene.folder)
+        by_step[k] = sizes_of(changed.build())
+    return {
+        name: (8.0 * (by_step[1][name] - by_step[-1][name]) - (by_step[2][name] - by_step[-2][name])) / (12.0 * step)
+        for name in SIZES
+    }
+
+
+class _Governing:
+    """The stress that the margin of safety and the utilisation of a static solution follow from."""
+
+    def __init__(self, scene, solution, summary):
+        from ..results.observables.observe import Observe
+        from ..statics.gradients import Gradients
+
+        self.margin, self.used = summary["margin"], summary["utilisation"]
+        observe = Observe(name=GOVERNING, quantity="stress", line=self.margin["line"])
+        observed = scene.replace(observe=(*scene.observables, observe))
+        self._gradients = Gradients(replace(solution, scene=observed))
+
+    def slope(self, name, path):
+        """Derivative of the margin or of the utilisation by the number at a path."""
+        from ..statics.gradients import LIMITS
+
+        margin = self.margin
+        if path.rpartition(".")[2] in LIMITS or margin["value"] is None or margin["line"] != self.used["line"]:
+            raise InputError(f"{name} depends on {path} in another way than by a stress")
+        slope = float(self._gradients.gradient(GOVERNING, path))
+        stress, allowed = margin["stress"], margin["allowed"]
+        return slope / margin["strength"] if name == "utilisation" else -allowed / stress**2 * slope

@@ -1,0 +1,152 @@
+"""Formulas: what is least and what is required, as intervals, and with their derivatives.
+
+A requirement ``a > b`` has the reserve (a − b)/|b| where b is a number that is not 0, else a − b: it holds where its
+reserve is above 0. Parts of ``and`` have a reserve each, of ``or`` the largest one counts.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+
+import numpy as np
+
+from ..sweeps.expressions import Expression, Interval, exact
+
+FALSE, TRUE = exact(-1.0), exact(1.0)
+"""Reserves of what has no number, such as an equation."""
+
+
+class Formula(Expression):
+    """An arithmetic expression, or a condition with its reserve.
+
+    Parameters
+    ----------
+    text : str
+        The expression.
+    names : collection of str
+        Names that it may use.
+    compares : bool
+        True for a condition.
+    """
+
+    def __init__(self, text, names, compares):
+        super().__init__(text, names, compares)
+        self.parts = list(_parts(self._tree)) if compares else [self._tree]
+
+    def number(self, values):
+        """The `refweb.sweeps.expressions.Interval` of an arithmetic expression, with values by name."""
+        try:
+            value = self._value(self._tree, values)
+            if isinstance(value, Interval):
+                return value
+        except (TypeError, AttributeError, ValueError, IndexError):
+            pass
+        raise self._refused(values)
+
+    def reserves(self, values):
+        """`refweb.sweeps.expressions.Interval` of the reserve of each part of a condition, a list."""
+        self(values)
+        return [self._reserve(part, values) for part in self.parts]
+
+    def _reserve(self, node, values):
+        if isinstance(node, ast.BoolOp):
+            inner = [self._reserve(operand, values) for operand in node.values]
+            among = min if isinstance(node.op, ast.And) else max
+            return Interval(among(r.low for r in inner), among(r.high for r in inner))
+        if isinstance(node, ast.UnaryOp):
+            inner = self._reserve(node.operand, values)
+            return Interval(-inner.high, -inner.low)
+        if isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
+            upper, lower, scale = _sides(node)
+            a, b = (self._value(side, values) for side in (upper, lower))
+            return Interval(_less(a.low, b.high) / scale, _less(a.high, b.low) / scale)
+        truth = self._truth(node, values)
+        return TRUE if truth else FALSE if truth is not None else Interval(-1.0, 1.0)
+
+    def slopes(self, values, slopes):
+        """(Value, gradient) of each part, of a condition those of its reserve, a list.
+
+        Parameters
+        ----------
+        values : dict of str to float
+            Values by name.
+        slopes : dict of str to ndarray
+            Gradient of each name that is not constant.
+        """
+        return [self._dual(part, values, slopes) for part in self.parts]
+
+    def _dual(self, node, values, slopes):
+        dual = lambda inner: self._dual(inner, values, slopes)  # noqa: E731
+        if isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
+            (a, da), (b, db) = (dual(side) for side in _sides(node)[:2])
+            scale = _sides(node)[2]
+            return (a - b) / scale, (da - db) / scale
+        if isinstance(node, ast.BoolOp):
+            among = min if isinstance(node.op, ast.And) else max
+            return among((dual(operand) for operand in node.values), key=lambda pair: pair[0])
+        if isinstance(node, ast.UnaryOp):
+            value, slope = dual(node.operand)
+            return (value, slope) if isinstance(node.op, ast.UAdd) else (-value, -slope)
+        if isinstance(node, ast.BinOp):
+            return _combined(node.op, *dual(node.left), *dual(node.right))
+        if isinstance(node, ast.Call):
+            return _called(ast.unparse(node.func), [dual(operand) for operand in node.args])
+        if isinstance(node, ast.Name):
+            name = self._aliases[node.id]
+            return float(values[name]), np.asarray(slopes.get(name, 0.0), float)
+        number = isinstance(node, ast.Constant | ast.Subscript)
+        return (self._value(node, values) if number else self._reserve(node, values)).low, np.array(0.0)
+
+
+def _less(a, b):
+    """Difference of two numbers, of which infinite ones may be equal."""
+    return 0.0 if a == b else a - b
+
+
+def _parts(node):
+    """Conditions that must all hold."""
+    if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
+        for operand in node.values:
+            yield from _parts(operand)
+    elif isinstance(node, ast.Compare) and len(node.ops) > 1:
+        sides = [node.left, *node.comparators]
+        for left, op, right in zip(sides, node.ops, sides[1:], strict=False):
+            yield ast.Compare(left, [op], [right])
+    else:
+        yield node
+
+
+def _sides(node):
+    """(Side that must be larger, smaller side, scale) of a comparison."""
+    left, right = node.left, node.comparators[0]
+    scales = [abs(ast.literal_eval(side)) for side in (right, left) if _is_number(side)]
+    scale = next((scale for scale in scales if scale > 0.0), 1.0)
+    return (left, right, scale) if isinstance(node.ops[0], ast.Gt | ast.GtE) else (right, left, scale)
+
+
+def _is_number(node):
+    return isinstance(node, ast.Constant) or isinstance(node, ast.UnaryOp) and isinstance(node.operand, ast.Constant)
+
+
+def _combined(op, a, da, b, db):
+    """Value and gradient of an operation on two numbers."""
+    if isinstance(op, ast.Add):
+        return a + b, da + db
+    if isinstance(op, ast.Sub):
+        return a - b, da - db
+    if isinstance(op, ast.Mult):
+        return a * b, a * db + b * da
+    if isinstance(op, ast.Div):
+        return a / b, (da - a / b * db) / b
+    return a**b, b * a ** (b - 1.0) * da
+
+
+def _called(name, operands):
+    """Value and gradient of a function of some numbers."""
+    value, slope = operands[0]
+    if name == "abs":
+        return abs(value), math.copysign(1.0, value) * slope
+    if name == "sqrt":
+        return math.sqrt(value), slope / (2.0 * math.sqrt(value))
+    return (min if name == "min" else max)(operands, key=lambda pair: pair[0])

@@ -1,0 +1,170 @@
+"""Problem of a sizing: the space of designs with the formulas of what is least and what is required, checked.
+
+Names in formulas are those of results, of free numbers and of `refweb.sizing.case.QUANTITIES`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..errors import InputError, in_file
+from ..messages import quote, short
+from ..results.observables.observe import bounds_by_name
+from ..sweeps.expressions import ANY, Interval
+from .case import FREQUENCY, QUANTITIES, SIZES, sizes_of
+from .formulas import Formula
+from .requirements import Free
+from .space import Design, Space
+
+ALIKE = 1e-12
+"""Relative difference of sizes up to which a free number has no effect on them."""
+
+
+class Problem:
+    """A requirements file with its scenes and formulas.
+
+    Parameters
+    ----------
+    sizing : refweb.Sizing
+        The requirements.
+
+    Attributes
+    ----------
+    space : refweb.sizing.space.Space
+        Space of designs.
+    objective : refweb.sizing.formulas.Formula
+        Formula of the objective.
+    requirements : dict of str to refweb.sizing.formulas.Formula
+        Conditions by name.
+    used : set of str
+        Names that formulas use, without free numbers.
+    differences : bool
+        True if a name has derivatives by differences of runs alone.
+    static : bool
+        True if all scenes are of statics.
+    drawn : list of dict
+        Values by path of each draw.
+
+    Raises
+    ------
+    InputError
+        For unknown names and paths, values that make no scene, a requirement that is always or never true, and a
+        minimum that depends on no free number.
+    """
+
+    def __init__(self, sizing):
+        self.sizing, self.space = sizing, Space(sizing)
+        self.drawn = sizing.drawn()
+        first = Design(tuple(self.space.starts(1, 0)[0]) if self.space.free else (), (0,) * len(self.space.listed))
+        self._check_ends(first)
+        names, scenes = None, []
+        for design in self._each_scene(first):
+            *_, scene = self.space.scene(design, self.drawn[0])
+            scene.build()
+            scenes.append(scene)
+            of_throw = [] if scene.throw is None else scene.throw.numbers
+            named = [*(o.name for o in scene.observables), *of_throw]
+            names = named if names is None else [name for name in names if name in named]
+        self.static = all(scene.solve.kind == "static" for scene in scenes)
+        known = [*names, *(name for name in QUANTITIES if name not in names)]
+        for name in self.space.names:
+            if name in known:
+                raise InputError(f"parameters: {short(name)} is the name of a result: choose another, with paths")
+        self._refuse_twice()
+        with in_file("minimise:"):
+            self.objective = Formula(sizing.minimise, [*self.space.names, *known], False)
+        self.requirements = {}
+        for name, requirement in sizing.requirements.items():
+            with in_file(f"requirements: {short(name)}:"):
+                self.requirements[name] = Formula(requirement.condition, [*self.space.names, *known], True)
+                self._refuse_certain(self.requirements[name], scenes)
+        formulas = [self.objective, *self.requirements.values()]
+        self.used = {name for formula in formulas for name in formula.used} - set(self.space.names)
+        self.quantities = tuple(name for name in QUANTITIES if name in self.used)
+        self.results = tuple(name for name in (*names, *QUANTITIES) if name in self.used)
+        self.differences = any(FREQUENCY.fullmatch(name) for name in self.results)
+        with in_file("minimise:"):
+            self._refuse_constant(first)
+
+    def _each_scene(self, first):
+        """The first design with each of the scenes."""
+        if len(self.space.bases) == 1:
+            yield first
+            return
+        for number in range(len(self.space.bases)):
+            yield Design(first.shares, (number, *first.options[1:]))
+
+    def _refuse_twice(self):
+        """Refuse two free numbers at one path."""
+        at = {}
+        for name, given in self.sizing.parameters.items():
+            options = self.space.listed.get(name, ())
+            paths = given.paths if isinstance(given, Free) else [path for option in options for path in option.settings]
+            for path in dict.fromkeys(paths):
+                if path in at:
+                    raise InputError(f"parameters: {short(name)} and {short(at[path])} both set {path}: leave one out")
+                at[path] = name
+
+    def _check_ends(self, first):
+        """Refuse free numbers whose ends, or options, make no scene with the first of all others."""
+        for n in range(len(self.space.free)):
+            for end in (0.0, 1.0):
+                self.space.scene(Design((*first.shares[:n], end, *first.shares[n + 1 :]), first.options), self.drawn[0])
+        for n, options in enumerate(self.space.listed.values()):
+            for number in range(1, len(options)):
+                choice = (*first.options[:n], number, *first.options[n + 1 :])
+                self.space.scene(Design(first.shares, choice), self.drawn[0])
+
+    def _within(self, scenes):
+        """Interval of each name over all designs; values of options that are no numbers are left out."""
+        values = {}
+        for scene in scenes:
+            for name, (low, high) in bounds_by_name(scene.to_dict()).items():
+                before = values.get(name, Interval(math.inf, -math.inf))
+                values[name] = Interval(min(low, before.low), max(high, before.high))
+        values |= dict.fromkeys(QUANTITIES, Interval(0.0, math.inf)) | {"margin": Interval(-1.0, math.inf)}
+        values |= {name: Interval(f.low, f.high) for name, f in self.space.free.items()}
+        for name, options in self.space.listed.items():
+            labels = [option.label for option in options]
+            if all(isinstance(label, int | float) and not isinstance(label, bool) for label in labels):
+                values[name] = Interval(min(labels), max(labels))
+        return values
+
+    def _refuse_certain(self, formula, scenes):
+        """Refuse a requirement that holds for all designs, or for none."""
+        values = self._within(scenes)
+        if not formula.used <= values.keys() | set(self.space.listed):
+            values |= {name: ANY for name in formula.used - values.keys() - set(self.space.listed)}
+        if formula.used <= values.keys() and (verdict := formula(values)) is not None:
+            always = "is true of every design within bounds" if verdict else "is true of no design within bounds"
+            raise InputError(f"{quote(formula.text)} {always}: leave it out or change its limit")
+
+    def _refuse_constant(self, first):
+        """Refuse a minimum of sizes that are the same for all designs, or of nothing that depends on the design."""
+        used = self.objective.used
+        if not used:
+            raise InputError(f"{quote(self.sizing.minimise)} depends on no free number, such as cable_mass does")
+        if not used <= set(SIZES):
+            return
+        before = self._sizes(first, used)
+        for n in range(len(self.space.free)):
+            for end in (0.0, 1.0):
+                changed = Design((*first.shares[:n], end, *first.shares[n + 1 :]), first.options)
+                if _differ(before, self._sizes(changed, used)):
+                    return
+        for n, options in enumerate(self.space.listed.values()):
+            for number in range(1, len(options)):
+                changed = Design(first.shares, (*first.options[:n], number, *first.options[n + 1 :]))
+                if _differ(before, self._sizes(changed, used)):
+                    return
+        numbers = ", ".join(self.space.names)
+        raise InputError(f"{quote(self.sizing.minimise)} does not depend on {numbers}: every design is as good")
+
+    def _sizes(self, design, used):
+        *_, scene = self.space.scene(design, self.drawn[0])
+        sizes = sizes_of(scene.build())
+        return [sizes[name] for name in sorted(used)]
+
+
+def _differ(before, after):
+    return any(abs(a - b) > ALIKE * max(abs(a), abs(b)) for a, b in zip(before, after, strict=True))

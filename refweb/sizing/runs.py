@@ -1,0 +1,276 @@
+"""Runs of designs: what is recorded in the folder of a sizing, what is missing, and what the rows say of a design.
+
+The row of a run is appended as a whole, under a digest of its scene and of what is computed of it. A sizing that is
+killed loses only the runs that its workers had begun.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import pathlib
+from typing import Any, NamedTuple
+
+from ..errors import InputError
+from ..messages import one_line
+from ..results import case_rows
+from ..results.files import write_text
+from ..sweeps.case import solve
+from ..sweeps.chances import bounds, clopper_pearson
+from ..sweeps.design import KEY, Case, key_of
+from ..sweeps.expressions import Interval
+from ..sweeps.sweep import holds_rows, job_of, tidy
+from ..sweeps.workers import Processes, through
+from .case import Task
+from .space import Design
+
+FAILED = Interval(-1.0, -1.0)
+"""Reserve of a requirement of a design whose run gives no result."""
+
+
+class Spent(Exception):
+    """The largest number of runs is reached."""
+
+
+class Judged(NamedTuple):
+    """Results of the runs of a design.
+
+    Attributes
+    ----------
+    design : refweb.sizing.space.Design
+        The design.
+    rows : list of dict
+        Its rows, one for each draw.
+    objective : refweb.sweeps.expressions.Interval
+        Objective, of draws the mean; infinite for a design without results.
+    reserves : tuple of refweb.sweeps.expressions.Interval
+        Reserve of each requirement, see `refweb.sizing.formulas`.
+    verdicts : tuple of (bool or None)
+        True if a requirement holds for the whole ±, False if for no part of it, else None.
+    message : str
+        Reason for which it has no results, else empty.
+    """
+
+    design: Design
+    rows: list[dict[str, Any]]
+    objective: Interval
+    reserves: tuple[Interval, ...]
+    verdicts: tuple[bool | None, ...]
+    message: str = ""
+
+    @property
+    def feasible(self):
+        """True if all requirements hold, False if one does not, None if one is undecided."""
+        return False if False in self.verdicts else None if None in self.verdicts else True
+
+    @property
+    def value(self):
+        """Middle of the objective."""
+        return middle(self.objective)
+
+    @property
+    def tightest(self):
+        """Smallest lower end of a reserve."""
+        return min(reserve.low for reserve in self.reserves)
+
+
+def middle(interval):
+    """Middle of an interval; infinite ends count as they are."""
+    low, high = interval
+    return low if low == high else 0.5 * (low + high)
+
+
+class Runs:
+    """Runs of designs, each once.
+
+    Parameters
+    ----------
+    problem : refweb.sizing.problem.Problem
+        Requirements, space and formulas.
+    out : path-like, optional
+        Folder of the sizing.
+    crew : refweb.sweeps.workers.Processes or Given
+        Workers.
+
+    Attributes
+    ----------
+    tell : callable
+        Called with a line of text and the finished share.
+    rows : dict
+        Rows by the key of their run.
+    judged : dict
+        Results of each design that was asked for, a `Judged` by design.
+    fresh : int
+        Number of runs since the start.
+    """
+
+    def __init__(self, problem, out, crew):
+        self.problem, self.crew, self.tell = problem, crew, lambda text, share: None
+        self.path = None if out is None else pathlib.Path(out).absolute()
+        self.rows, self.judged, self.fresh = {}, {}, 0
+        self._asked, self._files, self._table = set(), {}, None
+        if self.path is not None and holds_rows(out, "size"):
+            stored = case_rows.read(self.path / case_rows.NAME)
+            self.rows = {row["case"]: row for row in stored if row["status"] != "lost"}
+        self.recorded = len(self.rows)
+
+    def begin(self, summary):
+        """Write the requirements and the rows that exist into the folder."""
+        if self.path is None:
+            return
+        with case_rows.written(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+            tidy(self.path)
+            self.summary(summary)
+            write_text(self.path / "requirements.toml", _as_toml(self.problem.sizing))
+        self._table = case_rows.CaseRows(self.path, list(self.rows.values()), self.problem.space.names)
+
+    def summary(self, content):
+        """Write ``run.json``."""
+        if self.path is not None:
+            text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+            with case_rows.written(self.path):
+                write_text(self.path / "run.json", text)
+
+    def end(self):
+        """Close the table of rows."""
+        if self._table is not None:
+            self._table.close()
+
+    def of(self, designs, slopes=False):
+        """Judge some designs, a list of `Judged`; missing runs are made.
+
+        Parameters
+        ----------
+        designs : list of refweb.sizing.space.Design
+            The designs.
+        slopes : bool
+            True for derivatives, which are in the rows.
+
+        Raises
+        ------
+        Spent
+            If this takes more runs than the requirements allow.
+        """
+        cases = {design: self._cases(design, slopes) for design in designs}
+        missing = {}
+        for runs in cases.values():
+            for case, base, task in runs:
+                if case.given is not None and case.key not in self._asked:
+                    if len(self._asked) >= self.problem.sizing.runs:
+                        self._run(missing)
+                        raise Spent
+                    self._asked.add(case.key)
+                if case.given is not None and case.key not in self.rows:
+                    missing[case.key] = (case, base, task)
+        self._run(missing)
+        judged = [self._judge(design, runs) for design, runs in cases.items()]
+        self.judged |= {judged.design: judged for judged in judged}
+        return [self.judged[design] for design in designs]
+
+    def _cases(self, design, slopes):
+        """(Case, base scene, task) of each draw; a case without ``given`` is refused, and ``part`` says why."""
+        problem, cases = self.problem, []
+        numbers = tuple((path, self.problem.space.settings(design)[path]) for path in problem.space.paths)
+        task = Task(problem.quantities, problem.results if slopes else (), numbers if slopes else ())
+        for draw in problem.drawn:
+            try:
+                base, settings, given, scene = problem.space.scene(design, draw)
+            except InputError as error:
+                cases.append((Case({}, 0, 0, part=one_line(str(error))), None, None))
+                continue
+            text = json.dumps([key_of(scene, self._files), task], allow_nan=False)
+            key = hashlib.sha256(text.encode()).hexdigest()[:KEY]
+            values = problem.space.values(design) | draw
+            cases.append((Case(values, 0, 0, key=key, given=given), base, (task, settings)))
+        return cases
+
+    def _run(self, missing):
+        """Run missing cases: one in this process, several in workers."""
+        local = isinstance(self.crew, Processes)
+        jobs = [
+            job_of(base, case._replace(values=settings), local, task=task)
+            for case, base, (task, settings) in missing.values()
+        ]
+        single = local and len(jobs) == 1
+        for outcome in map(solve, jobs) if single else through(jobs, _Lasting(self.crew)) if jobs else ():
+            row = {"case": outcome.key, **missing[outcome.key][0].values, **outcome.cells}
+            self.rows[outcome.key] = row
+            self.fresh += 1
+            if self._table is not None:
+                self._table.add(row)
+            share = len(self._asked) / self.problem.sizing.runs
+            before = f", {self.recorded} recorded before" if self.recorded else ""
+            self.tell(f"{self.fresh} runs{before}", share)
+
+    def _judge(self, design, cases):
+        """The `Judged` of a design."""
+        problem = self.problem
+        rows = [self.rows.get(case.key, {"status": "refused", "message": case.part}) for case, *_ in cases]
+        values = [self._values(design, row) for row in rows]
+        lacking = next((row for row, known in zip(rows, values, strict=True) if known is None), None)
+        message, ends = "", (math.inf, math.inf)
+        if lacking is None:
+            objectives = [problem.objective.number(known) for known in values]
+            ends = [sum(part) / len(objectives) for part in zip(*objectives, strict=True)]
+        else:
+            names = [item.name for item in case_rows.results_among(lacking)]
+            message = lacking["message"] or f"no value of {', '.join(sorted(problem.used.difference(names)))}"
+        pairs = [self._of_requirement(name, values) for name in problem.requirements]
+        return Judged(design, rows, Interval(*ends), *map(tuple, zip(*pairs, strict=True)), one_line(message))
+
+    def _values(self, design, row):
+        """Values by name for formulas; None where the row has no results."""
+        if row["status"] != "solved":
+            return None
+        results = case_rows.results_among(row)
+        values = bounds(row, results, self.problem.space.values(design), bool(self.problem.sizing.draws))
+        return values if self.problem.used <= values.keys() else None
+
+    def values_of(self, judged):
+        """Values by name of the first draw of a design, None where its run has no results."""
+        return self._values(judged.design, judged.rows[0])
+
+    def _of_requirement(self, name, values):
+        """(Reserve, verdict) of a requirement over all draws."""
+        formula, sizing = self.problem.requirements[name], self.problem.sizing
+        probability = sizing.requirements[name].probability
+        verdicts = [False if known is None else formula(known) for known in values]
+        if probability is not None:
+            true, level = verdicts.count(True), sizing.confidence
+            certain, possible = (
+                clopper_pearson(n, len(values), level)[0] for n in (true, len(values) - verdicts.count(False))
+            )
+            reserve = Interval(certain / probability - 1.0, possible / probability - 1.0)
+            return reserve, True if certain > probability else None if possible > probability else False
+        reserves = [FAILED] if None in values else [r for known in values for r in formula.reserves(known)]
+        verdict = False if False in verdicts else None if None in verdicts else True
+        return Interval(min(r.low for r in reserves), min(r.high for r in reserves)), verdict
+
+
+class _Lasting:
+    """Workers that go on after some jobs: `refweb.sweeps.workers.through` stops others at its end."""
+
+    def __init__(self, crew):
+        self.local, self.parallel, self.submit, self.renew = crew.local, crew.parallel, crew.submit, crew.renew
+
+    def stop(self):
+        """Do nothing: the end of the sizing stops the workers."""
+
+
+def _as_toml(sizing):
+    """Requirements as TOML, with paths that lead to the same files."""
+    import tomli_w
+
+    given, folder = sizing.to_dict(), sizing.folder
+
+    def placed(name):
+        return str((folder / name).resolve()) if folder is not None and (folder / name).is_file() else name
+
+    scenes = [placed(name) for name in sizing.scenes]
+    given["scene"] = scenes[0] if isinstance(sizing.scene, str) else scenes
+    for values in given["parameters"].values():
+        if isinstance(values.get("catalogue"), str):
+            values["catalogue"] = placed(values["catalogue"])
+    return tomli_w.dumps(dict(sorted(given.items(), key=lambda item: isinstance(item[1], dict))))

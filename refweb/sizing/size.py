@@ -1,0 +1,279 @@
+"""Size a scene: find the least design that meets requirements, write it as a scene, run it, and say what governs it.
+
+Keys of `Sized.summary` are those of ``run.json``, which `results.sizing_text` and pictures read.
+"""
+
+from __future__ import annotations
+
+import math
+import pathlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError, SolverError
+from ..messages import quote
+from ..results.case_rows import results_among, written
+from ..results.files import as_toml, write_text
+from ..results.progress import followed
+from ..results.provenance import versions
+from ..results.run_status import Clock, recorded
+from ..sweeps.study_result import finite
+from ..sweeps.workers import Given, Processes
+from .problem import Problem
+from .requirements import Sizing, load
+from .runs import Runs
+from .search import BESIDE, best, method_of, searched
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from ..scene import Scene
+
+GOVERNS = 1e-6
+"""Reserve up to which a requirement governs a design by gradients."""
+
+
+@dataclass(eq=False, repr=False)
+class Sized:
+    """The least design that meets requirements, as `refweb.size` returns it.
+
+    Attributes
+    ----------
+    sizing : refweb.Sizing
+        The requirements.
+    scene : refweb.Scene or None
+        Scene of the design; of draws with the values of the scene file.
+    values : dict
+        Free numbers of the design by name.
+    objective : dict
+        ``value``, ``error`` and ``unit`` of what is least.
+    requirements : list of dict
+        Of each requirement ``name``, ``condition``, ``probability``, ``reserve`` over its limit with its ends ``least``
+        and ``most``, ``holds`` (true, false or None: undecided), ``governs``, and ``costs``: change of the objective
+        for a limit that is 1 % stricter, None where it is not known.
+    optimality : dict or None
+        By gradients ``residual``, the part of the gradient of the objective that the active requirements and bounds do
+        not balance, and ``at_bound``, numbers at a bound.
+    designs : list of dict
+        All designs that were run: ``values``, ``objective``, ``reserve``, the smallest one, and ``holds``.
+    status : {"running", "solved", "infeasible", "failed", "interrupted"}
+        "infeasible" if no design meets all requirements; ``values`` are those of the design that is nearest to it.
+    message : str
+        Reason for another status than "solved".
+    method : str
+        The method.
+    runs : int
+        Number of runs since the start, without those recorded before.
+    notes : list of str
+        Remarks, as on designs that ± leaves undecided.
+    """
+
+    sizing: Sizing
+    title: str
+    method: str
+    scene: Scene | None = None
+    values: dict[str, Any] = field(default_factory=dict)
+    objective: dict[str, Any] = field(default_factory=dict)
+    requirements: list[dict[str, Any]] = field(default_factory=list)
+    optimality: dict[str, Any] | None = None
+    designs: list[dict[str, Any]] = field(default_factory=list)
+    status: str = "running"
+    message: str = ""
+    runs: int = 0
+    recorded: int = 0
+    notes: list[str] = field(default_factory=list)
+    cost: dict[str, Any] = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "compile_s": 0.0})
+    versions: dict[str, str] = field(default_factory=versions)
+
+    def summary(self) -> dict[str, Any]:
+        """The content of ``run.json``, a dict of plain values; ``kind`` is "size"."""
+        kept = ("status", "message", "method", "values", "objective", "requirements", "optimality", "designs")
+        kept += ("runs", "recorded", "notes", "cost", "versions", "title")
+        plain = {key: finite(getattr(self, key)) for key in kept}
+        return {"kind": "size", **plain, "sizing": self.sizing.to_dict()}
+
+    def __repr__(self) -> str:
+        design = ", ".join(f"{name} = {quote(value)}" for name, value in self.values.items())
+        return f'<Sized "{self.title}": {self.status}; {design}>'
+
+
+def size(
+    requirements: Sizing | str | PathLike[str],
+    out: str | PathLike[str] | None = None,
+    executor: Any = None,
+    workers: int | None = None,
+    progress: bool | Callable[..., Any] | None = True,
+    announce: Callable[[Sized], object] | None = None,
+) -> Sized:
+    """Find the least design of a scene that meets requirements.
+
+    Parameters
+    ----------
+    requirements : Sizing, path-like or str
+        Requirements, a requirements file, or the name of one shipped with refweb.
+    out : path-like, optional
+        Folder of the sizing: every run is recorded there, and one that is recorded is not run again. ``design.toml`` is
+        the scene of the design, ``design`` its result folder. Without it nothing is written to the disk.
+    executor : concurrent.futures.Executor, optional
+        Executor that runs designs; by default processes of this machine, and this process for single designs.
+    workers : int, optional
+        Number of processes, by default one for each processor.
+    progress : bool or callable
+        See `refweb.run`.
+    announce : callable, optional
+        Called with the `Sized` before anything is run.
+
+    Returns
+    -------
+    Sized
+
+    Raises
+    ------
+    InputError
+        For wrong input; nothing has been written.
+    SolverError
+        Where no design gives a result, and where the folder cannot be written or the executor takes no more runs.
+    """
+    clock = Clock()
+    if executor is not None and workers is not None:
+        raise InputError(f"workers = {workers} has no meaning with an executor, which has its own: leave one out")
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        raise InputError(f"workers = {quote(workers)} must be a whole number ≥ 1")
+    sized, problem = prepared(requirements)
+    crew = Processes(workers) if executor is None else executor
+    runs = Runs(problem, out, crew if isinstance(crew, Given | Processes) else Given(crew))
+    sized.recorded = runs.recorded
+    if announce is not None:
+        announce(sized)
+    runs.begin(sized.summary())
+    try:
+        with recorded(sized, clock, lambda: f"{runs.fresh} runs"), followed(progress, "starting") as runs.tell:
+            try:
+                optima, spent = searched(runs, sized.method)
+            finally:
+                runs.crew.stop()
+                runs.end()
+                sized.runs = runs.fresh
+            _conclude(sized, runs, *best(runs, optima), spent)
+            _write(sized, runs)
+    finally:
+        runs.summary(sized.summary())
+    return sized
+
+
+def prepared(requirements):
+    """Check requirements; (the `Sized` before any run, the `refweb.sizing.problem.Problem`)."""
+    sizing = requirements if isinstance(requirements, Sizing) else load(requirements)
+    problem = Problem(sizing)
+    return Sized(sizing, sizing.title, method_of(problem)), problem
+
+
+def _conclude(sized, runs, judged, optimum, spent):
+    """Say what was found: the design, its requirements, and designs that are undecided."""
+    sized.designs = [
+        {
+            "values": runs.problem.space.values(j.design),
+            "objective": j.value,
+            "reserve": j.tightest,
+            "holds": j.feasible,
+        }
+        for j in runs.judged.values()
+    ]
+    if judged is None:
+        reasons = [j.message for j in runs.judged.values() if j.message]
+        raise SolverError(f"no design gives a result: {reasons[0] if reasons else 'the first has none'}")
+    if spent:
+        sized.notes.append(f"runs = {sized.sizing.runs} are reached: more may find a better design")
+    low, high = judged.objective
+    unit = {item.name: item.unit for item in results_among(judged.rows[0])}.get(sized.sizing.minimise, "")
+    sized.values = runs.problem.space.values(judged.design)
+    sized.objective = {"value": judged.value, "error": 0.5 * (high - low), "unit": unit}
+    sized.requirements = [_requirement(*row, runs, judged, optimum) for row in enumerate(runs.problem.requirements)]
+    *_, sized.scene = runs.problem.space.scene(judged.design)
+    sized.scene = sized.scene.replace(title=f"{sized.title}: design"[:200])
+    if judged.feasible is not True:
+        sized.status, sized.message = "infeasible", _nearest(sized)
+    elif optimum is not None:
+        sized.optimality = {"residual": optimum.residual, "at_bound": optimum.bounds}
+    _add_notes(sized, runs, judged)
+
+
+def _requirement(number, name, runs, judged, optimum):
+    """Entry of a requirement."""
+    given, reserve = runs.problem.sizing.requirements[name], judged.reserves[number]
+    multiplier = None if optimum is None else optimum.multipliers.get(name, 0.0)
+    tightest = reserve.low <= judged.tightest + GOVERNS
+    return {
+        "name": name,
+        "condition": given.condition,
+        "probability": given.probability,
+        "reserve": 0.5 * (reserve.low + reserve.high),
+        "least": reserve.low,
+        "most": reserve.high,
+        "holds": judged.verdicts[number],
+        "governs": bool(tightest if multiplier is None else multiplier > 0.0),
+        "costs": None if multiplier is None else float(0.01 * multiplier),
+    }
+
+
+def _nearest(sized):
+    """Text on the design that is nearest to meeting all requirements."""
+    worst = min(sized.requirements, key=lambda entry: entry["least"])
+    design = ", ".join(f"{name} = {_short(value)}" for name, value in sized.values.items())
+    wanted = f" with probability {worst['probability']:g}" if worst["probability"] is not None else ""
+    how = "is not decided within ±" if worst["holds"] is None else f"fails by {-100.0 * worst['least']:.3g} %"
+    text = "no design within bounds meets all requirements"
+    return (
+        f"{text}: nearest is {design}, where {worst['name']}, {worst['condition']}{wanted}, {how} of its limit".replace(
+            "± of its limit", "±"
+        )
+    )
+
+
+def _short(value):
+    return f"{value:.4g}" if isinstance(value, float) else quote(value)
+
+
+def _add_notes(sized, runs, judged):
+    """Note undecided designs, failed ones, and results without ±."""
+    every = list(runs.judged.values())
+    better = [
+        j for j in every if j.feasible is None and j.value < judged.value * (1.0 - math.copysign(BESIDE, judged.value))
+    ]
+    if judged.feasible is True and better:
+        lower = min(better, key=lambda j: j.value)
+        design = ", ".join(
+            f"{name} = {_short(value)}" for name, value in runs.problem.space.values(lower.design).items()
+        )
+        names = [
+            name for name, verdict in zip(runs.problem.requirements, lower.verdicts, strict=True) if verdict is None
+        ]
+        text = (
+            f"{len(better)} lesser designs are not decided within ± and count as not meeting the requirements, such as "
+        )
+        sized.notes.append(f"{text}{design} by {', '.join(names)}: a run with a smaller ± decides them")
+    if failed := [j for j in every if j.message]:
+        sized.notes.append(f"{len(failed)} designs have no result: {failed[0].message}")
+    lacking = {item.name for item in results_among(judged.rows[0]) if judged.rows[0].get(f"{item.name} ±") is None}
+    if lacking := sorted(lacking & runs.problem.used):
+        sized.notes.append(f"the ± of {', '.join(lacking)} is not known: it is compared by its value alone")
+
+
+def _write(sized, runs):
+    """Write the scene of the design, its result folder and its page, unless they are there."""
+    if runs.path is None:
+        return
+    from ..pages.page import report
+    from ..results.folder import read_summary
+    from ..runner import run
+
+    folder, file, text = runs.path / "design", runs.path / "design.toml", as_toml(sized.scene.to_dict())
+    before = file.read_text(encoding="utf-8") if file.is_file() else None
+    if before == text and (read_summary(folder) or {}).get("status") == "solved":
+        return
+    with written(runs.path):
+        write_text(pathlib.Path(file), text)
+    runs.tell("running the design", 1.0)
+    run(sized.scene, out=folder, force=folder.exists(), progress=False)
+    report(folder)

@@ -1,0 +1,203 @@
+"""Sizing by gradients: sequential quadratic programming over numbers between bounds.
+
+With fractions u of ranges, an objective f and reserves r that must stay above a small distance, an optimum within
+bounds has multipliers λ ≥ 0 with
+
+    ∇f = Σ λ ∇r,    λ r = 0
+
+(Karush, Kuhn and Tucker), where bounds have multipliers as well. `refweb.sizing.sqp` finds it.
+
+Derivatives are those of the adjoint. One that no adjoint gives, as that of a frequency, is a difference of runs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .case import slope_of
+from .runs import middle
+from .space import Design
+from .sqp import minimise
+
+INSIDE = 1e-9
+"""Distance that reserves keep from 0, so that a requirement holds for the whole ±, which is added twice."""
+STEP = 1e-4
+"""Step of differences of runs, over the range."""
+PRECISE, BY_DIFFERENCES, NEAR = 1e-11, 1e-6, 1e-5
+"""Lengths of steps, over ranges, at which a search ends: by adjoints, by differences, and where none is feasible."""
+ACTIVE = 1e-5
+"""Reserve below which a requirement counts as active, and distance of a fraction to a bound."""
+FARTHEST = 1e3
+"""Largest violation of a requirement, over its limit, that is looked for."""
+
+
+class Optimum(NamedTuple):
+    """A design with the conditions of its optimum.
+
+    Attributes
+    ----------
+    judged : refweb.sizing.runs.Judged
+        The design and its results.
+    multipliers : dict of str to float
+        Change of the objective by the reserve of each requirement that is active.
+    bounds : dict of str to float
+        The same of numbers at a bound, by their fraction.
+    residual : float
+        Part of the gradient that the multipliers do not balance, over its size.
+    """
+
+    judged: object
+    multipliers: dict[str, float]
+    bounds: dict[str, float]
+    residual: float
+
+
+class Point(NamedTuple):
+    """A design: objective over its size with gradient, reserves (parts,) with gradients (parts, n), half widths."""
+
+    f: float
+    df: np.ndarray
+    r: np.ndarray
+    dr: np.ndarray
+    wide: np.ndarray
+
+
+class Smooth:
+    """Objective and reserves over the numbers between bounds, for one choice of everything else.
+
+    Parameters
+    ----------
+    runs : refweb.sizing.runs.Runs
+        Runs of designs.
+    options : tuple of int
+        The choice.
+    """
+
+    def __init__(self, runs, options):
+        self.runs, self.options, self.problem = runs, options, runs.problem
+        self.count, self.size, self._points = len(self.problem.space.free), None, {}
+        self.parts = [name for name, f in self.problem.requirements.items() for _ in f.parts]
+
+    def design(self, u):
+        """The design at some fractions."""
+        return Design(tuple(float(min(max(share, 0.0), 1.0)) for share in u), self.options)
+
+    def at(self, u):
+        """The `Point` at some fractions."""
+        design = self.design(u)
+        if design not in self._points:
+            self._points[design] = self._computed(design)
+        return self._points[design]
+
+    def _computed(self, design):
+        (judged,) = self.runs.of([design], slopes=True)
+        if not math.isfinite(judged.value):
+            zeros = np.zeros((len(self.parts), self.count))
+            return Point(
+                math.inf, zeros[0] if len(zeros) else np.zeros(self.count), -np.ones(len(zeros)), zeros, zeros[:, 0]
+            )
+        values, row = self.runs.values_of(judged), judged.rows[0]
+        numbers = {name: middle(v) if isinstance(v, tuple) else v for name, v in values.items()}
+        slopes = {name: self._slope(name, row, design) for name in self.problem.results}
+        for n, (name, given) in enumerate(self.problem.space.free.items()):
+            slopes[name] = np.eye(self.count)[n] * given.slope(design.shares[n])
+        lacking = [name for name, slope in slopes.items() if slope is None]
+        slopes |= self._differences(design, lacking) if lacking else {}
+        ((f, df),) = self.problem.objective.slopes(numbers, slopes)
+        self.size = self.size or abs(f) or 1.0
+        r, dr, wide = [], [], []
+        for formula in self.problem.requirements.values():
+            for (value, slope), reserve in zip(formula.slopes(numbers, slopes), formula.reserves(values), strict=True):
+                r.append(value)
+                dr.append(np.zeros(self.count) + slope)
+                wide.append(max(value - reserve.low, 0.0))
+        return Point(f / self.size, (np.zeros(self.count) + df) / self.size, np.array(r), np.array(dr), np.array(wide))
+
+    def _slope(self, name, row, design):
+        """Gradient of a result by fractions, None where the row lacks one."""
+        total = np.zeros(self.count)
+        for path, n, factor in self.problem.space.slopes(design):
+            slope = row.get(slope_of(name, path))
+            if slope is None:
+                return None
+            total[n] += factor * slope
+        return total
+
+    def _differences(self, design, names):
+        """Gradients by fractions, of differences of runs to both sides, at a bound to one."""
+        ends = []
+        for n, share in enumerate(design.shares):
+            for side in (-1.0, 1.0):
+                moved = min(max(share + side * STEP, 0.0), 1.0)
+                ends.append(Design((*design.shares[:n], moved, *design.shares[n + 1 :]), design.options))
+        values = [self.runs.values_of(judged) for judged in self.runs.of(ends)]
+        slopes = {name: np.zeros(self.count) for name in names}
+        for n, (low, high) in enumerate(zip(values[::2], values[1::2], strict=True)):
+            apart = ends[2 * n + 1].shares[n] - ends[2 * n].shares[n]
+            for name in names:
+                if low is not None and high is not None:
+                    slopes[name][n] = (middle(high[name]) - middle(low[name])) / apart
+        return slopes
+
+    def optimise(self, u, reserve=0.0):
+        """Least design from a start, with reserves of at least ``reserve``; the fractions."""
+        u, kept = np.array(u, float), np.full(len(self.parts), reserve + INSIDE)
+        for _ in range(3):
+            u = minimise(
+                lambda u, kept=kept: (self.at(u).f, self.at(u).df, self.at(u).r - kept, self.at(u).dr),
+                u,
+                np.zeros(self.count),
+                np.ones(self.count),
+                BY_DIFFERENCES if self.problem.differences else PRECISE,
+            )
+            point = self.at(u)
+            if (point.r - point.wide > reserve).all() or not point.wide.any():
+                break
+            kept = np.maximum(kept, reserve + INSIDE + 2.0 * point.wide)
+        return u
+
+    def nearest(self, u):
+        """Design whose largest violation is least, from a start: t is least with r + t ≥ 0; the fractions."""
+        ones = np.ones((len(self.parts), 1))
+
+        def functions(ut):
+            point = self.at(ut[:-1])
+            return ut[-1], np.eye(self.count + 1)[-1], point.r + ut[-1], np.hstack([point.dr, ones])
+
+        start = np.append(u, max(-self.at(u).r.min(), 0.0))
+        lower, upper = np.append(np.zeros(self.count), -1.0), np.append(np.ones(self.count), FARTHEST)
+        return minimise(functions, start, lower, upper, NEAR)[:-1]
+
+    def _multipliers(self, u, kept):
+        """(Multipliers of all parts, those of bounds, what they leave of the gradient over its size)."""
+        from scipy.optimize import nnls
+
+        point = self.at(u)
+        sides = np.where(u <= ACTIVE, 1.0, np.where(u >= 1.0 - ACTIVE, -1.0, 0.0))
+        at_bound, active = np.flatnonzero(sides), np.flatnonzero(point.r - kept <= ACTIVE)
+        normals = np.vstack([point.dr[active].reshape(-1, self.count), (np.eye(self.count) * sides)[at_bound]])
+        scale = np.linalg.norm(normals, axis=1)
+        scale[scale == 0.0] = 1.0
+        solved, left = (
+            nnls((normals / scale[:, None]).T, point.df) if len(normals) else (np.zeros(0), np.linalg.norm(point.df))
+        )
+        solved = solved / scale
+        multipliers, of_bounds = np.zeros(len(self.parts)), np.zeros(self.count)
+        multipliers[active], of_bounds[at_bound] = solved[: len(active)], solved[len(active) :]
+        return multipliers, of_bounds, float(left / (np.linalg.norm(point.df) or 1.0))
+
+    def optimum(self, u):
+        """The `Optimum` at some fractions."""
+        multipliers, of_bounds, residual = self._multipliers(u, np.full(len(self.parts), INSIDE))
+        by_name, at_bound = {}, {}
+        for name, value in zip(self.parts, multipliers, strict=True):
+            if value > 0.0:
+                by_name[name] = by_name.get(name, 0.0) + float(value * self.size)
+        for name, value in zip(self.problem.space.free, of_bounds, strict=True):
+            if value > 0.0:
+                at_bound[name] = float(value * self.size)
+        (judged,) = self.runs.of([self.design(u)], slopes=True)
+        return Optimum(judged, by_name, at_bound, residual)
