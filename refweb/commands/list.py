@@ -1,4 +1,4 @@
-"""List the scenes and studies that are shipped with refweb."""
+"""List the scenes, studies and requirements that are shipped with refweb."""
 
 # This docstring is the help of the verb; the first comment of a shipped file is its line here.
 
@@ -10,13 +10,16 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Print name, title and first comment of each; of studies, which ``refweb sweep`` runs, behind an empty line."""
+    """Print name, title and first comment of each; those of studies and of requirements stand behind empty lines."""
     from ..scene import shipped
+    from ..sizing.requirements import shipped as sizings
     from ..sweeps.study import shipped as studies
 
     _print(shipped())
     print("\nFor refweb sweep:")
     _print(studies())
+    print("\nFor refweb size:")
+    _print(sizings())
 
 
 def _print(paths):

@@ -16,10 +16,10 @@ from .sheet import COLOURS, DARK, PALE, Panel, label, legend, sheet
 
 NAME = "trade-off.png"
 """Name of the file in the folder of a sizing."""
-LOWEST = -1.0
+LOWEST = -0.5
 """Smallest reserve that is drawn: designs that miss more say nothing of the trade-off."""
-MOST_NAMES = 8
-"""Largest number of designs of the front that are named."""
+MOST_NAMES = 5
+"""Largest number of designs of the front that are named below it."""
 
 
 def front(designs):
@@ -70,7 +70,6 @@ def draw(summary):
         best = front(drawn)
         (line,) = axes.step(*_columns(best, factor), where="pre", color=COLOURS[0], linewidth=1.2)
         entries += [(line, "no design is better in both")] if len(best) > 1 else []
-        _named(axes, best, factor)
         answer = min((d for d in drawn if d["values"] == summary["values"]), key=lambda d: d["objective"], default=None)
         if answer is not None:
             style = {"marker": "*", "color": COLOURS[1], "linestyle": "none", "markersize": 14.0}
@@ -81,7 +80,9 @@ def draw(summary):
         legend(axes, entries, columns=2)
 
     left = len(known) - len(drawn)
+    named = list(_names(front(drawn), factor, unit))
     notes = [f"At the design the tightest is {tightest['name']}: {tightest['condition']}."]
+    notes += [f"The line goes by {'; '.join(named)}."] if named else []
     notes += [f"{left} designs with a reserve below {100.0 * LOWEST:.0f} % are not drawn."] if left else []
     panel = Panel(plotted, "reserve of the tightest requirement, lower end of ± [% of its limit]", height=3.4)
     return sheet([panel], summary["title"], notes)
@@ -91,11 +92,10 @@ def _columns(designs, factor):
     return [100.0 * d["reserve"] for d in designs], [d["objective"] / factor for d in designs]
 
 
-def _named(axes, designs, factor):
-    """Write the options of the designs of the front beside them, where there are any."""
-    for design in designs if len(designs) <= MOST_NAMES else ():
+def _names(designs, factor, unit):
+    """Texts of the options of designs of the front that meet all requirements, where there are any."""
+    for design in [d for d in designs if d["holds"]][:MOST_NAMES]:
         words = [str(value) for value in design["values"].values() if isinstance(value, str)]
         if words:
             (x,), (y,) = _columns([design], factor)
-            style = {"size": 8, "color": DARK, "xytext": (5, -9), "textcoords": "offset points", "parse_math": False}
-            axes.annotate(", ".join(words), (x, y), **style)
+            yield f"{', '.join(words)}: {y:.4g}{f' {unit}' if unit else ''}, reserve {x:.3g} %"

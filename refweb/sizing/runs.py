@@ -200,9 +200,8 @@ class Runs:
             self.fresh += 1
             if self._table is not None:
                 self._table.add(row)
-            share = len(self._asked) / self.problem.sizing.runs
             before = f", {self.recorded} recorded before" if self.recorded else ""
-            self.tell(f"{self.fresh} runs{before}", share)
+            self.tell(f"{self.fresh} runs{before}", 0.0)
 
     def _judge(self, design, cases):
         """The `Judged` of a design."""

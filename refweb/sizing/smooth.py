@@ -153,10 +153,10 @@ class Smooth:
                 np.ones(self.count),
                 BY_DIFFERENCES if self.problem.differences else PRECISE,
             )
-            point = self.at(u)
-            if (point.r - point.wide > reserve).all() or not point.wide.any():
+            lacking = reserve + INSIDE - (self.at(u).r - self.at(u).wide)
+            if not (lacking >= INSIDE).any():
                 break
-            kept = np.maximum(kept, reserve + INSIDE + 2.0 * point.wide)
+            kept = kept + 2.0 * np.maximum(lacking, 0.0)
         return u
 
     def nearest(self, u):

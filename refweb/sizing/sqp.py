@@ -40,7 +40,7 @@ def minimise(functions, x, lower, upper, tolerance):
     x, lower, upper : ndarray, shape (n,)
         Start and bounds.
     tolerance : float
-        Length of a step at which it ends.
+        Length of the last step, which is taken without a look at the functions behind it.
 
     Returns
     -------
@@ -51,7 +51,9 @@ def minimise(functions, x, lower, upper, tolerance):
     curvature = np.eye(len(x)) * max(np.linalg.norm(at[1]), 1e-3)
     step, multipliers = _step(curvature, at, lower - x, upper - x, radius)
     for _ in range(ROUNDS):
-        if np.abs(step).max() <= tolerance or radius < SHORTEST:
+        if np.abs(step).max() <= tolerance:
+            return np.clip(x + step, lower, upper)
+        if radius < SHORTEST:
             break
         moved = np.clip(x + step, lower, upper)
         after = functions(moved)

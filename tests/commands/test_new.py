@@ -9,6 +9,7 @@ import refweb
 from refweb.__main__ import main
 from refweb.commands.new import START
 from refweb.scene import SHIPPED_SCENES
+from refweb.sizing.requirements import shipped as sizings
 from refweb.sweeps.study import shipped as studies
 
 SHIPPED = {path.stem: path.read_text(encoding="utf-8") for path in sorted(SHIPPED_SCENES.glob("*.toml"))}
@@ -21,12 +22,17 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_list_has_a_line_for_each_shipped_scene_and_study(capsys):
+def test_list_has_a_line_for_each_shipped_scene_study_and_sizing(capsys):
     assert main(["list"]) == 0
-    lines, empty = capsys.readouterr().out.splitlines(), len(SHIPPED)
-    assert lines[empty : empty + 2] == ["", "For refweb sweep:"]
-    texts = SHIPPED | {name: path.read_text(encoding="utf-8") for name, path in studies().items()}
-    for line, (name, text) in zip(lines[:empty] + lines[empty + 2 :], texts.items(), strict=True):
+    lines, empty, after = capsys.readouterr().out.splitlines(), len(SHIPPED), len(SHIPPED) + 2 + len(studies())
+    assert lines[empty : empty + 2] == ["", "For refweb sweep:"] and lines[after : after + 2] == [
+        "",
+        "For refweb size:",
+    ]
+    files = studies() | sizings()
+    texts = SHIPPED | {name: path.read_text(encoding="utf-8") for name, path in files.items()}
+    listed = lines[:empty] + lines[empty + 2 : after] + lines[after + 2 :]
+    for line, (name, text) in zip(listed, texts.items(), strict=True):
         title = tomllib.loads(text)["title"]
         assert line.split("  ")[0] == name and title in line and len(line) <= 140
         said = line.split(title)[1].strip()
