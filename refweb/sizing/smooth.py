@@ -30,6 +30,8 @@ PRECISE, BY_DIFFERENCES, NEAR = 1e-11, 1e-6, 1e-5
 """Lengths of steps, over ranges, at which a search ends: by adjoints, by differences, and where none is feasible."""
 ACTIVE = 1e-5
 """Reserve below which a requirement counts as active, and distance of a fraction to a bound."""
+ROUNDED = 1e-12
+"""Distance of a fraction to a bound that is one of rounding."""
 FARTHEST = 1e3
 """Largest violation of a requirement, over its limit, that is looked for."""
 
@@ -82,8 +84,8 @@ class Smooth:
         self.parts = [name for name, f in self.problem.requirements.items() for _ in f.parts]
 
     def design(self, u):
-        """The design at some fractions."""
-        return Design(tuple(float(min(max(share, 0.0), 1.0)) for share in u), self.options)
+        """The design at some fractions, which are 0 or 1 at a bound but for rounding."""
+        return Design(tuple(float(x if ROUNDED < x < 1.0 - ROUNDED else x > 0.5) for x in u), self.options)
 
     def at(self, u):
         """The `Point` at some fractions."""
