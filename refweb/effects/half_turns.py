@@ -14,7 +14,6 @@ import numpy as np
 
 from ..errors import SolverError
 from ..kernels import kernel
-from ..results.probes import PROBE, Probe
 from .around import CYLINDER, body_of
 from .winding import segments_of
 
@@ -74,29 +73,10 @@ def turns_of(x, node, base, turn, numbers):
     if turn >= 0:
         near += numbers[10] * x[turn, 1]
     for k in range(3):
-        place = numbers[k] + x[node, k] - x[base, k]
-        first, second = first + place * numbers[3 + k], second + place * numbers[6 + k]
+        away = numbers[k] + x[node, k] - x[base, k]
+        first, second = first + away * numbers[3 + k], second + away * numbers[6 + k]
     apart = (math.atan2(second, first) - near) / (2.0 * math.pi)
     return apart - round(apart)
-
-
-@kernel(PROBE)
-def farthest(t, x, v, f, lines, rows, data, where):
-    """Largest distance of an end from where turns are counted; ``rows`` are those of each `End`, ``data`` numbers."""
-    most = -1.0
-    for n in range(data.shape[0]):
-        turns = abs(turns_of(x, rows[3 * n], rows[3 * n + 1], rows[3 * n + 2], data[n]))
-        if turns > most:
-            most, where[0] = turns, n
-    return most
-
-
-def probe_of(net: Net) -> Probe | None:
-    """Probe of the `farthest` end; None without one."""
-    ends = ends_of(net)
-    if not ends:
-        return None
-    return Probe(farthest, [row for end in ends for row in end.rows], np.array([end.numbers for end in ends]), sign=1.0)
 
 
 def refuse_half_turns(system: System, t: float, x: NDArray[np.float64], before: list[float]) -> list[float]:
@@ -135,14 +115,14 @@ def refuse_half_turns(system: System, t: float, x: NDArray[np.float64], before: 
     return now
 
 
-def half_turn_remark(net: Net, turns: float, place: int, t: float, drifts: bool) -> str:
-    """Text that names the `farthest` end of a run, by its turns, its number and the time [s]; "" for few turns.
+def half_turn_remark(net: Net, turns: float, number: int, t: float, drifts: bool) -> str:
+    """Text that names the farthest end of a run, by its turns, its number and the time [s]; "" for few turns.
 
     ``drifts`` is True beside an energy drift, which it may be the cause of.
     """
     if turns < (DOUBT if drifts else MOST):
         return ""
-    end = ends_of(net)[place]
+    end = ends_of(net)[number]
     return (
         f'node {end.rows[0]} comes to {turns:.2f} of a turn about body "{end.body}" from where it was in the web, at '
         f"t = {t:.6g} s, and its thread may have gained or lost a turn there, {REMEDY}"
