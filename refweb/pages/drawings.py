@@ -18,8 +18,8 @@ HEAVIEST = 150_000
 """Size of a plot above which it is stored as pixels [byte]."""
 LIKE_STRESS = ("tension-distance", "strain-distance")
 """Plots that are left out beside that of the stress, since they look alike."""
-MOST_PLOTS = 16
-"""Largest number of plots on a page."""
+FIRST_PLOTS, LAST_PLOTS = 11, 5
+"""Number of plots on a page of those of a run at most: its first observables, and its energies, momentum and others."""
 
 
 def frames_of(record, frames=None, progress=None):
@@ -126,7 +126,9 @@ def plots(record):
         plots_of = {name: line for name, line in kinds(record).items() if name not in LIKE_STRESS}
     except InputError as error:
         return section("plots", "Plots", tag("p", str(error)))
-    few = dict(list(plots_of.items())[-MOST_PLOTS:]) if len(plots_of) > MOST_PLOTS else plots_of
+    few, names = plots_of, list(plots_of)
+    if len(names) > FIRST_PLOTS + LAST_PLOTS:
+        few = {name: plots_of[name] for name in names[:FIRST_PLOTS] + names[-LAST_PLOTS:]}
     parts = []
     for name, line in few.items():
         try:
