@@ -36,13 +36,14 @@ if TYPE_CHECKING:
     from .integrators.integrator import History, Integrator, IntegratorState
     from .schedule import Schedule
 
-INPUTS = {
+NUMBERS = {
     "load": ("force", "torque"),
     "thrust": ("force",),
     "pressure": ("value",),
     "gravity": ("acceleration",),
-    "winch": ("speed", "limit", "tension", "power"),
 }
+"""Keys of each effect whose values are numbers of a term alone."""
+INPUTS = {**NUMBERS, "winch": ("speed", "limit", "tension", "power")}
 """Keys of each effect that a command may set."""
 RATES = {
     "reel": {"rate": ("factor", 1)},
@@ -95,7 +96,7 @@ def widened(scene: Scene) -> Scene:
 
 
 def only_numbers_differ(scene: Scene, changed: Scene) -> list[tuple[str, int, Any]] | None:
-    """Effects of a changed scene that differ in initial velocities or in `INPUTS`, by name and number.
+    """Effects of a changed scene that differ in initial velocities or in `NUMBERS`, by name and number.
 
     None where the scenes differ in more, and where an equilibrium or a stiffness of contact follows from such numbers.
     """
@@ -109,12 +110,20 @@ def only_numbers_differ(scene: Scene, changed: Scene) -> list[tuple[str, int, An
         counts[name] = counts.get(name, -1) + 1
         if given == effect:
             continue
-        key = INPUTS.get(name)
-        alike = key and type(given) is type(effect) and given.with_value(key, getattr(effect, key)) == effect
-        if not alike and not (name == "velocity" and type(given) is type(effect)):
+        if type(given) is not type(effect) or not (name == "velocity" or _alike(given, effect, NUMBERS.get(name, ()))):
             return None
         changes.append((name, counts[name], effect))
     return changes
+
+
+def _alike(given, effect, keys):
+    """True if two effects differ in values of some keys that both have, at most."""
+    for key in keys:
+        value = getattr(effect, key)
+        if (value is None) != (getattr(given, key) is None):
+            return False
+        given = given if value is None else given.with_value(key, value)
+    return bool(keys) and given == effect
 
 
 class Inputs:
