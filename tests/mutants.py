@@ -470,6 +470,7 @@ MUTANTS = [
         "if error <= 1e6:\n                    break",
     ),
     Mutant("effects/thread_slips", "x0, x1, x2 = a1 * b2 - a2 * b1", "x0, x1, x2 = a1 * b2 + a2 * b1"),
+    Mutant("effects/thread_slips", "start, rounds = trial % starts, ROUGH", "start, rounds = 0, ROUGH"),
     Mutant("effects/thread_slips", "if pull == low or pull == high:", "if high - low < 1e-3 * ea:"),
     Mutant("effects/thread_slips", "total += (high - low) * (first + slope * middle)", "total += (high - low) * first"),
     Mutant("effects/thread_slips", "w[SLIP, r] = w[BEFORE, r] + math.copysign(reach, moved)", "w[SLIP, r] += 0.0"),

@@ -30,6 +30,8 @@ STEPS = 12
 """Largest number of Newton steps, by which next to all steps of a run are solved."""
 BISECTIONS = 200
 """Largest number of bisections."""
+ROUGH = 16
+"""Number of bisections that mostly suffice to tell which rings slip: Newton steps behind them find by how much."""
 DOUBLINGS = 1000
 """Largest number of doublings."""
 POLISH = 4
@@ -130,6 +132,8 @@ def miss(w, rings):
             error = 0.0 if reach == 0.0 else max(-ahead, 0.0) if moved > 0.0 else max(-back, 0.0)
         else:
             error = abs(ahead) if moved > 0.0 else abs(back) if moved < 0.0 else max(ahead, back, 0.0)
+        if not math.isfinite(moved + error):
+            return math.inf
         if w[KAPPA, r] > 0.0 and error > worst * little(w, r):
             worst = error / little(w, r)
     return worst
@@ -351,7 +355,7 @@ def return_mapping(law, record, width):
         return w[row, count - 1]
 
     @kernel()
-    def chain(w, data, c, start):
+    def chain(w, data, c, start, rounds):
         """Write the slips of a chain of all segments from ``start`` on, whose ends keep their material.
 
         Material that is left at the end grows with the pull on a segment. It jumps where a ring on the way turns from
@@ -365,7 +369,7 @@ def return_mapping(law, record, width):
             high *= 2.0
         while first < count:
             w[LOW, first] = -math.inf
-            for _ in range(BISECTIONS):
+            for _ in range(rounds):
                 pull = 0.5 * (low + high)
                 if low < 0.0 < high:
                     pull = 0.0
@@ -404,7 +408,7 @@ def return_mapping(law, record, width):
                     pull_low, pull_high = pull_low * w[KAPPA, s], pull_high * w[KAPPA, s]
 
     @kernel()
-    def find_chain(w, data, c, start, moved):
+    def find_chain(w, data, c, start, moved, rounds):
         """Write the slips of a chain where a winch has slipped by ``moved``; its pull beyond its limit, with a sign."""
         count = w.shape[1]
         for r in range(count):
@@ -413,7 +417,7 @@ def return_mapping(law, record, width):
             w[SLIP, count - 1] += moved
         for s in range(count):
             w[OLD, s] = gained(w, s, SLIP)
-        chain(w, data, c, start)
+        chain(w, data, c, start, rounds)
         pull_all(w, data, c)
         if w[HEAD, 0] == w[TAIL, 0]:
             return 0.0
@@ -423,23 +427,23 @@ def return_mapping(law, record, width):
         return ahead if ahead > 0.0 else -back if back > 0.0 else 0.0
 
     @kernel()
-    def find_with_winch(w, data, c):
+    def find_with_winch(w, data, c, rounds):
         """Write all slips by `chain`, with that of a winch by bisection."""
-        first = find_chain(w, data, c, 0, 0.0)
+        first = find_chain(w, data, c, 0, 0.0, rounds)
         if first == 0.0 or w[REACH, 0] == 0.0:
             return
         sign, low, high = math.copysign(1.0, first), 0.0, min(w[REACH, 0], w[LENGTH, 0])
         for _ in range(DOUBLINGS):
-            if find_chain(w, data, c, 0, sign * high) * sign <= 0.0 or high >= w[REACH, 0]:
+            if find_chain(w, data, c, 0, sign * high, rounds) * sign <= 0.0 or high >= w[REACH, 0]:
                 break
             high = min(2.0 * high, w[REACH, 0])
-        if find_chain(w, data, c, 0, sign * high) * sign >= 0.0:
+        if find_chain(w, data, c, 0, sign * high, rounds) * sign >= 0.0:
             return
-        for _ in range(BISECTIONS):
+        for _ in range(rounds):
             middle = 0.5 * (low + high)
             if middle == low or middle == high:
                 break
-            if find_chain(w, data, c, 0, sign * middle) * sign > 0.0:
+            if find_chain(w, data, c, 0, sign * middle, rounds) * sign > 0.0:
                 low = middle
             else:
                 high = middle
@@ -448,14 +452,15 @@ def return_mapping(law, record, width):
     def find_all(w, rings, data, c, a, b):
         """Write all slips by `chain`; a closed thread has a ring that sticks, at which it begins."""
         count, best, best_error = w.shape[1], 0, math.inf
-        closed = w[HEAD, 0] * w[TAIL, 0] > 0.0
-        for start in range(count + 1 if closed else 1):
-            if start == count:
+        starts = count if w[HEAD, 0] * w[TAIL, 0] > 0.0 else 1
+        for trial in range(2 * starts + (starts > 1)):
+            start, rounds = trial % starts, ROUGH if trial < starts else BISECTIONS
+            if trial == 2 * starts:
                 start = best
             if w[HEAD, 0] != w[TAIL, 0]:
-                find_with_winch(w, data, c)
+                find_with_winch(w, data, c, rounds)
             else:
-                find_chain(w, data, c, start, 0.0)
+                find_chain(w, data, c, start, 0.0, rounds)
             error = miss(w, rings)
             for _ in range(POLISH):
                 if error <= 1.0:
@@ -466,7 +471,7 @@ def return_mapping(law, record, width):
                     if abs(moved) >= reach_of(w, r) * (1.0 - NEAR):
                         w[MODE, r] *= 2.0
                 error = newton(w, rings, data, c, a, b)
-            if error < best_error:
+            if error < best_error and trial >= starts:
                 best, best_error = start, error
 
     @kernel()

@@ -12,6 +12,7 @@ import refweb
 
 EA = 1e5
 ROPE = {"modulus": 1e10}
+ARMS = {"arms": [[1e8, 0.01], [2e8, 0.3]]}
 STEPS = {name: keys for name, keys in METHODS.items() if keys.get("method") != "explicit"}
 TIGHT = {
     "central-difference": {"step_size": 1e-4},
@@ -331,6 +332,19 @@ def test_power_up_to_a_speed(method, end):
     np.testing.assert_allclose(history["winch_energy"], -work, atol=1e-4)
     assert work[-1] < 0.75 * power * 0.4  # by the limit
     closed(history, 1e-3)
+
+
+@pytest.mark.parametrize("linear_solver", ["dense", "block"])
+@pytest.mark.parametrize("method", ["cvode", "ida"])
+def test_power_beside_arms(method, linear_solver):
+    """Unknowns of viscous lines, here at rest, stand beside those of a winch, and change nothing of it."""
+    cable = {"law": "tension-only", "modulus": 1e9, "area": 1e-5, "density": 0.0}
+    solve = {"method": method, "linear_solver": linear_solver, "rtol": 1e-7, "duration": 0.1}
+    history = lifted({"power": 30.0, "speed_limit": 20.0}, solve, pull=2.0 * G, cable=cable | {"viscous": ARMS})
+    height, hauled, work = hoisted(history["time"], 30.0, 20.0, 2.0 * G)
+    np.testing.assert_allclose(history["z"], height, atol=1e-6)
+    np.testing.assert_allclose(-history["wound"], hauled, atol=1e-6)
+    np.testing.assert_allclose(history["winch_energy"], -work, rtol=1e-9, atol=1e-9)
 
 
 def test_paying_out_at_a_power():
