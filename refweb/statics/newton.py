@@ -280,6 +280,7 @@ class Newton:
             f"{self.system.row_name(row)}, {np.abs(iterate.force[row]).max():.4g} N along {along}: balance the loads, "
             "add a support, or start nearer",
             stats,
+            iterate.x,
         )
 
     def _step_by_factor_at_hand(self, t, iterate, r, shift, error, stats, ahead):
