@@ -40,7 +40,7 @@ class ResidualSearch:
             y = system.moved(x, a * step)
             ahead = self._factor.solve(system.force(self._t, y).ravel()[system.free])
             stats["nfev"] += 1
-            length, along = np.linalg.norm(ahead), ahead @ p
+            length, along = (np.inf, 0.0) if ahead is None else (np.linalg.norm(ahead), ahead @ p)
             if length < size or (length < 2.0 * size and along > 0.9 * length * size):
                 break
             a *= 0.5

@@ -1,5 +1,7 @@
 """Winches at the ends of threads: closed forms of tension, brake and power, reels of lines, and the balances."""
 
+from types import SimpleNamespace
+
 import nets
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from scipy.integrate import solve_ivp
 from threads import FAR, G
 
 import refweb
+from refweb.statics.residual_search import ResidualSearch
 
 EA = 1e5
 ROPE = {"modulus": 1e10}
@@ -252,6 +255,17 @@ def test_a_load_that_a_winch_pulls_in():
         refweb.run(given)
     with pytest.raises(refweb.InputError, match=r"modes take no friction of \[\[thread\]\] above 0, and no"):
         refweb.modes(given)
+
+
+def test_a_step_is_cut_where_nothing_follows_it():
+    """Newton's method with forces without a potential takes half of a step whose end has no finite next step."""
+    system = SimpleNamespace(
+        free=slice(None), largest_share=lambda p: 1.0, moved=np.add, force=lambda t, x: x, rows_of=lambda p: p
+    )
+    factor = SimpleNamespace(solve=lambda force: None if force[0] > 0.6 else 0.1 * force)
+    stats = {"nfev": 0}
+    x, shift = ResidualSearch(system, factor, 1.0).along(np.ones(1), np.zeros(1), np.ones(1), 1.0, stats)
+    assert (x[0], shift, stats["nfev"]) == (0.5, 4.0, 2)
 
 
 def test_speed_in_statics():
