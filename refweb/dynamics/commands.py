@@ -102,7 +102,8 @@ def only_numbers_differ(scene: Scene, changed: Scene) -> list[tuple[str, int, An
     """
     compared = [f.name for f in fields(scene) if f.compare and f.name != "effects"]
     same = all(getattr(scene, name) == getattr(changed, name) for name in compared)
-    if not same or len(scene.effects) != len(changed.effects) or scene.solve.start != "web" or scene.left_out():
+    starts = getattr(scene.solve, "start", "web") == "web" and not scene.left_out()
+    if not same or not starts or len(scene.effects) != len(changed.effects):
         return None
     changes, counts = [], {}
     for given, effect in zip(scene.effects, changed.effects, strict=True):
@@ -172,7 +173,8 @@ class Inputs:
         for name, number, effect in changes:
             for array, numbers in self._writes(name, self._given[name][number], effect) if name in INPUTS else ():
                 array[...] = numbers
-            self._given[name][number] = self._acting[name][number].effect = effect
+            self._given[name][number] = effect
+            self._acting[name][number].effect = effect
         self._first.clear()
 
     def restore(self, present: dict[tuple[str, int], Any]) -> None:

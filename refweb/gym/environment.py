@@ -94,15 +94,18 @@ class SceneEnv(gymnasium.Env):
         self.run: SteppedRun | None = None
         self.render_mode: str | None = render_mode
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.gym.period))}  # type: ignore[misc]
-        self._size, self._images, self._values, self._over = size, None, None, True
+        self._size, self._over = size, True
+        self._images: Images | None = None
+        self._values: dict[str, Any] = {}
         low, high = np.hstack(list(self.gym.bounds.values()))
         self._low, self._high, self._varies = low, high, low < high
         ends = np.cumsum([bounds.shape[1] for bounds in self.gym.bounds.values()])
         self._parts = list(zip(self.gym.bounds, [0, *ends[:-1]], ends, strict=True))
-        self._reward, self._terminated, self._truncated = self.gym.formulas([o.name for o in scene.observables])
+        formulas: Any = self.gym.formulas([o.name for o in scene.observables])
+        self._reward, self._terminated, self._truncated = formulas
         bounds = np.array(list(self.gym.observations.values()), dtype=float).T
-        self.observation_space = Box(*bounds, dtype=np.float64)
-        self.action_space = Box(-1.0, 1.0, (int(self._varies.sum()),), dtype=np.float32)
+        self.observation_space: Box = Box(*bounds, dtype=np.float64)
+        self.action_space: Box = Box(-1.0, 1.0, (int(self._varies.sum()),), dtype=np.float32)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

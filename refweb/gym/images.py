@@ -6,7 +6,7 @@ The camera stays for an episode while the scene is within its view, and is moved
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -40,8 +40,8 @@ class Images:
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._size = size
-        self._stage: Stage | None = None
-        self._renderer: Renderer | None = None
+        self._stage: Any = None
+        self._renderer: Any = None
 
     def forget(self) -> None:
         """Choose another camera with the next image, for another episode."""
@@ -53,9 +53,10 @@ class Images:
         supported = state.system.fixed[: net.nodes].any(axis=1)
         frame = frame_of(0, state.time, meshes(state), supported, net.point_mass)
         points = np.concatenate([frame.paths.reshape(-1, 3), *(body.points for body in frame.bodies.values())])
-        if self._stage is None or not self._within(points):
-            self._place_camera(frame)
-        model, views, sizes = self._stage.model(frame), self._stage.views, [self._size]
+        stage = self._stage
+        if stage is None or not self._within(points):
+            stage = self._place_camera(frame)
+        model, views, sizes = stage.model(frame), stage.views, [self._size]
         (image,) = self._renderer.images(model) or flat_images(model, views, sizes)
         return image
 
@@ -65,12 +66,13 @@ class Images:
         return bool((np.abs(view.project(points)[0] - view.offset) <= view.half).all())
 
     def _place_camera(self, frame):
-        """Choose the view of a frame, and start a renderer with it."""
+        """Choose the view of a frame, start a renderer with it, and return the stage."""
         self.close()
         width, height = self._size
         stage = Stage.of(Seen.of(frame, LOOK.field), LOOK, width / height * WHOLE[3] / WHOLE[2])
         self._stage = replace(stage, views=[view.wider(MARGIN) for view in stage.views])
         self._renderer = Renderer(self._stage.views, [self._size], COARSE)
+        return self._stage
 
     def close(self) -> None:
         """End the process that draws."""

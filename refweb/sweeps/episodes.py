@@ -209,7 +209,7 @@ class Gym(Table):
             if name not in names:
                 raise InputError(f"observations: {quote(name)} is not an observable, {nearest(name, names)}")
         with refused_at(f"period = {self.period:g}:"):
-            row_at(row_times(scene), self.period)
+            row_at(np.asarray(row_times(scene), dtype=np.float64), self.period)
         self.formulas(names)
         given = scene.to_dict() if self.draw else {}
         for path in self.draw:

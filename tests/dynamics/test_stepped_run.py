@@ -312,6 +312,9 @@ def test_a_restarted_run_is_a_new_one(name):
         for column, values in expected.history.items():
             np.testing.assert_array_equal(run.history[column], values, err_msg=column)
         assert (run.state.system is system) == (run.scene != heavier)
+    run.restart(one)
+    run.set("load.0.force", [7.0, 0.0, 0.0])
+    run.advance()
     for _ in range(2):  # a set value does not outlive a restart, nor do those of the scene before
         run.restart(loaded)
         run.advance()
