@@ -171,7 +171,8 @@ class Inputs:
         """Take other effects as those of the scene, by name and number, as `only_numbers_differ` gives them."""
         self.reset()
         for name, number, effect in changes:
-            for array, numbers in self._writes(name, self._given[name][number], effect) if name in INPUTS else ():
+            writes: list[Any] = self._writes(name, self._given[name][number], effect) if name in INPUTS else []
+            for array, numbers in writes:
                 array[...] = numbers
             self._given[name][number] = effect
             self._acting[name][number].effect = effect
