@@ -315,6 +315,31 @@ def test_a_hub_deploys_its_web_by_a_torque_that_falls_with_its_speed():
     assert terminated and count < 20
 
 
+def test_debris_is_caught_by_corners_that_fly_on_and_close():
+    """By feedback to places beside it and then behind it; left alone, the net is still open after 4 s."""
+
+    def run(law):
+        env, ended = SceneEnv("net-capture"), False
+        state, _ = env.reset(seed=3)
+        while not ended:
+            state, reward, terminated, truncated, _ = env.step(law(state))
+            ended = terminated or truncated
+        return env.run, reward, terminated
+
+    def closing(state):
+        corners, debris = state[:24].reshape(4, 6), state[24:]
+        behind = corners[:, 2].min() > debris[2] + 0.3
+        places = debris[:2] + (not behind) * np.array([[-2, -2], [2, -2], [-2, 2], [2, 2]])
+        aside = 1.5 * (places - corners[:, :2]) - 1.5 * corners[:, 3:5]
+        ahead = 2.0 * (debris[2] + 1.0 - corners[:, 2]) - 2.0 * (corners[:, 5] - debris[5])
+        return np.column_stack([aside, ahead]).ravel() / 2.0
+
+    caught, reward, terminated = run(closing)
+    assert terminated and reward > 10.0 and caught.time < 4.0 and caught.observe("mouth") < 2.0
+    left, reward, terminated = run(lambda state: np.zeros(12))
+    assert not terminated and reward < 1.0 and left.time == 4.0 and left.observe("mouth") > 2.0
+
+
 WRONG = [
     ({"inputs": {}}, "inputs is empty"),
     ({"inputs": {"load.0.force": [1.0, 1.0]}}, r"inputs: load.0.force = \[1.0, 1.0\] must be .* with low < high"),
