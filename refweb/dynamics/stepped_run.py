@@ -86,14 +86,14 @@ class SteppedRun:
             As `SteppedRun`.
         """
         changes = [] if scene is None else only_numbers_differ(self.scene, scene)
+        if scene is not None and changes is None:
+            self.__dict__.update(type(self)(scene).__dict__)
+            return
         self.scene, self.commands = scene or self.scene, []
-        if changes is None:
-            self._make(None)
-        else:
-            self._inputs.take_on(changes)
-            self._schedule.reset()
-            self._simulation.scene = self.scene if scene is not None else self._simulation.scene
-            self._simulation.again(None)
+        self._inputs.take_on(changes or [])
+        self._schedule.reset()
+        self._simulation.scene = self._simulation.scene.replace(effects=widened(self.scene).effects)
+        self._simulation.again(None)
         self._set_off()
 
     def _make(self, begin):

@@ -81,15 +81,18 @@ class SceneEnv(gymnasium.Env):
         render_mode: str | None = None,
         size: tuple[int, int] = (640, 480),
     ) -> None:
-        scene = scene if isinstance(scene, Scene) else Scene.load(scene)
+        if not isinstance(scene, Scene):
+            scene = Scene.load(scene, values)
+        elif values:
+            scene = _with_values(scene, scene.to_dict(), values)
         scene = scene if gym is None else scene.replace(gym=gym)
         if scene.gym is None:
             raise InputError(f"{scene.file or 'scene'}: [gym] is missing: it names inputs, observations and the reward")
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f'render_mode = {quote(render_mode)} must be "rgb_array" or None')
-        self.scene: Scene = _with_values(scene, scene.to_dict(), values) if values else scene
-        self.scene.build()
-        self._given = self.scene.to_dict() if scene.gym.draw else None
+        scene.build()
+        self.scene: Scene = scene
+        self._given = scene.to_dict() if scene.gym.draw else None
         self.gym: Gym = scene.gym
         self.run: SteppedRun | None = None
         self.render_mode: str | None = render_mode
@@ -143,10 +146,12 @@ class SceneEnv(gymnasium.Env):
         if values and self._given is None:
             self._given = self.scene.to_dict()
         scene = _with_values(self.scene, self._given, values) if values else self.scene
-        if self.run is None:
-            self.run = SteppedRun(scene)
+        run, self.run = self.run, None  # which it stays where the new one cannot begin
+        if run is None:
+            run = SteppedRun(scene)
         else:
-            self.run.restart(scene)
+            run.restart(scene)
+        self.run = run
         self._values, self._over, self._observed = values, False, self.run.observed
         if self._images is not None:
             self._images.forget()

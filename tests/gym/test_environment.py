@@ -170,6 +170,20 @@ def test_options_and_values():
     ]:
         with pytest.raises(InputError, match=re.escape(message)):
             env.reset(options=options)
+    with pytest.raises(InputError, match="mass"):
+        env.reset(options={"set": {"point_mass.0.mass": -1.0}})
+    assert SceneEnv(scene(), values={"gym.period": 0.2}).gym.period == 0.2
+    assert SceneEnv("corner-control", values={"gym.period": 0.3}).gym.period == 0.3
+
+
+def test_a_reset_that_is_refused_leaves_nothing_behind():
+    env = SceneEnv(scene())
+    env.reset()
+    with pytest.raises(InputError, match="supported"):
+        env.reset(options={"set": {"velocity.0": {"node": 0, "value": [1.0, 0.0, 0.0]}}})
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(np.zeros(1))
+    assert_same(episode(env, seed=1), episode(SceneEnv(scene()), seed=1))
 
 
 TAUT = {"kind": "inline", "points": [[0, 0, 0], [0.5, 0, 0]], "lines": [[0, 1]], "natural_length": [0.4]}
