@@ -22,6 +22,7 @@ from import_graph import loaded_with
 
 import refweb
 from refweb.dynamics.integrators import central_difference
+from refweb.dynamics.schedule import FEW_CORNERS
 from refweb.kernels import Functions, Record
 from refweb.registry import EFFECTS, INTEGRATORS, LAWS, OBSERVABLES, SHAPES, STATICS, WEBS, load
 from refweb.scene import SHIPPED_SCENES
@@ -134,6 +135,12 @@ def roots(given, method):
         yield "effects.axle"
     if "gym" in given:
         yield from ("sweeps.episodes", "dynamics.controllers")  # inputs are checked as those of controls are
+    if "control" in given:
+        yield "dynamics.controllers"
+    if any("body" in load for load in given.get("load", ())):
+        yield "effects.body_load"
+    if any(len(reel["factor"]) > FEW_CORNERS for reel in given.get("reel", ())):
+        yield "dynamics.breakpoints"
     if any("around" in thread for thread in given.get("thread", ())):
         yield from ("effects.around", "effects.half_turns", "effects.winding")
         if not static:
@@ -144,8 +151,11 @@ def roots(given, method):
         yield "effects.winch_power"
     if any(reel.get("mass") == "follows" for reel in given.get("reel", ())):
         yield "system.material_flow"
-    if any(shape in ("cylinder", "box") and "mass" in body for shape, body in zip(shapes, bodies, strict=True)):
-        yield from ("net.solid", *(["effects.turning_bodies"] if spun else []))
+    heavy = [body for body in bodies if "mass" in body]
+    if any(body["shape"] in ("cylinder", "box") and "inertia" not in body for body in heavy if "shape" in body):
+        yield "net.solid"
+    if spun and any(body.get("shape") in ("cylinder", "box", "mesh") for body in heavy):
+        yield "effects.turning_bodies"
     if "mesh" in shapes:
         yield from ("effects.contact.nonconvex_contacts", *(f"net.boundary.{name}" for name in MESH))
     if not static and len(bodies) > 1 and not (contact or {}).get("between_bodies"):

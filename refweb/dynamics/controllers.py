@@ -145,7 +145,7 @@ class Controller:
         value, rate = self._measured[max(len(self._measured) - 1 - self._lag, 0)]
         if rate is None:
             at = len(self._measured) - 2 - self._lag
-            before = self._measured[max(at, 0)][0] if at >= 0 else value
+            before = self._measured[at][0] if at >= 0 else value
             rate = self._difference(value, before) / control.period
         target = self._target(time, values)
         before = target if self._target_before is None else self._target_before

@@ -88,6 +88,7 @@ CASES = {
         "falling_net",
         "spun_tight",
         "spin_deployment",
+        "spin_up",
         "capture",
         "capture_satellite",
         "tethered_web",
