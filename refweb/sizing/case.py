@@ -72,7 +72,9 @@ class Task(NamedTuple):
         for name, (path, _) in itertools.product(self.results, self.numbers):
             try:
                 if name in observed:
-                    slopes[slope_of(name, path)] = float(solution.gradient(name, path))
+                    gradient = solution.gradient(name, path)
+                    if gradient.left is None:  # at a kink those by several paths have no sum
+                        slopes[slope_of(name, path)] = float(gradient)
                 elif name in STRENGTH:
                     slopes[slope_of(name, path)] = governing.slope(name, path)
             except (InputError, SolverError):

@@ -11,7 +11,7 @@ from ..errors import InputError, in_file
 from ..messages import quote, short
 from ..results.observables.observe import bounds_by_name
 from ..sweeps.expressions import ANY, Interval
-from .case import FREQUENCY, QUANTITIES, SIZES, sizes_of
+from .case import QUANTITIES, SIZES, sizes_of
 from .formulas import Formula
 from .requirements import Free
 from .space import Design, Space
@@ -38,8 +38,6 @@ class Problem:
         Conditions by name.
     used : set of str
         Names that formulas use, without free numbers.
-    differences : bool
-        True if a name has derivatives by differences of runs alone.
     static : bool
         True if all scenes are of statics.
     drawn : list of dict
@@ -82,7 +80,6 @@ class Problem:
         self.used = {name for formula in formulas for name in formula.used} - set(self.space.names)
         self.quantities = tuple(name for name in QUANTITIES if name in self.used)
         self.results = tuple(name for name in (*names, *QUANTITIES) if name in self.used)
-        self.differences = any(FREQUENCY.fullmatch(name) for name in self.results)
         with in_file("minimise:"):
             self._refuse_constant(first)
 

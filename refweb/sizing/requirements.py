@@ -17,13 +17,17 @@ from ..errors import InputError, in_file, refused_at
 from ..messages import nearest, quote, short
 from ..sweeps.study import Distribution, Range, Study
 from ..sweeps.study import read_parameters as read_draws
-from ..tables import Table, boolean, checked, choice, field, integer, real, table, text
+from ..tables import Several, Table, boolean, checked, choice, field, integer, real, table, text
 
 if TYPE_CHECKING:
     from os import PathLike
 
+    from ..scene import Scene
+
 SHIPPED_SIZINGS = pathlib.Path(__file__).parent / "shipped"
 """Folder of the requirements files shipped with refweb."""
+SCENE_FILE = "scene.toml"
+"""File of a scene that was given in Python, in the folder of its sizing."""
 METHODS = ("auto", "gradients", "enumeration", "evolution", "direct")
 """Ways to find the least design."""
 MOST_RUNS = 1_000_000
@@ -211,7 +215,7 @@ def _scenes() -> Any:
 
     @accepts(any_of({"type": "string"}, array({"type": "string"}, 1)))
     def read(name, value):
-        if isinstance(value, str):
+        if isinstance(value, str) or type(value).__name__ == "Scene":
             return value
         if not isinstance(value, list | tuple) or not value or not all(isinstance(v, str) for v in value):
             raise InputError(f"{name} = {quote(value)} must be a scene, or a list of scenes")
@@ -242,7 +246,7 @@ class Sizing(Table):
     ----------
     scene : str or sequence of str
         A scene file, relative to the requirements file, or the name of a scene shipped with refweb; of a list of them
-        one is chosen.
+        one is chosen. In Python also a `refweb.Scene`.
     parameters : dict
         Free numbers, by the paths of ``--set`` or by a name with ``paths``, which all have the value. A list has the
         values that are possible; ``{ from, to }`` is any number between, with ``spacing = "log"`` searched in equal
@@ -296,7 +300,7 @@ class Sizing(Table):
         strong = "max_stress < 1e5"
     """
 
-    scene: str | tuple[str, ...] = _scenes()
+    scene: str | Several | Scene = _scenes()
     parameters: dict[str, Any] = _free_numbers()
     requirements: dict[str, Any] = _requirements()
     minimise: str = text()
@@ -313,8 +317,10 @@ class Sizing(Table):
 
     @property
     def scenes(self) -> tuple[str, ...]:
-        """Its scenes."""
-        return (self.scene,) if isinstance(self.scene, str) else self.scene
+        """Names of its scenes."""
+        if isinstance(self.scene, tuple):
+            return self.scene
+        return (self.scene,) if isinstance(self.scene, str) else (SCENE_FILE,)
 
     def check(self) -> None:
         """Refuse keys that do not fit together."""
@@ -347,6 +353,7 @@ class Sizing(Table):
     def to_dict(self) -> dict[str, Any]:
         """The requirements as plain TOML values."""
         given = {key: value for key, value in super().to_dict().items() if key not in ("folder", "draws")}
+        given["scene"] = list(self.scene) if isinstance(self.scene, tuple) else self.scenes[0]
         given["parameters"] = {name: _plain(value) for name, value in self.parameters.items()}
         given["requirements"] = {
             name: r.condition if r.probability is None else {"condition": r.condition, "probability": r.probability}

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ..errors import InputError
 from ..messages import one_line
 from ..results import case_rows
-from ..results.files import write_text
+from ..results.files import as_toml, write_text
 from ..sweeps.case import solve
 from ..sweeps.chances import bounds, clopper_pearson
 from ..sweeps.design import KEY, Case, key_of
@@ -23,6 +23,7 @@ from ..sweeps.expressions import Interval
 from ..sweeps.sweep import holds_rows, job_of, tidy
 from ..sweeps.workers import Processes, through
 from .case import Task
+from .requirements import SCENE_FILE
 from .space import Design
 
 FAILED = Interval(-1.0, -1.0)
@@ -124,6 +125,8 @@ class Runs:
             tidy(self.path)
             self.summary(summary)
             write_text(self.path / "requirements.toml", _as_toml(self.problem.sizing))
+            if not isinstance(self.problem.sizing.scene, str | tuple):
+                write_text(self.path / SCENE_FILE, as_toml(self.problem.sizing.scene.to_dict()))
         self._table = case_rows.CaseRows(self.path, list(self.rows.values()), self.problem.space.names)
 
     def summary(self, content):
@@ -268,7 +271,7 @@ def _as_toml(sizing):
         return str((folder / name).resolve()) if folder is not None and (folder / name).is_file() else name
 
     scenes = [placed(name) for name in sizing.scenes]
-    given["scene"] = scenes[0] if isinstance(sizing.scene, str) else scenes
+    given["scene"] = scenes if isinstance(sizing.scene, tuple) else scenes[0]
     for values in given["parameters"].values():
         if isinstance(values.get("catalogue"), str):
             values["catalogue"] = placed(values["catalogue"])

@@ -7,7 +7,8 @@ bounds has multipliers λ ≥ 0 with
 
 (Karush, Kuhn and Tucker), where bounds have multipliers as well. `refweb.sizing.sqp` finds it.
 
-Derivatives are those of the adjoint. One that no adjoint gives, as that of a frequency, is a difference of runs.
+Derivatives are those of the adjoint. One that no adjoint gives, as that of a frequency or of a largest value that two
+lines share, is a difference of runs.
 """
 
 from __future__ import annotations
@@ -80,7 +81,7 @@ class Smooth:
 
     def __init__(self, runs, options):
         self.runs, self.options, self.problem = runs, options, runs.problem
-        self.count, self.size, self._points = len(self.problem.space.free), None, {}
+        self.count, self.size, self.coarse, self._points = len(self.problem.space.free), None, False, {}
         self.parts = [name for name, f in self.problem.requirements.items() for _ in f.parts]
 
     def design(self, u):
@@ -108,6 +109,7 @@ class Smooth:
             slopes[name] = np.eye(self.count)[n] * given.slope(design.shares[n])
         lacking = [name for name, slope in slopes.items() if slope is None]
         slopes |= self._differences(design, lacking) if lacking else {}
+        self.coarse = self.coarse or bool(lacking)
         ((f, df),) = self.problem.objective.slopes(numbers, slopes)
         self.size = self.size or abs(f) or 1.0
         r, dr, wide = [], [], []
@@ -147,13 +149,14 @@ class Smooth:
     def optimise(self, u, reserve=0.0):
         """Least design from a start, with reserves of at least ``reserve``; the fractions."""
         u, kept = np.array(u, float), np.full(len(self.parts), reserve + INSIDE)
+        self.at(u)
         for _ in range(3):
             u = minimise(
                 lambda u, kept=kept: (self.at(u).f, self.at(u).df, self.at(u).r - kept, self.at(u).dr),
                 u,
                 np.zeros(self.count),
                 np.ones(self.count),
-                BY_DIFFERENCES if self.problem.differences else PRECISE,
+                BY_DIFFERENCES if self.coarse else PRECISE,
             )
             lacking = reserve + INSIDE - (self.at(u).r - self.at(u).wide)
             if not (lacking >= INSIDE).any():

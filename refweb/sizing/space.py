@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from ..errors import InputError, in_file, refused_at
 from ..messages import quote, short
+from ..sweeps.design import Base
 from ..sweeps.sweep import base_of
 from .requirements import Catalogue, Free
 
@@ -134,6 +135,8 @@ class Space:
 
 def _base(sizing, name):
     """The scene of a requirements file by its name there."""
+    if not isinstance(sizing.scene, str | tuple):
+        return Base(sizing.scene.to_dict(), sizing.scene.folder, sizing.scene.file or "scene")
     path = sizing.folder / name if sizing.folder is not None else pathlib.Path(name)
     return base_of(path if path.is_file() else name)
 
