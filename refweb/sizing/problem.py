@@ -119,7 +119,7 @@ class Problem:
             for name, (low, high) in bounds_by_name(scene.to_dict()).items():
                 before = values.get(name, Interval(math.inf, -math.inf))
                 values[name] = Interval(min(low, before.low), max(high, before.high))
-        values |= dict.fromkeys(QUANTITIES, Interval(0.0, math.inf)) | {"margin": Interval(-1.0, math.inf)}
+        values |= dict.fromkeys((*SIZES, "utilisation"), Interval(0.0, math.inf)) | {"margin": Interval(-1.0, math.inf)}
         values |= {name: Interval(f.low, f.high) for name, f in self.space.free.items()}
         for name, options in self.space.listed.items():
             labels = [option.label for option in options]

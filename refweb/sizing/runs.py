@@ -156,20 +156,18 @@ class Runs:
         Spent
             If this takes more runs than the requirements allow.
         """
-        cases = {design: self._cases(design, slopes) for design in designs}
-        missing = {}
-        for runs in cases.values():
-            for case, base, task in runs:
-                if case.given is not None and case.key not in self._asked:
-                    if len(self._asked) >= self.problem.sizing.runs:
-                        self._run(missing)
-                        raise Spent
-                    self._asked.add(case.key)
-                if case.given is not None and case.key not in self.rows:
-                    missing[case.key] = (case, base, task)
+        cases, missing = {design: self._cases(design, slopes) for design in designs}, {}
+        for design, runs in list(cases.items()):
+            keys = {case.key for case, *_ in runs if case.given is not None}
+            if len(self._asked | keys) > self.problem.sizing.runs:
+                del cases[design]
+                continue
+            self._asked |= keys
+            missing |= {run[0].key: run for run in runs if run[0].given is not None and run[0].key not in self.rows}
         self._run(missing)
-        judged = [self._judge(design, runs) for design, runs in cases.items()]
-        self.judged |= {judged.design: judged for judged in judged}
+        self.judged |= {design: self._judge(design, runs) for design, runs in cases.items()}
+        if len(cases) < len(set(designs)):
+            raise Spent
         return [self.judged[design] for design in designs]
 
     def _cases(self, design, slopes):

@@ -88,10 +88,12 @@ def _gradients(runs, optima):
             optima.append(smooth.optimum(solved[-1][1]))
             continue
         for start in starts:
-            runs.of([smooth.design(smooth.nearest(start))])
+            runs.of([smooth.design(smooth.nearest(start))], slopes=True)
     for smooth, u in solved if sizing.trade_off else ():
         for reserve in RESERVES:
             u = smooth.optimise(u, reserve)
+            if runs.of([smooth.design(u)], slopes=True)[0].tightest < reserve:
+                break
 
 
 def _enumeration(runs, optima):
@@ -128,7 +130,7 @@ def _evolution(runs, optima):
         vectorized=True,
         updating="deferred",
         polish=False,
-        rng=np.random.default_rng(runs.problem.sizing.seed),
+        seed=np.random.default_rng(runs.problem.sizing.seed),
         popsize=max(5, 15 // max(len(space.names), 1)),
         tol=1e-6,
         maxiter=10_000,

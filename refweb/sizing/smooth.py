@@ -31,6 +31,8 @@ PRECISE, BY_DIFFERENCES, NEAR = 1e-11, 1e-6, 1e-5
 """Lengths of steps, over ranges, at which a search ends: by adjoints, by differences, and where none is feasible."""
 ACTIVE = 1e-5
 """Reserve below which a requirement counts as active, and distance of a fraction to a bound."""
+NEARBY = 1e-2
+"""Violation, over its limit, above which another search from the same place is of no use."""
 ROUNDED = 1e-12
 """Distance of a fraction to a bound that is one of rounding."""
 FARTHEST = 1e3
@@ -159,7 +161,7 @@ class Smooth:
                 BY_DIFFERENCES if self.coarse else PRECISE,
             )
             lacking = reserve + INSIDE - (self.at(u).r - self.at(u).wide)
-            if not (lacking >= INSIDE).any():
+            if not INSIDE <= lacking.max(initial=0.0) <= NEARBY:
                 break
             kept = kept + 2.0 * np.maximum(lacking, 0.0)
         return u
