@@ -158,6 +158,8 @@ def roots(given, method):
         yield "effects.turning_bodies"
     if "mesh" in shapes:
         yield from ("effects.contact.nonconvex_contacts", *(f"net.boundary.{name}" for name in MESH))
+    if any(body.get("file") == "envisat.obj" for body in bodies):  # its parts overlap
+        yield from ("net.boundary.repair", "net.boundary.winding")
     if not static and len(bodies) > 1 and not (contact or {}).get("between_bodies"):
         yield "effects.contact.undetected_overlap"  # bodies that overlap in silence
     if "self_contact" in given:
@@ -217,7 +219,8 @@ def called(given):
     if given["cable"].get("order", 1) > 1 or rests or method in ("cvode", "ida"):
         outside.append("skfem")  # dofs of what has a matrix
     joined = given.keys() & {"self_contact", "thread"}
-    if "mesh" not in given["web"] or joined or rests or factorized:  # parts, neighbours
+    apart = "net.boundary.repair" in modules
+    if "mesh" not in given["web"] or joined or rests or factorized or apart:  # parts, neighbours
         outside.append("scipy.sparse.csgraph")
     if factorized:
         outside.append("qdldl")
@@ -283,6 +286,7 @@ ALIKE = (
     "spun-tight",
     "falling-net",
     "capture-satellite",
+    "four-satellites",
     "spinning-web",
     "tethered-web",
     "ring-on-slack-cable",

@@ -93,6 +93,7 @@ CASES = {
         "capture_satellite",
         "tethered_web",
         "capture_in_orbit",
+        "four_satellites",
         "odds_of_capture",
     ),
     "methods": ("cross_validation", "coverage", "trust", "work_precision", "price_of_modelling"),
