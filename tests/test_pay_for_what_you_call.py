@@ -144,7 +144,7 @@ def roots(given, method):
     if any("around" in thread for thread in given.get("thread", ())):
         yield from ("effects.around", "effects.half_turns", "effects.winding")
         if not static:
-            yield "results.half_turn_probe"
+            yield "dynamics.half_turns"
     if "winch" in given or any("friction" in thread for thread in given.get("thread", ())):
         yield from ("effects.thread_friction", "effects.thread_slips")
     if any("power" in winch for winch in given.get("winch", ())):

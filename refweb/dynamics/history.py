@@ -71,7 +71,7 @@ def _probes_of_warnings(system, followed, step_size):
         cells = len(system.terms[i].cells)
         by_name["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, term=i)
     if any(thread.wraps for thread in net.threads):
-        from ..results.half_turn_probe import probe_of as probe_of_turns
+        from .half_turns import probe_of as probe_of_turns
 
         by_name |= {"half turns": probe} if (probe := probe_of_turns(net)) is not None else {}
     if pairs_of(system):
@@ -424,7 +424,7 @@ class Watch:
         """Text on the end of a thread that goes about half a turn round a cylinder, or "", see `half_turn_remark`."""
         if (at := self._of_warning("half turns")) is None:
             return ""
-        from ..effects.half_turns import half_turn_remark
+        from .half_turns import half_turn_remark
 
         turns, number, time = (getattr(course.extremes, name)[at] for name in ("values", "places", "times"))
         return half_turn_remark(self.system.net, float(turns), int(number), float(time), drifts)

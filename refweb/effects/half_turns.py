@@ -1,8 +1,7 @@
 """Half turns of threads about cylinders: how far ends are from where `winding` counts their turns.
 
 The azimuth of an end is within half a turn of that in the web's position, so an end that goes farther would change the
-length by a whole turn. `statics` refuses an equilibrium near there; dynamics follows the farthest end in every step,
-warns of it, and names it beside an energy drift.
+length by a whole turn. `statics` refuses an equilibrium near there, and `dynamics.half_turns` follows the farthest end.
 """
 
 from __future__ import annotations
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 
 MOST = 0.45
 """Turns from where they are counted up to which an equilibrium is taken, and a run has no warning."""
-DOUBT = 0.25
-"""Turns from which on an energy drift may come of them."""
 REMEDY = (
     "as turns are counted up to half a turn from the web: let the body turn about an axle with that end on it, move "
     "the end less, or start from a web in which it is nearer, with around.turns"
@@ -113,17 +110,3 @@ def refuse_half_turns(system: System, t: float, x: NDArray[np.float64], before: 
                 "open: use more load_steps"
             )
     return now
-
-
-def half_turn_remark(net: Net, turns: float, number: int, t: float, drifts: bool) -> str:
-    """Text that names the farthest end of a run, by its turns, its number and the time [s]; "" for few turns.
-
-    ``drifts`` is True beside an energy drift, which it may be the cause of.
-    """
-    if turns < (DOUBT if drifts else MOST):
-        return ""
-    end = ends_of(net)[number]
-    return (
-        f'node {end.rows[0]} comes to {turns:.2f} of a turn about body "{end.body}" from where it was in the web, at '
-        f"t = {t:.6g} s, and its thread may have gained or lost a turn there, {REMEDY}"
-    )

@@ -45,15 +45,15 @@ def reason_of(system: System, x: NDArray[np.float64], tangents: bool) -> str | N
 
 def _pulled_to(system, thread: ThreadLine, x, end, ring):
     """Words that say where an end of a thread has been pulled to, its next ring or body; "" where it is clear."""
-    positions = system.net.points + x
-    node, segment = positions[thread.rows[end]], 0 if end == 0 else len(thread.distances) - 1
+    position = system.net.points + x
+    node, segment = position[thread.rows[end]], 0 if end == 0 else len(thread.distances) - 1
     for wrap in thread.wraps:
         if wrap.segment == segment:
             body = next(body for body in system.net.bodies if body.name == wrap.body)
-            away = node - positions[body.row]
+            away = node - position[body.row]
             if type(body.shape).__name__ != "Sphere":
                 away = away - (away @ body.axes[2]) * body.axes[2]
             return f'at body "{body.name}"' if np.linalg.norm(away) < body.shape.radius * (1.0 + NEAR) else ""
     at = thread.rows[ring]
-    near = len(thread.rows) > 2 and np.linalg.norm(node - positions[at]) < NEAR * thread.natural_length
+    near = len(thread.rows) > 2 and np.linalg.norm(node - position[at]) < NEAR * thread.natural_length
     return f"at node {at}" if near else ""
