@@ -172,6 +172,8 @@ GLOSSARY = {
         "critical speed": "Angular velocity at which centrifugal forces exceed the stiffness [rad/s].",
         "study": "Runs of one scene over values that vary; also called sweep.",
         "case": "One run of a study.",
+        "sizing": "Search for the design of the least mass, or least of another number, that meets requirements.",
+        "reserve": "Distance of a result to the limit of a requirement, over the limit.",
         "ensemble": "Runs with small random changes of the initial state.",
         "confidence interval": "Range that contains a probability with stated confidence, by Clopper and Pearson.",
         "Sobol index": "Share of the variance of a result that one input explains: first-order or total-effect.",

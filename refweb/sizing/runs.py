@@ -102,6 +102,8 @@ class Runs:
         Rows by the key of their run.
     judged : dict
         Results of each design that was asked for, a `Judged` by design.
+    asked : set of str
+        Keys of all runs that were asked for.
     fresh : int
         Number of runs since the start.
     """
@@ -110,7 +112,7 @@ class Runs:
         self.problem, self.crew, self.tell = problem, crew, lambda text, share: None
         self.path = None if out is None else pathlib.Path(out).absolute()
         self.rows, self.judged, self.fresh = {}, {}, 0
-        self._asked, self._files, self._table = set(), {}, None
+        self.asked, self._files, self._table = set(), {}, None
         if self.path is not None and holds_rows(out, "size"):
             stored = case_rows.read(self.path / case_rows.NAME)
             self.rows = {row["case"]: row for row in stored if row["status"] != "lost"}
@@ -159,10 +161,10 @@ class Runs:
         cases, missing = {design: self._cases(design, slopes) for design in designs}, {}
         for design, runs in list(cases.items()):
             keys = {case.key for case, *_ in runs if case.given is not None}
-            if len(self._asked | keys) > self.problem.sizing.runs:
+            if len(self.asked | keys) > self.problem.sizing.runs:
                 del cases[design]
                 continue
-            self._asked |= keys
+            self.asked |= keys
             missing |= {run[0].key: run for run in runs if run[0].given is not None and run[0].key not in self.rows}
         self._run(missing)
         self.judged |= {design: self._judge(design, runs) for design, runs in cases.items()}

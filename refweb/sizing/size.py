@@ -154,7 +154,7 @@ def size(
             finally:
                 runs.crew.stop()
                 runs.end()
-                sized.runs = runs.fresh
+                sized.runs, sized.recorded = runs.fresh, len(runs.asked) - runs.fresh
             _conclude(sized, runs, *best(runs, optima), spent)
             _write(sized, runs)
     finally:
