@@ -791,7 +791,7 @@ MUTANTS = [
     # Studies and modes
     Mutant("sizing/sqp", "penalty = max(penalty, 2.0 *", "penalty = min(penalty, 2.0 *"),
     Mutant("sizing/formulas", "_less(a.low, b.high) / scale", "_less(a.low, b.low) / scale"),
-    Mutant("sizing/runs", "if case.given is not None and case.key not in self.rows:", "if case.given is not None:"),
+    Mutant("sizing/runs", " and run[0].key not in self.rows", ""),
     Mutant("sizing/case", "if gradient.left is None:", "if gradient.left is not gradient:"),
     Mutant("sizing/case", "-allowed / stress**2 * slope", "allowed / stress**2 * slope"),
     Mutant(
