@@ -142,7 +142,7 @@ def roots(given, method):
     if any(len(reel["factor"]) > FEW_CORNERS for reel in given.get("reel", ())):
         yield "dynamics.breakpoints"
     if any("around" in thread for thread in given.get("thread", ())):
-        yield from ("effects.around", "effects.half_turns", "effects.winding")
+        yield from ("effects.around", "effects.half_turns", "effects.winding", "system.contact_forces")
         if not static:
             yield "dynamics.half_turns"
     if "winch" in given or any("friction" in thread for thread in given.get("thread", ())):

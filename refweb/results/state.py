@@ -52,9 +52,8 @@ class State:
         force, per_cell = self.system.forces(self.time, self.x, self.v)
         lines = [i for i, term in enumerate(self.system.terms) if term.contact.with_lines]
         contact = {i: records_of(TOUCH, per_cell[i])["value"] for i in lines}
-        felt = None
-        if self.system.net.bodies and len((forces := self.system.contact_forces).terms):
-            felt = forces.of(per_cell)
+        pressed = any(f.contact.felt for f in self.system.terms) or any(t.wraps for t in self.system.net.threads)
+        felt = self.system.contact_forces.of(per_cell) if pressed else None
         threads = {thread.name: per_cell[i][0] for i, thread in self.system.threads.items()}
         return force, per_cell.tension, contact, felt, threads
 

@@ -130,8 +130,9 @@ LOOKED_AT = {
     "overlap": [{"body": "ball"}, {"body": "box"}],
     "slack_fraction": [{}],
     "step_size": [{}],
+    **{quantity: [] for quantity in ("fuel", "delta_v")},
 }
-"""Where each observable is looked at."""
+"""Where each observable is looked at; those of a control in ``dynamics/test_control.py``."""
 EVENTS = [
     {"name": "any", "kind": "contact"},
     {"name": "ball", "kind": "contact", "body": "ball", "with": "web"},

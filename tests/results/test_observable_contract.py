@@ -40,6 +40,7 @@ WHERE = {
     "line": [{}, {"line": 0}, {"line": 7}],
     "thread": [{"thread": "rope"}],
     "ring": [{"ring": 4}],
+    "control": [{"control": "hold"}],
     "component": [{}, *({"component": axis} for axis in "xyz")],
     "to": [{"to": "ball"}],
     "select": [{}, *({"select": choice} for choice in ("max", "min", "abs"))],
@@ -83,7 +84,9 @@ STATES += [random_state("smooth", 3, pieces=3), random_state("tension-only", 4, 
 BY_PROBE = ("support_force", "support_moment", "axle_angle", "slip")
 """Quantities whose value in a state is that of their probe, of bodies and rings that these scenes do not have."""
 BOOKED = [name for name in OBSERVABLES if refweb.Observe(name="_", quantity=name).observable.booked]
-PROBED = [name for name in OBSERVABLES if name not in (*BOOKED, *BY_PROBE)]
+BY_CONTROL = ("fuel", "delta_v")
+"""Quantities of a control, which no state has and whose probe a control writes; see ``dynamics/test_control.py``."""
+PROBED = [name for name in OBSERVABLES if name not in (*BOOKED, *BY_PROBE, *BY_CONTROL)]
 
 
 def probed(observe, state):
