@@ -34,6 +34,8 @@ ROUGH = 16
 """Number of bisections that mostly suffice to tell which rings slip: Newton steps behind them find by how much."""
 DOUBLINGS = 1000
 """Largest number of doublings."""
+FARTHER = 40
+"""Largest number of doublings of the slip of a winch, from the length of a segment on: none is beyond 1e12 lengths."""
 POLISH = 4
 """Largest number of Newton steps behind bisections."""
 DENORMAL = 1e-200
@@ -433,7 +435,7 @@ def return_mapping(law, record, width):
         if first == 0.0 or w[REACH, 0] == 0.0:
             return
         sign, low, high = math.copysign(1.0, first), 0.0, min(w[REACH, 0], w[LENGTH, 0])
-        for _ in range(DOUBLINGS):
+        for _ in range(FARTHER):
             if find_chain(w, data, c, 0, sign * high, rounds) * sign <= 0.0 or high >= w[REACH, 0]:
                 break
             high = min(2.0 * high, w[REACH, 0])
