@@ -65,7 +65,7 @@ def ball(**changes):
     return refweb.Body(**{**given, **changes})
 
 
-@pytest.mark.ordinary("central-difference", "adams", "ida")
+@pytest.mark.ordinary("central-difference", "adams")
 @pytest.mark.parametrize("solve", METHODS, ids=NAMES)
 def test_first_touch_of_a_flying_ball(solve):
     """It meets the line x = 0 at the height √(R² − 0.01²), and the whole web not before."""

@@ -462,6 +462,7 @@ def test_bodies_that_tumble_go_on_whatever_axes_their_tables_have(tmp_path):
             np.testing.assert_allclose(one, other, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_bodies_go_on_where_they_lose_or_take_nodes(tmp_path):
     """Centre, axes and their motion are those there, though the row is another centre of mass; of a ball as well."""
     for own in ({}, dict(shape="sphere", size=None, radius=0.2, inertia=None)):

@@ -110,6 +110,7 @@ def test_atwood_over_a_drum(method):
     agrees(run.results["pull"], pull, pull)
 
 
+@pytest.mark.ordinary("ida", "adams", "central-difference", "order *")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_load_unwinds_a_drum(method):
     """m g R = (I + m R²) α: a rope of three turns, whose end is on the drum."""
@@ -299,6 +300,7 @@ def test_half_a_turn_of_a_slack_thread_is_warned_of(turns, method):
     assert [text.split(" about")[0] for text in texts] == ["node 1 comes to 0.50 of a turn"] * (turns < -0.5)
 
 
+@pytest.mark.slow
 def test_half_a_turn_is_named_beside_a_drift():
     """A mass that flies around a post by more than half a turn."""
     rope = {"nodes": [0, "drum", 1], "around": [OVER | {"side": [-1, 0, 0]}]}

@@ -395,6 +395,7 @@ def test_methods_agree_on_a_bridle():
         np.testing.assert_allclose(other.x, found[0].x, rtol=0, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_resumed_run_is_the_same(tmp_path):
     whole, resumed = nets.whole_and_resumed(bridled(), tmp_path)
     np.testing.assert_array_equal(resumed.state.x, whole.state.x)

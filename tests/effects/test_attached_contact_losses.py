@@ -243,6 +243,7 @@ def sliding(**solve):
     )
 
 
+@pytest.mark.slow
 def test_central_differences_have_their_order_towards_cvode():
     """Two free bodies, one of which carries what the other rubs on: bounces, slides and turns, all in touch."""
     exact = sliding(method="cvode", rtol=1e-10)

@@ -48,7 +48,7 @@ def angle_of_pendulum(t, omega):
     return 2.0 * np.arcsin(k * ellipj(rate * t, k * k)[0])
 
 
-@pytest.mark.ordinary("ida", "adams", "order *", "central-difference")
+@pytest.mark.ordinary("adams", "order *", "central-difference")
 @pytest.mark.parametrize("method", nets.METHODS)
 def test_body_on_an_axle_is_a_physical_pendulum(method):
     """Its angle, and the pull m g + m ω² l at the lowest place, within ±; the balance of energy closes."""
@@ -82,6 +82,7 @@ WHEEL = dict(name="wheel", shape="cylinder", radius=0.2, length=0.1, axis=[1.0, 
 TORQUE = [[0.0, 0.0], [0.2, 0.6], [0.5, -0.3]]
 
 
+@pytest.mark.ordinary("ida", "adams", "order *", "central-difference")
 @pytest.mark.parametrize("method", nets.METHODS)
 def test_torque_turns_a_wheel(method):
     """I dω/dt = M(t) by pieces: the angle is a cubic, the work ½ I ω²; moments across the axle turn nothing."""
@@ -352,6 +353,7 @@ def test_a_pendulum_at_rest_hangs_below_its_axle():
     assert found["held"].value == pytest.approx(3.0 * G, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_flap_that_falls_onto_a_rope():
     """It rests there, and does not step over the rope to hang; the other rest is told of.
 

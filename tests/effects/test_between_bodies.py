@@ -297,6 +297,7 @@ BOXES = [
 ]
 
 
+@pytest.mark.slow
 def test_an_eccentric_hit_keeps_both_momenta():
     """To rounding, with losses too; all methods agree."""
     law = dict(stiffness=1e4, damping=0.2, friction=0.3, slip_velocity=0.1)

@@ -52,6 +52,7 @@ def exact(tmp_path_factory):
     return refweb.run(caught(shape="box", size=SIZE.tolist())), refweb.run(caught(shape="mesh", file=file))
 
 
+@pytest.mark.ordinary("hole", "doubled", "flipped")
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_faulty_box_hits_a_net_as_the_box_does(name, exact, tmp_path):
     """Within ± of both runs and the error of the surface, and as the file without faults by six digits."""
@@ -69,6 +70,7 @@ def test_a_faulty_box_hits_a_net_as_the_box_does(name, exact, tmp_path):
         assert found[key].value == pytest.approx(clean[key].value, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_net_wraps_around_parts_that_overlap(tmp_path):
     """A cross of two bars, which a net with heavy corners meets: nothing passes, what is lost is the momentum given."""
     bar, across = solids.box([0.5, 0.12, 0.1]), solids.box([0.12, 0.5, 0.1])

@@ -347,6 +347,7 @@ def test_spinning_web_from_inside_and_from_outside():
     assert np.abs(found[0]).max() > 0.05 and abs(slope(errors, 1.0 / counts) - 2.0) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.ordinary("cvode block")
 @pytest.mark.parametrize("solver", ["cvode block", "ida block"])
 def test_spinning_web_with_consistent_mass(solver):

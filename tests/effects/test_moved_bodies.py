@@ -114,6 +114,7 @@ def test_line_winds_onto_a_drum():
     assert values["support_moment"] == pytest.approx(-values["tension"] * RADIUS, rel=2.0 * out)
 
 
+@pytest.mark.slow
 def test_shipped_winch():
     """The mass rises by R θ and by what the rope stretches less, and the moment is R times the weight that hangs."""
     found, angle, h = refweb.run("winch-drum").results, 2.0, 0.02

@@ -104,7 +104,7 @@ def test_a_brake_stops_a_mass(method):
     assert run.drift < (5e-4 if method is CentralDifference else 1e-4)
 
 
-@pytest.mark.ordinary("law1-CentralDifference", "law0-Ida", "law1-Cvode")
+@pytest.mark.ordinary("law1-CentralDifference", "law0-Ida")
 @pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
 @pytest.mark.parametrize("law", [LAW, CURVE])
 def test_a_mass_that_bounces_on_a_line_that_yields(method, law):
@@ -167,6 +167,7 @@ def test_three_bars_of_which_one_yields():
         np.testing.assert_allclose(found, np.column_stack([other, weak, other]), rtol=1e-7, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_lines_of_three_laws_side_by_side():
     """One that yields, one with a measured curve and one of tension alone, by statics and motion: each as by itself."""
     points = [(0.0, 0.0), (0.01, 2e4), (0.02, 6e4), (0.05, 2e5)]

@@ -101,6 +101,7 @@ def test_a_mass_that_is_whirled_by_central_differences(factor, drum):
         assert abs(slope - 2.0) < 0.2  # steps of 0.2 of the bound leave the next term
 
 
+@pytest.mark.slow
 @pytest.mark.ordinary("drum that moves-Cvode")
 @pytest.mark.parametrize("solver", [Cvode, Ida])
 @pytest.mark.parametrize("drum", DRIVES)

@@ -463,6 +463,7 @@ def test_free_strings_keep_energy_and_momenta():
     assert 2.5 < drifts[0] / drifts[1] < 6.0 and 2.5 < drifts[1] / drifts[2] < 6.0
 
 
+@pytest.mark.slow
 @pytest.mark.ordinary("2.0")
 @pytest.mark.parametrize("damping", [0.0, 2.0])
 def test_explicit_against_cvode(damping):

@@ -239,7 +239,7 @@ IMPLICIT = {
 }
 
 
-@pytest.mark.ordinary("adams", "ida block")
+@pytest.mark.ordinary("adams")
 @pytest.mark.parametrize("name", IMPLICIT)
 def test_implicit_methods_follow(name, exact):
     """CVODE and IDA, by each kind of linear solver, against explicit steps of order 6."""

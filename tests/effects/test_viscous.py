@@ -138,6 +138,7 @@ def test_a_vibration_is_of_order_two():
     assert max(error[-1] for error in errors) < 1e-4
 
 
+@pytest.mark.ordinary("adams-1", "cvode-1", "ida-1", "block-1")
 @pytest.mark.parametrize(
     "method, order",
     [*((method, 1) for method in ("cvode", "adams", "ida", "block", "sparse"))]
@@ -170,6 +171,7 @@ def slack_reference(push, rate, end):
     return solution.y[:, -1]
 
 
+@pytest.mark.ordinary("CentralDifference", "Ida")
 @pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
 def test_a_slack_line_creeps_back_and_never_pushes(method):
     """A mass that bounces on a rope: its arms relax while it hangs loose, as a program of its own finds."""

@@ -61,6 +61,7 @@ def closed(history, size):
     np.testing.assert_allclose(energy, energy[0], atol=size)
 
 
+@pytest.mark.ordinary("central-difference-*", "adams-first", "ida-first", "bdf-last")
 @pytest.mark.parametrize("end", ["first", "last"])
 @pytest.mark.parametrize("method", STEPS)
 def test_constant_tension(method, end):
@@ -313,6 +314,7 @@ def hoisted(times, power, limit, pull):
     return found.y[[0, 2, 3]]
 
 
+@pytest.mark.ordinary("central-difference", "bdf")
 @pytest.mark.parametrize("method", STEPS)
 def test_power(method):
     """The load rises as by an independent solver, and gets P t; in the end its speed is nearly P/(m g)."""
@@ -348,6 +350,7 @@ def test_power_up_to_a_speed(method, end):
     closed(history, 1e-3)
 
 
+@pytest.mark.ordinary("cvode-dense", "ida-block")
 @pytest.mark.parametrize("linear_solver", ["dense", "block"])
 @pytest.mark.parametrize("method", ["cvode", "ida"])
 def test_power_beside_arms(method, linear_solver):
@@ -402,6 +405,7 @@ def test_power_over_a_ring():
     assert exact["dissipated_energy"][-1] > 0.1
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("method", ["central-difference", "bdf"])
 def test_power_goes_on(tmp_path, method):
     """A run that was stopped and resumed is the same, bit for bit, and one from its folder goes on like one run."""

@@ -229,6 +229,7 @@ def box_depth(p, half=0.5 * SIZE):
     return -np.linalg.norm(np.maximum(q, 0.0), axis=-1) - np.minimum(q.max(axis=-1), 0.0)
 
 
+@pytest.mark.slow
 def test_distances_at_the_points_of_the_grid_are_exact():
     points, triangles = solids.box(SIZE, 2)
     h, shape = 0.02, (24, 28, 20)

@@ -88,6 +88,7 @@ def sized(folder, executor=None, **keys):
 # Closed forms
 
 
+@pytest.mark.ordinary("-0.25")
 @pytest.mark.parametrize("start", [-0.25, -1.4, pytest.param(-2.6, marks=pytest.mark.slow)])
 def test_two_bars_of_least_mass(start, tmp_path):
     """Bars that carry P at stress σ have the mass ρ P b/(σ (1 + ε) sin φ cos φ), least at φ = 45° as they hang.

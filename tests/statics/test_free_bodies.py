@@ -147,7 +147,7 @@ def test_what_is_open_and_what_is_not_proven_is_told(tmp_path):
     np.testing.assert_allclose(drawn.points, turned, rtol=0, atol=1e-12)
 
 
-@pytest.mark.ordinary("34", "83")
+@pytest.mark.ordinary("83")
 @pytest.mark.parametrize("seed", [2, 11, 34, 83])
 def test_random_ropes_beside_a_program_of_ones_own(seed):
     """The least energy found by differences alone, and dynamic relaxation; tensions where differences leave digits."""

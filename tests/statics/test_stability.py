@@ -312,6 +312,7 @@ def test_many_random_nets():
     assert found["grows"] >= 300 and found["held"] >= 20 and not found["undecided"]
 
 
+@pytest.mark.slow
 def test_random_nets_of_more_unknowns_than_are_all_asked():
     """What is said is right, or that it is not decided; of some of either kind it is."""
     found = kinds((2, 4, 5, 8), sizes=(38, 44))

@@ -119,6 +119,7 @@ def test_price(found):
     assert "agree to" in found.sentence
 
 
+@pytest.mark.slow
 def test_folder(found, tmp_path):
     found.save(tmp_path / "cost")
     with open(tmp_path / "cost" / "cost.csv", newline="") as file:
@@ -409,7 +410,11 @@ DYNAMIC_SCENES = [path.stem for path in sorted(scenes.SHIPPED_SCENES.glob("*.tom
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n == "capture-satellite")) for n in DYNAMIC_SCENES]
+    "name",
+    [
+        pytest.param(n, marks=[pytest.mark.slow] * (n in ("capture-satellite", "four-satellites")))
+        for n in DYNAMIC_SCENES
+    ],
 )
 @pytest.mark.parametrize("digits", [None, 8])
 def test_auto_takes_every_shipped_scene(name, digits):

@@ -173,6 +173,7 @@ def upright(speed, **changes):
     )
 
 
+@pytest.mark.slow
 def test_a_peak_before_the_horizon_may_be_exceeded_behind_it():
     """It stands for 15 s where nothing pushes it, and swings through its lowest place where anything does."""
     found = upright(0.05).trust(progress=False).results["lowest"]

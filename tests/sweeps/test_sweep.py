@@ -529,6 +529,7 @@ def test_a_kill_before_and_after_every_write(tmp_path):
     assert alone("injected", tmp_path)[0] >= 12
 
 
+@pytest.mark.slow
 def test_kills(tmp_path):
     """A study that is killed at any moment keeps whole rows, and goes on to the rows of a study that is not."""
     left = alone("kills", tmp_path, 8, 1, "made-up")

@@ -237,6 +237,7 @@ def test_the_two_masses_bracket_the_frequencies(order):
 CELLS = 4
 
 
+@pytest.mark.ordinary("2-True")
 @pytest.mark.parametrize("order, consistent", nets.some(list(itertools.product(ORDERS, [False, True])), 3))
 def test_frequencies_of_a_square_net(order, consistent):
     """A net of N × N squares of strings of side a, held at its rim: 2 cos(ωa/c) = cos(pπ/N) + cos(qπ/N), 0 < p, q < N.
@@ -357,6 +358,7 @@ def test_motion_of_a_taut_cable_converges_with_the_orders_of_the_element(order):
     assert abs(order_of_motion(order, (10, 14, 20, 28), TAUT) - (order + 1)) < ORDER
 
 
+@pytest.mark.ordinary("1-counts0-2", "3-counts2-1")
 @pytest.mark.parametrize(
     "order, counts, expected", [(1, (20, 40, 80), 2), (2, (80, 113, 160), 1), (3, (40, 57, 80), 1)]
 )
@@ -372,6 +374,7 @@ def test_motion_of_a_cable_that_goes_slack(order, counts, expected):
     assert abs(order_of_motion(order, counts, SLACK) - expected) < 0.25
 
 
+@pytest.mark.ordinary("2-counts1")
 @pytest.mark.parametrize("order, counts", [(1, (80, 160, 320)), (2, (40, 80, 160)), (3, (20, 40, 80))])
 def test_motion_of_a_slack_cable_that_is_pulled_taut(order, counts):
     """Order 1 at best: a jump in strain inside an element, which snaps taut at once and rings behind the front.

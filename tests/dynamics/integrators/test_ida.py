@@ -282,6 +282,7 @@ def stretch(system, x):
     return np.abs(sizes - 1.0).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order, rtol", nets.some([(5, 1e-8), (2, 1e-6)], 2))
 def test_pendulum(order, rtol):
     """From horizontal: period 4 K(sin²45°) √(L/g), force at the bottom 3 m g, along the link.

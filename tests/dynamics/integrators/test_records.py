@@ -16,7 +16,7 @@ from refweb.solution import Solution
 SCENES = Path(refweb.__file__).parent / "scenes"
 
 
-@pytest.mark.ordinary("square-impact-changes0", "capture-stage-changes4")
+@pytest.mark.ordinary("square-impact-changes0")
 @pytest.mark.parametrize(
     "name, changes",
     [
