@@ -100,6 +100,8 @@ EXAMPLES = {
         dict(thread="rope", at=4, tension=10.0, speed_limit=0.02),
         dict(thread="rope", end="last", power=0.1, speed_limit=0.05),
         dict(thread="rope", at=4, power=-0.3, speed_limit=0.02),
+        dict(lines=[1, "tie"], tension=10.0, speed_limit=0.02),
+        dict(lines="all", speed=[(0.0, 0.1), (1.0, 0.05)], limit=4.0),
     ],
     "Reel": [
         dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
@@ -141,11 +143,18 @@ def cases(role):
 
 OF_ONE_LAW = ("PlasticLines", "ViscousArms")
 """Effects whose kernels are made for each law: each of their examples has one."""
+
+
+def on_lines(name, i):
+    """Tell if an example is a winch on lines, which do not push."""
+    return name == "Winch" and "lines" in EXAMPLES[name][i]
+
+
 CASES = [
     (name, i, law)
     for name, i in cases("on")
     for n, law in enumerate(LAWS)
-    if name not in OF_ONE_LAW or n == i % len(LAWS)
+    if (n == i % len(LAWS) if name in OF_ONE_LAW else law == "tension-only" or not on_lines(name, i))
 ]
 
 
@@ -362,7 +371,7 @@ def check_derivatives(name, i, law, place):
 @pytest.mark.parametrize("name, i", cases("extend"))
 def test_extension(name, i):
     """Rows and mass are added, what was there stays, and the given net is left alone."""
-    net = skew_net()
+    net = skew_net("tension-only" if on_lines(name, i) else "smooth")
     for number in range(5) if "around" in EXAMPLES[name][i] else [1] if name == "Attach" else []:
         net = example("Body", number).extend(net)
     net = example("Thread", 8 if "at" in EXAMPLES[name][i] else 0).extend(net) if name == "Winch" else net

@@ -159,8 +159,9 @@ EFFECTS = {
     ),
     "winch": st.lists(
         table(
-            thread=st.just("rope"),
             optional={
+                "thread": st.just("rope"),
+                "lines": LINES,
                 "end": st.sampled_from(["first", "last"]),
                 "at": NODE,
                 "speed": SIGNED,

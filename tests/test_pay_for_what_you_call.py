@@ -147,6 +147,8 @@ def roots(given, method):
             yield "dynamics.half_turns"
     if "winch" in given or any("friction" in thread for thread in given.get("thread", ())):
         yield from ("effects.thread_friction", "effects.thread_slips")
+    if any("lines" in winch for winch in given.get("winch", ())):
+        yield "effects.wound_lines"
     if any("power" in winch for winch in given.get("winch", ())):
         yield "effects.winch_power"
     if any(reel.get("mass") == "follows" for reel in given.get("reel", ())):
@@ -264,6 +266,15 @@ SCENES["a curve"]["cable"] = {
 }
 SCENES["arms"] = brief("square-impact")
 SCENES["arms"]["cable"] |= {"viscous": {"arms": [[7e7, 1e-3]]}}
+SCENES["a brake"] = {
+    "web": {"kind": "inline", "points": [[0, 0, 0], [0, 0, -1]], "lines": [[0, 1]]},
+    "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-4, "density": 1000.0},
+    "winch": [{"lines": [0], "speed": 0.0, "limit": 10.0}],
+    "gravity": {"acceleration": [0.0, 0.0, -9.81]},
+    "supports": {"nodes": [0]},
+    "solve": {"kind": "dynamic", "duration": 1e-3},
+    "accuracy": {"error": "none"},
+}
 SCENES["a platform"] = {
     "web": {"kind": "inline", "points": [[-1, 0, 2], [1, 0, 2], [-1, 0, 0], [1, 0, 0]], "lines": [[0, 2], [1, 3]]},
     "cable": {"law": "tension-only", "modulus": 1e9, "area": 1e-4, "density": 1000.0},

@@ -270,4 +270,8 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
             _turn(body, bearings[body.name], rows_there, x, v)
     for thread in net.threads:
         thread.rewind(x)
+    if net.wound:
+        from ..effects.wound_lines import rewind
+
+        rewind(net, x)
     return Start(x if set(net.internal_names) <= set(row) else system.settled(x), v)

@@ -152,6 +152,9 @@ class Rupture(Table):
             if line >= count:
                 raise InputError(f"at[{i}][0] = {line:g} is not a line, must be 0 … {count - 1}")
         strains = self._strains(net)
+        due = {line for line, _ in self._due}
+        for line in [n for lines, _ in net.wound for n in lines.tolist() if np.isfinite(limits[n]) or n in due][:1]:
+            raise InputError(f"line {line} is on a [[winch]] and does not break: give it no strength or time")
         if not self._due and strains is None and not np.isfinite(limits).any():
             raise InputError(
                 "strength is missing: give it here, in [cable] or in their groups, or give at = [[line, t]]"

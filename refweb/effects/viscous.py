@@ -343,5 +343,7 @@ def refuse_beside(net, what):
     """Refuse ``what`` beside arms or lines that yield; `InputError`."""
     if ROW in net.line_data.dtype.names:
         raise InputError(f"{what} cannot stand beside [cable.viscous]: give it one more arm, of a short time, instead")
+    if net.wound:
+        raise InputError(f"{what} cannot stand beside lines on a [[winch]]: damp with rate = ... [1/s]")
     if net.rows_of_elements:
         raise InputError(f'{what} cannot stand beside law = "elastic-plastic": damp with rate = ... [1/s]')

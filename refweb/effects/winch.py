@@ -1,4 +1,4 @@
-"""Winches: the end of a thread on a drum, which hauls material in and pays it out.
+"""Winches: the end of a thread or line on a drum, which hauls material in and pays it out.
 
 A closed thread with a winch is one that begins and ends at the drum: one end is tied to it, the other wound on it.
 
@@ -10,6 +10,8 @@ constant power has a rate of its own, see `refweb.effects.winch_power`.
 Numbers of a winch: the tensions up to which it hauls in and from which it pays out [N], its largest speed beside the
 one that is asked for [m/s], 1 in statics, where time does not pass, the number of rows of its table of speeds, and
 these rows, of time [s] and speed [m/s]; in dynamics those of a constant power behind them.
+
+A line on a winch is in `refweb.effects.wound_lines`.
 """
 
 from __future__ import annotations
@@ -41,13 +43,18 @@ def _one_or_table(name, value):
 
 @table
 class Winch(Table):
-    """A winch at an end of a thread, or at a node of a closed one, its drum: it hauls material in and pays it out.
+    """A winch at an end of a thread or line, or at a node of a closed thread: it hauls material in and pays it out.
 
-    ``speed``, ``tension`` or ``power`` says how. A line on a winch is a thread of two nodes. Energy that the winch
-    takes from the web is ``winch_energy``: heat of a brake is positive, work of a motor negative. Mass of the thread
-    stays at its nodes. For lines whose mass follows, or many of which change alike, see ``[[reel]]``. A ``slip`` whose
-    ``ring`` is the node of the drum is the length that has gone over it. Explicit steps are of order 1 where a winch
-    with ``tension`` at its ``speed_limit`` turns round, and of order 2 else.
+    ``speed``, ``tension`` or ``power`` says how. Energy that the winch takes from the web is ``winch_energy``: heat of
+    a brake is positive, work of a motor negative. Mass stays at the nodes; for lines whose mass follows, or whose
+    natural lengths change in proportion, see ``[[reel]]``. A ``slip`` of the thread whose ``ring`` is the node of the
+    drum is the length that has gone over it. Explicit steps are of order 1 where a winch with ``tension`` at its
+    ``speed_limit`` turns round, and of order 2 else.
+
+    Each line of ``lines`` has a winch of these numbers at one of its ends, which of them makes no difference. It stays
+    a line, with its tension, strain, drag and contact with bodies. Lines on brakes take up the energy of what the web
+    catches. A line on a winch is one element, has a law that does not push or yield, does not break, and its natural
+    length changes by the winch alone. Explicit steps are shorter by up to a factor of √2 where it is the stiffest.
 
     A closed thread, such as a drawstring, is tied to the drum and wound on it from one side. Its segments and rings
     count from the drum: the first segment leaves it, and the last ring is the drum again. With friction the tension
@@ -56,8 +63,10 @@ class Winch(Table):
 
     Parameters
     ----------
-    thread : str
+    thread : str, optional
         Name of the thread. It has one winch.
+    lines : int, str or list, optional
+        In place of it lines, by number or group (see `refweb.net.groups`), or "all"; each has a winch.
     end : {"first", "last"}, optional
         End of an open thread at the drum: its first node or its last. Of a closed thread the side that is wound: the
         segment behind the drum, by default, or with "last" the one before it.
@@ -80,16 +89,18 @@ class Winch(Table):
         limit. In statics, and with ``start = "equilibrium"``, the winch stays as it is.
     speed_limit : float, optional
         Largest speed with ``tension`` or ``power`` [m/s], in and out; by default none. With ``tension`` the tension is
-        lower or higher at it. ``power`` needs one, since a slack thread has no tension.
+        lower or higher at it. ``power`` needs one, since a slack thread has no tension, and is of threads alone.
 
     Raises
     ------
     InputError
-        For none or several of ``speed``, ``tension`` and ``power``, a ``limit`` without ``speed``, a ``speed_limit``
-        with it, and ``power`` without one.
+        For none or both of ``thread`` and ``lines``, none or several of ``speed``, ``tension`` and ``power``, a
+        ``limit`` without ``speed``, a ``speed_limit`` with it, ``power`` without one, and ``end``, ``at`` or ``power``
+        of lines.
         From ``extend``, for a thread that the scene does not have, that is open and has no ``end``, or has ``at``, that
-        does not run through ``at``, has a winch already, a law that pushes, neighbours in one point or no more material
-        for a speed.
+        does not run through ``at``, and for a thread or line that has a winch already, a law that pushes, nodes in one
+        point or no more material for a speed; for a line of several elements, that is broken, or yields. From ``on``,
+        for a line whose natural length changes otherwise.
 
     Examples
     --------
@@ -101,9 +112,13 @@ class Winch(Table):
     """
 
     several = True
-    either = ("speed",), ("tension",), ("power", "speed_limit")
+    either = (
+        *((kind, key) for kind in ("thread", "lines") for key in ("speed", "tension")),
+        ("thread", "power", "speed_limit"),
+    )
 
-    thread: str = text(limit=80)
+    thread: str | None = text(default=None, limit=80)
+    lines: Several = nodes(default=None, what="line")
     end: str | None = choice("first", "last", default=None)
     at: Several = nodes(default=None)
     speed: Any = field(_one_or_table, default=None, unit="m/s")
@@ -113,7 +128,13 @@ class Winch(Table):
     speed_limit: float | None = real(default=None, above=0.0, unit="m/s")
 
     def check(self) -> None:
-        """Refuse none or several ways to wind, and limits that have no meaning or are missing."""
+        """Refuse none or several ways to wind, and keys that have no meaning or are missing."""
+        if (self.thread is None) == (self.lines is None):
+            both = f"thread = {quote(self.thread)} and lines = {quote(self.lines)} exclude each other: give a winch for"
+            raise InputError(f"{both} each" if self.thread else "thread and lines are missing: give one of them")
+        for key in ("end", "at", "power") if self.lines is not None else ():
+            if (value := getattr(self, key)) is not None:
+                raise InputError(f"{key} = {quote(value)} is of threads, and this winch has lines: leave it out")
         given = [name for name in ("speed", "tension", "power") if getattr(self, name) is not None]
         if len(given) != 1:
             raise InputError(
@@ -131,7 +152,9 @@ class Winch(Table):
             )
 
     def extend(self, net: Net) -> Net:
-        """The net whose thread has the winch."""
+        """The net whose thread or lines have the winch."""
+        if self.lines is not None:
+            return self._on_lines(net)
         names = [thread.name for thread in net.threads]
         if self.thread not in names:
             hint = nearest(self.thread, names) if names else "the scene has no [[thread]]"
@@ -150,11 +173,39 @@ class Winch(Table):
             if refused:
                 raise InputError(f"thread = {quote(self.thread)} {why}")
         if net.end < math.inf and not net.quasi_static:
-            self._refuse_empty(thread, net.end)
+            self._refuse_empty(thread.title, thread.natural_length, net.end)
         thread = self._opened(thread, net.web)
         friction = thread.friction or (0.0,) * (len(thread.distances) - 1)
-        wound = thread._replace(winch=self._numbers(net.quasi_static), at_last=self.end == "last", friction=friction)
+        wound = thread._replace(winch=self.numbers(net.quasi_static), at_last=self.end == "last", friction=friction)
         return replace(net, threads=(*net.threads[:number], wound, *net.threads[number + 1 :]))
+
+    def _on_lines(self, net):
+        """The net whose lines have the winch."""
+        lines = net.web.find_lines(self.lines)
+        if net.subdivide > 1 or net.order > 1:
+            key, value = ("subdivide", net.subdivide) if net.subdivide > 1 else ("order", net.order)
+            raise InputError(
+                f"lines = {quote(self.lines)}: a line on a winch is one straight element, and [cable] {key} = {value}: "
+                "leave it out, or give a [[thread]] in place of the line"
+            )
+        wound, broken = [net.line[elements] for elements, _ in net.wound], np.asarray(net.web.broken, dtype=np.int64)
+        for line in lines.tolist():  # whose element has the same number
+            law = net.laws[net.law_index[line]]
+            for refused, why in (
+                (any(line in others for others in wound), "has a winch already"),
+                (line in broken, "is broken"),
+                (net.line_data.distance[line] == 0.0, "has its ends in one point: move them apart"),
+                (
+                    law.pushes or law.bar or law.forming or law.plastic,
+                    f'has law = "{law.name}": on a winch it takes "tension-only" or "table"',
+                ),
+            ):
+                if refused:
+                    raise InputError(f"line {line} {why}")
+        if net.end < math.inf and not net.quasi_static:
+            shortest = lines[net.natural_length[lines].argmin()]
+            self._refuse_empty(f"line {shortest}", float(net.natural_length[shortest]), net.end)
+        return replace(net, wound=(*net.wound, (lines, self)))
 
     def _opened(self, thread, web):
         """The thread as an open one, from the drum to the drum where it is closed."""
@@ -182,13 +233,14 @@ class Winch(Table):
             closed=False,
         )
 
-    def _speeds(self):
+    @property
+    def speeds(self) -> tuple[tuple[float, float], ...]:
         """Rows of time [s] and speed [m/s]."""
         return self.speed if isinstance(self.speed, tuple) else ((0.0, self.speed or 0.0),)
 
-    def _refuse_empty(self, thread, end):
-        """Refuse speeds that haul in all material of a thread until the end of a run [s]."""
-        times, speeds = np.array(self._speeds()).T
+    def _refuse_empty(self, title, length, end):
+        """Refuse speeds that haul in all of a natural length [m] until the end of a run [s]."""
+        times, speeds = np.array(self.speeds).T
         at = np.unique(np.clip([0.0, end, *times], 0.0, end))
         for before, behind in zip(times[:-1], times[1:], strict=True):  # where a speed passes through zero
             first, second = np.interp([before, behind], times, speeds)
@@ -197,20 +249,20 @@ class Winch(Table):
         at = np.unique(at)
         speed = np.interp(at, times, speeds)
         hauled = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(at) * (speed[1:] + speed[:-1]))])
-        if self.limit is None and hauled.max() >= thread.natural_length:
+        if self.limit is None and hauled.max() >= length:
             raise InputError(
                 f"speed hauls in {hauled.max():.4g} m until t = {at[hauled.argmax()]:.4g} s, must be below the natural "
-                f"length of {thread.title}, {thread.natural_length:.4g} m"
+                f"length of {title}, {length:.4g} m"
             )
 
-    def _numbers(self, quasi_static):
+    def numbers(self, quasi_static: bool) -> tuple[float, ...]:
         """Its numbers, see the module."""
         if self.tension is not None:
             holds = self.tension, self.tension
         else:
             holds = -math.inf, math.inf if self.limit is None else self.limit
         largest = 0.0 if self.limit is None and self.tension is None else self.speed_limit or math.inf
-        speeds = self._speeds()
+        speeds = self.speeds
         flat = [value for row in speeds for value in row]
         if self.power is not None and not quasi_static:
             flat += [self.power, self.speed_limit]
@@ -228,16 +280,42 @@ class Winch(Table):
         if given is None:
             keys = " or ".join(key for key in ("speed", "limit", "tension", "power") if getattr(self, key) is not None)
             raise InputError(f"{key} is not a key of this winch in the scene, which has {keys}")
-        value = max(value, 0.0) if key == "tension" else value
+        value = max(float(value), 0.0) if key == "tension" else float(value)
         of_table = [(t, value) for t, _ in given] if isinstance(given, tuple) else value
         return replace(self, **{key: of_table})
 
     def writes(self, system: System) -> list[Any]:
-        """(Array, numbers) of the thread in a system, with the numbers of this winch."""
+        """(Array, numbers) of the thread or lines in a system, with the numbers of this winch."""
+        net = system.net
+        if self.lines is not None:
+            from .wound_lines import write_numbers
+
+            if net.factors:
+                raise InputError(
+                    "a winch on lines has its numbers from the scene alone beside [[reel]] and [temperature]: give "
+                    "these lines up, or take a [[thread]] of two nodes"
+                )
+            return write_numbers(net, net.web.find_lines(self.lines), self.numbers(net.quasi_static))
         number = next(number for number, thread in system.threads.items() if thread.name == self.thread)
-        array, numbers = system.terms[number].data, self._numbers(system.net.quasi_static)
+        array, numbers = system.terms[number].data, self.numbers(net.quasi_static)
         return [(array, np.append(array[:, : -len(numbers)], [numbers], axis=1))]
 
+    def settled(self, net: Net, x: Any) -> Any:
+        """Displacement of all rows as a run begins from, None as it is given, with what lines have wound."""
+        if x is None or not self._leads(net):
+            return x
+        from .wound_lines import settled
+
+        return settled(net, x)
+
+    def _leads(self, net):
+        """Tell if this is the first winch on lines, whose terms are those of all."""
+        return self.lines is not None and net.wound[0][1] == self
+
     def on(self, net: Net) -> list[Any]:
-        """No term: its thread has them."""
-        return []
+        """Terms of all lines on winches, of the first of these; those of a thread are its own."""
+        if not self._leads(net):
+            return []
+        from .wound_lines import terms
+
+        return terms(net)

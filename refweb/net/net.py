@@ -67,6 +67,8 @@ class Net:
         Point masses in ``mass`` [kg]; None if there are none.
     threads : tuple of refweb.net.threads.ThreadLine
         Threads through nodes.
+    wound : tuple of (ndarray of int, refweb.effects.winch.Winch)
+        Elements of lines on winches, and their winch.
     kept : tuple of refweb.net.laws.curve.Curve
         Curves whose addresses stand in ``line_data``: they live as long as the net.
     gradients : ndarray, shape (points, nodes per cell)
@@ -125,6 +127,7 @@ class Net:
     allowed_share: NDArray[np.float64] | None = None
     point_mass: NDArray[np.float64] | None = None
     threads: tuple[Any, ...] = ()
+    wound: tuple[Any, ...] = ()
     kept: tuple[Any, ...] = ()
 
     @property
@@ -186,6 +189,12 @@ class Net:
     def rows_of_elements(self) -> int:
         """Number of rows of internal variables of elements, which stand before those of threads."""
         return self.internal - sum(thread.rows_of_slips for thread in self.threads if thread.first >= 0)
+
+    @property
+    def winches(self) -> list[tuple[float, ...]]:
+        """Numbers of each winch, see `refweb.effects.winch`, a list."""
+        of_lines = [winch.numbers(self.quasi_static) for _, winch in self.wound]
+        return [thread.winch for thread in self.threads if thread.winch] + of_lines
 
     @property
     def carried(self) -> list[int]:

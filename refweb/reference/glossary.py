@@ -83,7 +83,7 @@ GLOSSARY = {
         "reel": "Device that changes the natural length of lines over time.",
         "link": "Rigid bar between two nodes, an algebraic constraint.",
         "thread": "Line that slides through several nodes, with one tension unless there is friction at them.",
-        "winch": "Device at an end of a thread that hauls it in and pays it out, at a speed, a tension or a power.",
+        "winch": "Device at an end of a thread or line that hauls it in and pays it out: at a speed, tension or power.",
         "brake": "Winch that stands still up to a tension, from which on it pays out.",
         "ring": "Node over which a thread slides.",
         "slip of a thread": "Length of it that has gone over a ring [m].",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..compiled.rows import records_of
-from ..effects.base import FELT, TOUCH
+from ..effects.base import FELT, STRAIN, TOUCH
 from ..findings import Finding
 from .columns import static_energies
 
@@ -106,6 +106,8 @@ class State:
     @cached_property
     def element_strain(self) -> NDArray[np.float64]:
         """Strain of each element, the largest over its quadrature points [1], shape (cells,)."""
+        if self.system.net.wound:
+            return self.system.forces(self.time, self.x, self.v)[1].lines[:, STRAIN]
         from ..effects.elasticity import strains
 
         strain = strains(self.system.at(self.time).net, self.x).max(axis=1)

@@ -190,7 +190,7 @@ def with_reason(system, t, error, remedy="", tangents=True):
     from ..system.unsupported_parts import find_parts
     from .contact_kinks import kink_remark
 
-    if system.net.threads and error.x is not None:
+    if (system.net.threads or system.net.wound) and error.x is not None:
         from .thread_reasons import reason_of
 
         if (reason := reason_of(system, error.x, tangents)) is not None:

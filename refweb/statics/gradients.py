@@ -119,6 +119,8 @@ class Gradients:
         system = at_rest(state.system)
         for thread in (thread for thread in system.net.threads if thread.rings):
             raise InputError(f"gradients take no friction or winch, as of {thread.title}: it depends on the path")
+        if system.net.wound:
+            raise InputError("gradients take no [[winch]] on lines: what it has wound depends on the path")
         self._yields = state.plastic_strain is not None
         self._yielded = self._yields and state.plastic_strain.any()
         if self._yields:

@@ -98,7 +98,7 @@ def solve(system, load_steps, progress=None):
 def _refuse_far(system, t, state):
     """Refuse a state that has run away, since forces that do not grow with length balance no load, however far."""
     net = system.net
-    wound = any(thread.winch for thread in net.threads)
+    wound = len(net.winches) > 0
     if not (wound or net.forming.any() or net.law_is("plastic").any()):
         return
     size = float(np.ptp(net.points, axis=0).max() + net.natural_length.max())

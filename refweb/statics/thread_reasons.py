@@ -38,7 +38,7 @@ def reason_of(system: System, x: NDArray[np.float64], tangents: bool) -> str | N
         if any(any(thread.friction) for thread in threads):
             way_out = "; or rings slip where nothing holds both sides of them: raise friction or lower loads"
         return f"{together}{way_out}"
-    if any(thread.winch and thread.winch[0] > 0.0 for thread in threads):  # at a tension
+    if any(numbers[0] > 0.0 for numbers in system.net.winches):  # at a tension
         return "a winch pulls in all that is not held against its tension: lower its tension, or give it a speed"
     return None
 

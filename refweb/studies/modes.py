@@ -190,7 +190,7 @@ def _at_rest(system):
         raise InputError("[[link]]: modes cannot hold lengths exactly: make it a stiff line")
     for term in rest.terms:
         if term.tangent.stiffness is not None and not rest.is_symmetric(term):
-            if term.name == "thread":
+            if term.name in ("thread", "winch"):
                 raise InputError("modes take no friction of [[thread]] above 0, and no [[winch]]: leave them out")
             raise InputError(f"{term.name} has no potential, so there are no natural modes: leave it out")
     if not len(rest.free):

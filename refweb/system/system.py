@@ -106,6 +106,10 @@ class System:
             if hasattr(effect, "extend"):
                 net = effect.extend(net)
         net = with_rotations(net)
+        if net.wound:
+            from ..effects.wound_lines import with_wound
+
+            net = with_wound(net)
         for effect in effects:
             if hasattr(effect, "add_internal"):
                 net = effect.add_internal(net)
@@ -406,6 +410,8 @@ class System:
     def snapshot(self, t: float) -> System:
         """The system as it stands at time t, with a copy of all numbers that commands may change."""
         view = copy.copy(self.at(t))
+        if self.net.wound:  # whose numbers stand in those of lines
+            view = view.with_line_data(view.net.line_data.copy())
         view.terms = [term if term.data is None else replace(term, data=term.data.copy()) for term in self.terms]
         view.drives = [replace(drive, data=drive.data.copy()) for drive in self.drives]
         return view

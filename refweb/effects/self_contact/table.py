@@ -118,6 +118,11 @@ class SelfContact(Table):
                 f"radius = {self.radius:g} needs [cable] order = 1, not {net.order}: lines touch as straight elements; "
                 f"use subdivide = {net.order * net.subdivide}, which has the same nodes"
             )
+        if net.wound:
+            raise InputError(
+                f"radius = {self.radius:g} needs natural lengths ahead, which a [[winch]] finds: in place of its lines "
+                "take a [[thread]] of two nodes for each, or a [[reel]]"
+            )
         from . import line_line_ccd, line_line_penalty
 
         self._refuse_too_large(net)
