@@ -108,7 +108,10 @@ class Winch(Table):
         thread = "rope"
         end = "last"
         tension = 50.0
-        speed_limit = 2.0
+
+        [[winch]]
+        lines = "rim"
+        tension = 20.0
     """
 
     several = True
@@ -290,10 +293,10 @@ class Winch(Table):
         if self.lines is not None:
             from .wound_lines import write_numbers
 
-            if net.factors:
+            if net.factors or system.weakness is not None:
                 raise InputError(
-                    "a winch on lines has its numbers from the scene alone beside [[reel]] and [temperature]: give "
-                    "these lines up, or take a [[thread]] of two nodes"
+                    "a winch on lines has its numbers from the scene alone beside [[reel]], [temperature] and lines "
+                    "that break: take a [[thread]] of two nodes"
                 )
             return write_numbers(net, net.web.find_lines(self.lines), self.numbers(net.quasi_static))
         number = next(number for number, thread in system.threads.items() if thread.name == self.thread)

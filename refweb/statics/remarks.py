@@ -162,9 +162,13 @@ def _not_proven(state, equilibrium):
         name = state.system.resting[0].name
         text = f'body "{name}" is free: ± are estimates, as the proven bound asks for a web without free bodies'
         yield Finding("not-proven", text, "body")
-    if (net.wound or any(thread.rings for thread in net.threads)) and proven.all():
+    if net.wound and proven.all():
+        text = "lines are on a winch: ± are estimates for these load steps, no proven bounds, and a winch that turns "
+        yield Finding(
+            "not-proven", text + "round between two of them is not seen; compare with more load_steps", "winch"
+        )
+    elif any(thread.rings for thread in net.threads) and proven.all():
         text = "threads have friction or a winch: ± are estimates for these load steps, no proven bounds, and a thread "
-        text = text.replace("threads have friction or", "lines have") if net.wound else text
         yield Finding(
             "not-proven",
             text + "that slips over a ring and turns back between two of them is not seen; "

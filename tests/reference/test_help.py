@@ -51,7 +51,10 @@ AROUND = {
     "thread.around": {
         "body": [BALL | {"name": "pulley", "shape": "ring", "normal": [0, 1, 0]}],
     },
-    "winch": {"thread": [{"name": "rope", "nodes": [0, 1, 2], "modulus": 1e9, "area": 1e-6, "density": 1.0}]},
+    "winch": {
+        "cable": {**SCENE["cable"], "law": "tension-only"},
+        "thread": [{"name": "rope", "nodes": [0, 1, 2], "modulus": 1e9, "area": 1e-6, "density": 1.0}],
+    },
     "bending": {"cable": {**SCENE["cable"], "subdivide": 2}},
     "fold": {"supports": {"nodes": []}},
     "control": {
