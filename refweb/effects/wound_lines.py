@@ -172,6 +172,16 @@ def write_numbers(net: Net, elements: NDArray[np.int64], numbers: tuple[float, .
     return [(array, changed)]
 
 
+def standing(net: Net) -> tuple[NDArray[np.bool_], Any]:
+    """(True for each element on a winch, line data in which all winches stand still whatever the tension is)."""
+    lines, wound = net.line_data.copy(), np.zeros(len(net.cells), dtype=bool)
+    for elements, _ in net.wound:
+        wound[elements] = True
+    at = lines.column(FIRST) + NUMBERS
+    lines.matrix[wound, at : at + 3] = -np.inf, np.inf, 0.0
+    return wound, lines
+
+
 def refuse_beside(net: Net) -> None:
     """Refuse what changes natural lengths of lines on winches beside these, and other internal variables.
 

@@ -193,8 +193,8 @@ def test_statics_at_a_tension(winch):
             ],
         )
     )
-    assert run.results["pull"].value == pytest.approx(60.0, rel=1e-8)
-    assert run.results["strain"].value == pytest.approx(60.0 / EA, rel=1e-8)
+    for name, value in (("pull", 60.0), ("strain", 60.0 / EA)):  # to rounding, which ± has
+        assert abs(run.results[name].value - value) <= run.results[name].error < 1e-6
     depth = np.tan(np.arcsin(weights[1] / 120.0))
     assert run.positions[2][2] == pytest.approx(-depth, rel=1e-7)
     finding = next(finding for finding in run.findings if finding.code == "not-proven")

@@ -160,18 +160,24 @@ class Observable:
         return abs(self.of(moved).value - self.of(state).value) / share
 
     def of_held_lines(self, state: State) -> float:
-        """Effect on the value of a rounding, by `ROUNDING`, of the strains of lines whose ends are both fixed.
+        """Effect on the value of a rounding, by `ROUNDING`, of strains of lines on winches or with both ends fixed.
 
         No displacement of a node balances these strains.
         """
         system = state.system.at(state.time)
         net = system.net
         fixed = np.all(system.supported[: net.nodes], axis=1)[net.cells].all(axis=1)
+        lines = net.line_data
+        if net.wound:
+            from ...effects.wound_lines import standing
+
+            wound, lines = standing(net)
+            fixed |= wound
         if not fixed.any():
             return 0.0
         changes, value = [], self.of(state).value
         for share in (SHARE, -SHARE):  # of a line that is neither slack nor taut, the side where it is taut
-            numbers = net.line_data.copy()
+            numbers = lines.copy()
             numbers.natural_length[fixed] *= 1.0 + share
             moved = type(state)(system.with_line_data(numbers), state.time, state.x)
             changes.append(abs(self.of(moved).value - value))
