@@ -419,6 +419,7 @@ MUTANTS = [
     Mutant("dynamics/controllers", 'self._law.restore(arrays["law"])', "pass"),
     Mutant("dynamics/stepped_run", "copy._inputs.restore(self._inputs.present)", "pass"),
     Mutant("dynamics/stepped_run", "self._inputs.take_on(changes or [])", "pass"),
+    Mutant("dynamics/stepped_run", "replace(scene.solve, duration=end)", "scene.solve"),
     Mutant("dynamics/commands", "self._first.clear()", "pass"),
     Mutant("gym/environment", "0.5 + 0.5 * np.clip(action, -1.0, 1.0)", "0.5 + 0.5 * action"),
     Mutant("gym/environment", "truncated = not terminated and (", "truncated = (not terminated or ended) and ("),

@@ -6,6 +6,7 @@ has its bits. `SteppedRun` is public; `refweb.dynamics.commands` has what may be
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -67,7 +68,7 @@ class SteppedRun:
 
     def _set_off(self):
         """Go to the first row, at t = 0."""
-        self._pending, self._tables, self._row = [], [], 0
+        self._pending, self._tables, self._row, self._end = [], [], 0, None
         self._course = self._simulation.integrator.start(*self._simulation.begin.motion)
         self._go_to_row(1)
 
@@ -137,8 +138,8 @@ class SteppedRun:
 
     @property
     def stopped(self) -> bool:
-        """True at the end of the duration, and where an event has ended the run."""
-        return self._course.stopped or self._row == len(self._schedule.times)
+        """True at the end of the duration, and where an event or `end` has ended the run."""
+        return self._end is not None or self._course.stopped or self._row == len(self._schedule.times)
 
     @property
     def drift(self) -> float:
@@ -261,8 +262,15 @@ class SteppedRun:
             self._inputs.apply(self._pending, self._simulation.integrator, self._course)
             self._pending = []
 
+    def end(self) -> None:
+        """End the run at its last row: it goes on no more, and `finish` gives the results until there."""
+        if not self.stopped:
+            self._end = float(self._tables[-1][-1, 0])
+
     def finish(self, out: str | PathLike[str] | None = None, force: bool = False, progress: bool = False) -> Solution:
         """Go on to the end, with the values that are set, and return all that `refweb.run` returns.
+
+        The end is that of the duration, of an event, or of `end`, whose time is the duration of the scene then.
 
         The run is repeated from its start with the same commands, bit for bit, for the extremes, the errors by a
         step-refinement run with the same commands, and the files.
@@ -279,9 +287,17 @@ class SteppedRun:
         Raises
         ------
         InputError, SolverError
-            See `refweb.run`.
+            See `refweb.run`; `InputError` also for a run that `end` has ended at t = 0.
         """
-        return load("refweb.runner:run")(self.scene, out, force, progress, commands=self.commands)
+        scene, end = self.scene, self._end
+        if end is not None:
+            if not end > 0.0:
+                raise InputError("the run has ended at t = 0 s, its first row: there are no results")
+            interval = self._simulation.scene.output.interval
+            scene = scene.replace(
+                solve=replace(scene.solve, duration=end), output=replace(scene.output, interval=interval), gym=None
+            )
+        return load("refweb.runner:run")(scene, out, force, progress, commands=self.commands)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """A run of its own from the present state; CVODE and IDA begin anew there, within their tolerance."""
@@ -295,7 +311,7 @@ class SteppedRun:
         else:
             copy._schedule.commands.load(commands.save())
         copy._course = copy._simulation.integrator.load({name: np.array(value) for name, value in arrays.items()})
-        copy._tables, copy._row, copy._pending = list(self._tables), self._row, []
+        copy._tables, copy._row, copy._pending, copy._end = list(self._tables), self._row, [], self._end
         return copy
 
 

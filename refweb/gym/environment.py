@@ -57,7 +57,8 @@ class SceneEnv(gymnasium.Env):
     gym : refweb.Gym
         Its table.
     run : refweb.dynamics.stepped_run.SteppedRun or None
-        The run of the episode; None before the first `reset`. Its `finish` gives results with ±.
+        The run of the episode; None before the first `reset`. Its `finish` gives results with ±, where
+        the episode is over those of it.
 
     Raises
     ------
@@ -196,6 +197,7 @@ class SceneEnv(gymnasium.Env):
             if self.gym.raise_failure:
                 raise
             self._over, info["failure"] = True, one_line(str(error))
+            self.run.end()
             return self._observation(), self.gym.failure_reward, True, False, {TIME: self.run.time, **info}
         info = {TIME: self.run.time, "energy_drift": self.run.drift}
         ended, terminated = self.run.stopped, self._holds(self._terminated)
@@ -203,6 +205,8 @@ class SceneEnv(gymnasium.Env):
             info["event"], terminated = self.run.event, True
         truncated = not terminated and (ended or self._holds(self._truncated))
         self._over = terminated or truncated or ended
+        if self._over:
+            self.run.end()
         return self._observation(), reward, terminated, truncated, info
 
     def _inputs(self, action):

@@ -281,6 +281,23 @@ def test_an_event_ends_the_run():
     assert run.time < 0.2 and run.observe("x4") >= 0.01
 
 
+def test_a_run_that_is_ended():
+    """Its results are those of a run of that duration with the same commands; it goes on no more, and nor do copies."""
+    run = driven(refweb.start(scene(**MOVED)), until=0.1)
+    run.set("load.0.force", [1e6, 0.0, 0.0])  # from its last row on
+    run.end()
+    assert run.stopped and copy.deepcopy(run).stopped
+    with pytest.raises(InputError, match=re.escape("the run has ended at t = 0.1 s")):
+        run.advance()
+    shorter = refweb.run(scene(duration=0.1, **MOVED), commands=run.commands[:-1])
+    assert run.finish().results == shorter.results
+    run.restart()
+    assert not run.stopped
+    run.end()
+    with pytest.raises(InputError, match="ended at t = 0 s, its first row: there are no results"):
+        run.finish()
+
+
 def test_a_scene_by_name_and_an_equilibrium():
     run = refweb.start("square-impact")
     assert run.time == 0.0 and run.advance() > 0.0

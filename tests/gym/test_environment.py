@@ -228,6 +228,36 @@ def test_an_episode_has_results_with_errors():
     assert env.run.commands == []
 
 
+@pytest.mark.parametrize("task", [{"terminated": "v > 0.2"}, {"truncated": "v > 0.2"}, {"reward": "1/(v < 0.2)"}])
+def test_results_are_those_of_the_episode_that_is_over(task):
+    """At its end, success, loss or failure, in closed form; not those of a motion that goes on to the duration."""
+    env = SceneEnv(scene(task))
+    env.reset()
+    while not any(env.step(np.ones(1))[2:4]):
+        pass
+    results, acceleration = env.run.finish().results, FORCE / MASS
+    assert env.run.stopped and env.run.time == 0.2 and results["v"].time == 0.2
+    # Half of the line's mass, 2.5e-9 kg, is with the point mass.
+    assert results["v"].value == pytest.approx(0.2 * acceleration, rel=1e-8) and results["v"].error is not None
+    assert results["x"].value == pytest.approx(0.5 * acceleration * 0.2**2, rel=1e-8)
+    env.reset()
+    env.step(np.ones(1))
+    assert env.run.finish().results["v"].time == 0.5  # this one is not over
+
+
+def test_results_of_a_run_that_fails():
+    """Until the row before, where an observation was given: of a spring, by cosines."""
+    tables, stiffness = {"web": {**TAUT, "natural_length": [0.5]}, "solve": COARSE}, 1e6 * 1e-4 / 0.5
+    env, ended = SceneEnv(scene({"inputs": {"load.0.force": [[-FORCE, 0, 0], [FORCE, 0, 0]]}}, **tables)), False
+    env.reset()
+    while not ended:
+        _, _, ended, _, info = env.step(np.ones(1))
+    end = env.run.history["time"][-1]
+    x, found = FORCE / stiffness * (1.0 - np.cos(np.sqrt(stiffness / MASS) * end)), env.run.finish().results["x"]
+    assert "energy drift" in info["failure"] and 0.0 < end == found.time < info["time"]
+    assert abs(found.value - x) <= found.error < 0.1 * abs(x)
+
+
 def test_wrong_actions():
     env = SceneEnv(scene())
     env.reset()
