@@ -429,6 +429,8 @@ MUTANTS = [
         "before = self._observed = run.observed",
     ),
     Mutant("sweeps/episodes", "parameter[int(share * len(parameter))]", "parameter[0]"),
+    Mutant("sweeps/expressions", '_call("_known", side)', "side"),
+    Mutant("sweeps/episodes", "formulas[-1].check_types(typical)", "pass"),
     Mutant("effects/viscous", "time * (1.0 - decay * decay)", "time * (1.0 - decay)"),
     Mutant("effects/viscous", "pull + max(by_law, 0.0) >= 0.0:", "pull + by_law >= 0.0 or e > 0.0:"),
     Mutant("effects/viscous", "data, c, q) - (1.0 + e) * pull)", "data, c, q) - pull)"),

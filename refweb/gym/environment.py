@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium.spaces import Box
 
 from ..dynamics.stepped_run import SteppedRun
-from ..errors import InputError, SolverError, in_file
+from ..errors import InputError, SolverError, in_file, refused_at
 from ..messages import nearest, one_line, quote
 from ..reference.paths import with_value
 from ..scene import Scene
@@ -192,7 +192,11 @@ class SceneEnv(gymnasium.Env):
         given = self._inputs(action)
         info: dict[str, Any] = {}
         try:
-            reward = self._advance(self.run, given)
+            self._advance(self.run, given)
+            reward = self._value("reward", self._reward)
+            ended, terminated = self.run.stopped, self._holds("terminated", self._terminated)
+            terminated = terminated or self.run.event is not None
+            truncated = not terminated and (ended or self._holds("truncated", self._truncated))
         except SolverError as error:
             if self.gym.raise_failure:
                 raise
@@ -200,10 +204,8 @@ class SceneEnv(gymnasium.Env):
             self.run.end()
             return self._observation(), self.gym.failure_reward, True, False, {TIME: self.run.time, **info}
         info = {TIME: self.run.time, "energy_drift": self.run.drift}
-        ended, terminated = self.run.stopped, self._holds(self._terminated)
-        if ended and self.run.event is not None:
-            info["event"], terminated = self.run.event, True
-        truncated = not terminated and (ended or self._holds(self._truncated))
+        if self.run.event is not None:
+            info["event"] = self.run.event
         self._over = terminated or truncated or ended
         if self._over:
             self.run.end()
@@ -220,21 +222,25 @@ class SceneEnv(gymnasium.Env):
         return {path: values[first:end] if end - first > 1 else values[first] for path, first, end in self._parts}
 
     def _advance(self, run, given):
-        """Set values by path, go ahead by a period, and return the reward."""
+        """Set values by path, go ahead by a period, and take the numbers of reward and ends."""
         for path, value in given.items():
             run.set(path, value)
         run.advance(self.gym.period)
         before, self._observed = self._observed, run.observed
         self._numbers = {f"{name}{BEFORE}": value for name, value in before.items()}
         self._numbers |= {**self._values, **given, TIME: run.time, **self._observed}
-        reward = self._reward(self._numbers)
-        if not math.isfinite(reward):
-            raise SolverError(f"reward = {quote(self.gym.reward)} is {reward} at t = {run.time:.6g} s")
-        return reward
 
-    def _holds(self, condition):
+    def _value(self, key, formula):
+        """The value of a formula, `SolverError` where it is not finite."""
+        with in_file(self.scene.file), refused_at(f"[gym] {key}:"):
+            value = formula(self._numbers)
+        if not math.isfinite(value):
+            raise SolverError(f"{key} = {quote(getattr(self.gym, key))} is {value} at t = {self.run.time:.6g} s")
+        return value
+
+    def _holds(self, key, condition):
         """True if a condition is given and holds."""
-        return condition is not None and bool(condition(self._numbers))
+        return condition is not None and bool(self._value(key, condition))
 
     def render(self) -> NDArray[np.uint8] | None:
         """The image of the present state, shape (height, width, 3); None without a render mode."""

@@ -88,8 +88,9 @@ class Gym(Table):
     paths of inputs and draws, such as ``load.0.force[2]``. A comparison within a sum counts as 1 or 0. An episode is
     truncated at the end of the duration, and terminated where an event stops the run.
 
-    A run that fails, since the solver refuses to go on, energy drifts or the reward is not finite, terminates the
-    episode with the last observation, the reward ``failure_reward`` and the message as ``failure`` of the info.
+    A run that fails, since the solver refuses to go on, energy drifts, or the reward is not finite or an end compares
+    what has no value, terminates the episode with the last observation, the reward ``failure_reward`` and the message
+    as ``failure`` of the info.
 
     Parameters
     ----------
@@ -175,11 +176,16 @@ class Gym(Table):
     def formulas(self, observables: Sequence[str]) -> list[Formula | None]:
         """Reward and conditions of the two ends, to be evaluated with numbers by name."""
         names = [TIME, *self.inputs, *self.draw, *observables, *(f"{name}{BEFORE}" for name in observables)]
+        drawn = {path: given[0] for path, given in self.draw.items() if not hasattr(given, "_fields")}
+        inputs = {path: low.tolist() for path, (low, _) in self.bounds.items() if len(low) > 1}
+        typical = {**dict.fromkeys(names, 1.0), **drawn, **inputs}
         formulas: list[Formula | None] = []
         for key in ("reward", "terminated", "truncated"):
             given = getattr(self, key)
             with refused_at(f"{key}:"):
                 formulas.append(None if given is None else Formula(given, names, None if key == "reward" else True))
+                if given is not None:
+                    formulas[-1].check_types(typical)
         return formulas
 
     def drawn(self, generator: np.random.Generator, draws: dict[str, Any] | None = None) -> dict[str, Any]:

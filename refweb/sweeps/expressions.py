@@ -19,6 +19,7 @@ Operators and `FUNCTIONS` are the language of `skip` and `conditions` in study f
 from __future__ import annotations
 
 import ast
+import copy
 import math
 import operator
 import re
@@ -253,23 +254,82 @@ class Formula(Expression):
 
     def __init__(self, text, names, compares=True):
         super().__init__(text, names, compares)
-        tree = ast.fix_missing_locations(ast.Expression(_Floats().visit(self._tree)))
+        tree = ast.fix_missing_locations(ast.Expression(_Plain().visit(copy.deepcopy(self._tree))))
         self._code = compile(tree, "<formula>", "eval")
 
     def __call__(self, values):
-        """Evaluate with numbers by name; NaN where it has no value, as of 1/0 and of the root of −1."""
+        """Evaluate with numbers by name; NaN where it has no value, as 1/0, the root of −1, and a comparison of NaN."""
         names = {alias: values[name] for alias, name in self._aliases.items()}
         try:
             value = eval(self._code, dict(_PLAIN), names)  # of what `_check` has let through alone
+            if isinstance(value, str):
+                raise TypeError
+            return float(value)
         except (ArithmeticError, ValueError):
             return math.nan
         except (TypeError, IndexError):
-            raise InputError(f"{quote(self.text)}: cannot be computed of {_values_text(values, self.used)}") from None
-        return math.nan if isinstance(value, complex) else float(value)
+            raise self._refused(values) from None
+
+    def check_types(self, values):
+        """Refuse vectors and texts where numbers are needed, in all parts, with values by name that have their types.
+
+        Raises
+        ------
+        InputError
+            For them, and for an index out of range.
+        """
+        self._refuse_no_number(self._tree, values)
+
+    def _refuse_no_number(self, node: Any, values):
+        kind = self._kind(node, values)
+        if kind != "a number":
+            raise InputError(f"{quote(self.text)}: {self._written(node)} is {kind}, and must be a number")
+
+    def _kind(self, node: Any, values):
+        """A number, a text or a vector, in words; its parts are checked."""
+        if isinstance(node, ast.Constant | ast.Name):
+            value = node.value if isinstance(node, ast.Constant) else values[self._aliases[node.id]]
+            return _kind_of(value)
+        if isinstance(node, ast.Subscript):
+            entries, index = values[self._aliases[node.value.id]], node.slice.value
+            if not isinstance(entries, list | tuple) or index >= len(entries):
+                raise InputError(
+                    f"{quote(self.text)}: {self._written(node.value)} is {_kind_of(entries)}: no [{index}]"
+                )
+            return _kind_of(entries[index])
+        parts = [part for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr)]
+        parts = parts[1:] if isinstance(node, ast.Call) else parts
+        kinds = {self._kind(part, values) for part in parts}
+        equals = isinstance(node, ast.Compare) and all(isinstance(op, ast.Eq | ast.NotEq) for op in node.ops)
+        if not (equals and len(kinds) == 1):
+            for part in parts:
+                self._refuse_no_number(part, values)
+        return "a number"
+
+    def _written(self, node: Any):
+        """A name or a constant as it is written."""
+        return self._aliases[node.id] if isinstance(node, ast.Name) else ast.unparse(node)
 
 
-class _Floats(ast.NodeTransformer):
-    """Whole numbers as floats, whose powers stay short; indices stay whole."""
+def _kind_of(value):
+    if isinstance(value, list | tuple):
+        return f"a vector of {len(value)}"
+    return "a text" if isinstance(value, str) else "a number"
+
+
+class _Plain(ast.NodeTransformer):
+    """Whole numbers as floats, whose powers stay short; indices stay whole. Parts that have no value raise errors."""
+
+    def visit_BinOp(self, node):
+        """Compute a power by `_real_power`."""
+        self.generic_visit(node)
+        return _call("_power", node.left, node.right) if isinstance(node.op, ast.Pow) else node
+
+    def visit_Compare(self, node):
+        """Compare what is not NaN."""
+        self.generic_visit(node)
+        sides = [_call("_known", side) for side in (node.left, *node.comparators)]
+        return ast.Compare(sides[0], node.ops, sides[1:])
 
     def visit_Subscript(self, node):
         """Leave an index as it is."""
@@ -280,8 +340,26 @@ class _Floats(ast.NodeTransformer):
         return ast.Constant(float(str(node.value))) if type(node.value) is int else node
 
 
+def _call(name, *arguments):
+    return ast.Call(ast.Name(name, ast.Load()), list(arguments), [])
+
+
+def _known_value(value):
+    if value != value:
+        raise ArithmeticError
+    return value
+
+
+def _real_power(base, exponent):
+    value = base**exponent
+    if isinstance(value, complex):
+        raise ArithmeticError
+    return value
+
+
 _PLAIN = {"__builtins__": {}, "abs": abs, "sqrt": math.sqrt, "min": min, "max": max}
-"""`FUNCTIONS` of plain numbers."""
+_PLAIN |= {"_known": _known_value, "_power": _real_power}
+"""`FUNCTIONS` of plain numbers, and what `_Plain` calls."""
 
 
 def _with_short(names):

@@ -190,6 +190,8 @@ TAUT = {"kind": "inline", "points": [[0, 0, 0], [0.5, 0, 0]], "lines": [[0, 1]],
 COARSE = {"kind": "dynamic", "duration": 5.0, "safety": 1.0}
 FAILURES = [
     ({"reward": "1/(time < 0.15)"}, {}, "reward = .* is nan at t = 0.2 s"),
+    ({"terminated": "x/(time < 0.15) > 1e9"}, {}, "terminated = .* is nan at t = 0.2 s"),
+    ({"truncated": "not sqrt(0.15 - time) < 5"}, {}, "truncated = .* is nan at t = 0.2 s"),
     ({}, {"web": TAUT, "solve": COARSE}, "energy drift"),  # a spring in steps of the length of its stability
 ]
 
@@ -400,6 +402,15 @@ WRONG = [
     ({"reward": "x.__class__"}, "reward: .* is not known here"),
     ({"reward": "x +"}, "is not a condition|is not a number"),
     ({"terminated": "x"}, "compares nothing"),
+    ({"reward": "load.0.force"}, "reward: .* load.0.force is a vector of 3, and must be a number"),
+    ({"reward": "x > 1 and -load.0.force"}, "load.0.force is a vector of 3, and must be a number"),
+    ({"reward": "'abc'"}, "reward: .* 'abc' is a text, and must be a number"),
+    ({"reward": "min(x, 'abc')"}, "'abc' is a text"),
+    ({"reward": "x*load.0.force[3]"}, r"load.0.force is a vector of 3: no \[3\]"),
+    ({"terminated": "x[0] > 1"}, r"terminated: .* x is a number: no \[0\]"),
+    ({"truncated": "load.0.force > 1"}, "truncated: .* load.0.force is a vector of 3"),
+    ({"terminated": "load.0.force == 1"}, "load.0.force is a vector of 3"),
+    ({"reward": "x + cable.law", "draw": {"cable.law": ["linear", "tension-only"]}}, "cable.law is a text"),
     ({"period": 0.15, "draw": {}}, "period = 0.15: t = 0.15 s is not the time of a history row"),
     ({"draw": {"velocity.0.value.0": {"from": 0.0, "to": 1.0, "count": 3}}}, "count = 3 has no meaning: an"),
     ({"draw": {"velocity.4.value": [1.0]}}, "draw: velocity.4"),
@@ -413,6 +424,20 @@ def test_wrong_tables(task, message):
     with pytest.raises(InputError, match=message) as error:
         scene(task, output={"interval": 0.1}).build()
     assert str(error.value).startswith("[gym] ") and "\n" not in str(error.value)
+
+
+def test_values_of_an_episode_of_another_type_are_refused_with_file_table_and_key(tmp_path):
+    """As of a value that may be a number or a table."""
+    import tomli_w
+
+    file = tmp_path / "one.toml"
+    given = scene({"reward": "x*point_mass.0.mass", "draw": {"point_mass.0.mass": [1.0, 2.0]}}).to_dict()
+    file.write_text(tomli_w.dumps(given), encoding="utf-8")
+    env = SceneEnv(file)
+    env.reset()
+    env._values = {"point_mass.0.mass": "1"}
+    with pytest.raises(InputError, match=r"one.toml: \[gym\] reward: .* cannot be computed of point_mass.0.mass"):
+        env.step(np.ones(1))
 
 
 def test_wrong_scenes():
