@@ -421,7 +421,8 @@ class Control(Table):
     ``gravity.acceleration``, ``body.NAME.axle.torque``, of a winch ``winch.N.speed``, ``limit``, ``tension`` or
     ``power``, whichever the scene gives, or the rate of a table, ``reel.N.rate`` of the factor [1/s],
     ``motion.N.velocity``, ``motion.N.angular_velocity``. N counts from 0. Laws give vectors along x, y and z; a load
-    with ``axes = "body"`` has the same vector at the measurement, and turns with its body until the next.
+    with ``axes = "body"`` has the same vector at the measurement, and turns with its body until the next. A tension
+    below 0 is set to 0, which counts as a limit.
 
     The run says the integral over time of the size of the value; for a load it is that of the force on one node.
     ``quantity = "fuel"`` and ``"delta_v"`` of ``[[observe]]`` have it over time. A reel stops at a hundredth of its
@@ -431,7 +432,7 @@ class Control(Table):
     the shortest rotation to the target, and its rate is an angular velocity; laws get ``value`` = 0 and ``target`` = e.
 
     With the error e = target − measured and its rate e', "pid" gives proportional · e + integral · ∫e dt + derivative
-    · e'; the integral waits while the limit acts. "sliding-mode" gives strength · s/width, at most strength, with the
+    · e'; the integral waits while a limit acts. "sliding-mode" gives strength · s/width, at most strength, with the
     surface s = e' + slope · e. "bang-bang" gives strength with the sign of e + e' abs(e') mass/(2 strength), which
     brings a mass to its target in least time. "spin-up" gives strength · (1 − measured/target), the torque of a hub.
     "station-keeping" gives proportional · e + derivative · e' where the size of e is above ``dead_band``, else 0.

@@ -406,6 +406,7 @@ MUTANTS = [
         "value, target = np.zeros(3), -rotation_between(",
     ),
     Mutant("dynamics/controllers", "if not edge > 0.0:", "if False:"),
+    Mutant("dynamics/controllers", "value = np.maximum(value, 0.0)", "pass"),
     Mutant("dynamics/controllers", "controller.meters.append(probe.data)", "pass"),
     Mutant("net/quaternions", "np.copysign(angle, w)", "angle"),
     Mutant("effects/body_load", "internal=moment, twists=moment", "internal=moment, twists=False"),

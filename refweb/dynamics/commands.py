@@ -68,7 +68,7 @@ class Command(NamedTuple):
     path : str
         Path of the value, ``load.0.force``; names of effects and keys are those of `INPUTS` and `RATES`.
     value : float or sequence of float
-        The value from then on.
+        The value from then on; a tension below 0 counts as 0.
     """
 
     time: float

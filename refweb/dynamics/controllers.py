@@ -100,6 +100,7 @@ class Controller:
         if name not in known:
             raise InputError(f"sets = {quote(control.sets)}: {quote(name)} has nothing to set, {nearest(name, known)}")
         self._vector = name in VECTORS
+        self._not_negative = name == "winch" and control.sets.endswith(".tension")
         if self._vector and len(control.measures) == 1 and control.direction is None:
             raise InputError(f"direction is missing: {control.sets} is a vector, and measures has one name")
         if not self._vector and (len(control.measures) > 1 or control.direction is not None):
@@ -192,6 +193,8 @@ class Controller:
         asked = value
         if control.angle is not None:
             value = within_cone(value, np.array(control.direction), control.angle)
+        if self._not_negative:
+            value = np.maximum(value, 0.0)
         norm = float(np.linalg.norm(value))
         if control.limit is not None and norm > control.limit:
             value, norm = value * (control.limit / norm), control.limit

@@ -203,7 +203,7 @@ class SteppedRun:
             ``power`` [W], whichever the scene gives; or a rate, ``reel.N.rate`` [1/s] of the factor,
             ``motion.N.velocity`` [m/s], ``motion.N.angular_velocity`` [rad/s] of a body on an axle. N counts from 0.
         value : float or sequence of 3 float
-            The value; a rate continues the present value of the table.
+            The value; a rate continues the present value of the table, and a tension below 0 counts as 0.
 
         Raises
         ------

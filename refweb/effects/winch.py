@@ -37,8 +37,7 @@ _speed, _speeds = real(unit="m/s"), rows(2, increasing=True, unit="m/s")
 @accepts(any_of(_speed.metadata["read"].accepts, _speeds.metadata["read"].accepts))
 def _one_or_table(name, value):
     """Read a speed, or a table of (t, speed)."""
-    listed = hasattr(value, "tolist") or isinstance(value, (list, tuple))
-    return checked(name, value, _speeds if listed else _speed)
+    return checked(name, value, _speeds if isinstance(value, list | tuple | np.ndarray) else _speed)
 
 
 @table
@@ -80,9 +79,9 @@ class Winch(Table):
         Tension at which a winch with ``speed`` slips and pays out [N], as a brake does. A brake alone is a winch of
         ``speed = 0``.
     tension : float, optional
-        Tension that the winch holds [N], at any speed up to ``speed_limit``; at 0 it takes slack in. In statics it
-        holds it whatever length of thread that takes; with ``start = "equilibrium"`` as well, but for one with a
-        ``speed_limit``, which begins as the web is.
+        Tension that the winch holds [N], at any speed up to ``speed_limit``; at 0 it takes slack in, and one below 0
+        that is set during a run counts as 0. In statics it holds it whatever length of thread that takes; with
+        ``start = "equilibrium"`` as well, but for one with a ``speed_limit``, which begins as the web is.
     power : float, optional
         Power that the web gets [W], without the strain energy of what is wound; negative to pay out. The speed is power
         over tension, up to ``speed_limit``. A load that sinks at a constant power goes faster and faster, up to the

@@ -433,14 +433,14 @@ def test_no_tension(method):
 def test_commands():
     """A winch whose power or speed is set goes on like one with a table; balances stay closed; others are refused."""
     solve = {"step_size": 1e-4}
-    run = refweb.start(lifted_scene({"speed": [[0.0, 0.2], [1.0, 0.2]]}, solve, pull=2.0 * G))
-    run.advance(0.2)
-    run.set("winch.0.speed", -0.3)
-    run.advance(0.2)
-    by_hand = run.history
-    table = [[0.0, 0.2], [0.2, 0.2], [0.2 + 1e-9, -0.3]]
-    np.testing.assert_allclose(by_hand["z"], lifted({"speed": table}, solve, pull=2.0 * G)["z"], atol=1e-8)
-    closed(by_hand, 1e-3)
+    table = lifted({"speed": [[0.0, 0.2], [0.2, 0.2], [0.2 + 1e-9, -0.3]]}, solve, pull=2.0 * G)
+    for speed in (0.2, [[0.0, 0.2], [1.0, 0.2]]):
+        run = refweb.start(lifted_scene({"speed": speed}, solve, pull=2.0 * G))
+        run.advance(0.2)
+        run.set("winch.0.speed", -0.3)
+        run.advance(0.2)
+        np.testing.assert_allclose(run.history["z"], table["z"], atol=1e-8)
+        closed(run.history, 1e-3)
     for keys in (solve, {"method": "cvode", "family": "adams", "rtol": 1e-8}):
         run = refweb.start(lifted_scene({"power": 20.0, "speed_limit": 9.0}, keys, pull=2.0 * G))
         run.advance(0.2)
@@ -469,6 +469,21 @@ def test_controlled_tension():
     history = lifted({"tension": 2.0 * G}, solve, pull=2.0 * G, **given)
     assert history["z"][-1] == pytest.approx(0.2, abs=5e-3)
     closed(history, 1e-2)
+
+
+def test_controlled_speed_and_a_tension_that_is_not_below_zero():
+    """A constant speed of a scene is set, w' = k (w* − w) of the length that goes out; a tension below 0 is set to 0."""
+    control = {
+        "name": "hoist", "law": "pid", "parameters": {"proportional": -5.0}, "period": 0.01, "sets": "winch.0.speed",
+        "measures": ["wound"], "target": -0.1,
+    }  # fmt: skip
+    given, solve = {"control": [control], "output": {"interval": 0.01}}, {"step_size": 1e-4}
+    history = lifted({"speed": 0.0}, solve, pull=2.0 * G, **given)
+    rows = np.arange(len(history["wound"]))
+    np.testing.assert_allclose(history["wound"], -0.1 * (1.0 - 0.95**rows), atol=1e-12)
+    control |= {"sets": "winch.0.tension", "parameters": {"proportional": 1.0, "integral": 1e6}, "target": -9.0}
+    solution = refweb.run(lifted_scene({"tension": 2.0 * G}, {**solve, "duration": 0.05}, pull=2.0 * G, **given))
+    assert solution.history["pull"][-1] == pytest.approx(0.0, abs=1e-9) and solution.controls[0]["largest"] == 0.0
 
 
 def test_power_in_statics():
