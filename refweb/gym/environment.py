@@ -142,8 +142,10 @@ class SceneEnv(gymnasium.Env):
         for key in options:
             if key not in OPTIONS:
                 raise InputError(f"options: {quote(key)} is none, {nearest(key, OPTIONS)}")
-        draws = read_parameters("draw", options["draw"]) if options.get("draw") else None
-        values = {**self.gym.drawn(self.np_random, draws), **(options.get("set") or {})}
+        draws, given = options.get("draw"), options.get("set") or {}
+        draws = self.gym.draw if draws is None else draws and read_parameters("draw", draws)
+        self.gym.refuse_paths(draws, "options:", given)
+        values = {**self.gym.drawn(self.np_random, draws), **given}
         if values and self._given is None:
             self._given = self.scene.to_dict()
         scene = _with_values(self.scene, self._given, values) if values else self.scene

@@ -64,7 +64,10 @@ def _observations(name, value):
     if isinstance(value, dict):
         value = {key: _bounds(f"{name}: {short(key)}", given) for key, given in value.items()}
     else:
-        value = dict.fromkeys(checked(name, value, _names), (-np.inf, np.inf))
+        names = checked(name, value, _names)
+        if twice := [known for known in names if names.count(known) > 1]:
+            raise InputError(f"{name}: {quote(twice[0])} stands there twice: leave out one of them")
+        value = dict.fromkeys(names, (-np.inf, np.inf))
     return value
 
 
@@ -151,6 +154,22 @@ class Gym(Table):
         for path, drawn in self.draw.items():
             if isinstance(drawn, Range) and drawn.count is not None:
                 raise InputError(f"draw: {path}: count = {drawn.count} has no meaning: an episode draws once")
+
+        self.refuse_paths(self.draw, "draw:")
+
+    def refuse_paths(self, draws: dict[str, Any], where: str, given: dict[str, Any] | None = None) -> None:
+        """Refuse draws of what the agent sets, the table itself, and a vector beside its components; `InputError`."""
+        paths = {**draws, **(given or {})}
+        for path in paths:
+            if path.partition(".")[0] == "gym":
+                raise InputError(f"{where} {short(path)}: [gym] is the same in all episodes: give it in the scene")
+            for whole in paths:
+                if path.startswith(f"{whole}."):
+                    raise InputError(f"{where} {short(path)} is a part of {short(whole)}: give one of them")
+        for path in draws:
+            for part in self.inputs:
+                if f"{path}.".startswith(f"{part}.") or part.startswith(f"{path}."):
+                    raise InputError(f"{where} {short(path)} is set by the agent, by inputs: leave out one of them")
 
     def to_dict(self) -> dict[str, Any]:
         """The table as plain TOML values."""

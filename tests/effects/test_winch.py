@@ -472,7 +472,7 @@ def test_controlled_tension():
 
 
 def test_controlled_speed_and_a_tension_that_is_not_below_zero():
-    """A constant speed of a scene is set, w' = k (w* − w) of the length that goes out; a tension below 0 is set to 0."""
+    """A constant speed of a scene is set, w' = k (w* − w) of the length that goes out; a tension below 0 is 0."""
     control = {
         "name": "hoist", "law": "pid", "parameters": {"proportional": -5.0}, "period": 0.01, "sets": "winch.0.speed",
         "measures": ["wound"], "target": -0.1,

@@ -32,7 +32,7 @@ def scene(task=(), duration=0.5, **tables):
         "supports": {"nodes": [0]},
         "point_mass": [{"node": 1, "mass": MASS}],
         "velocity": [{"node": 1, "value": [0.0, 0.0, 0.0]}],
-        "load": [{"node": 1, "force": [0.0, 0.0, 0.0]}],
+        "load": [{"node": 1, "force": [0.0, 0.0, 0.0]}] * 2,
         "observe": [
             {"name": "x", "quantity": "displacement", "node": 1, "component": "x"},
             {"name": "v", "quantity": "velocity", "node": 1, "component": "x"},
@@ -116,7 +116,7 @@ def test_ends():
 DRAWN = {
     "draw": {
         "velocity.0.value.0": {"from": -0.5, "to": 0.5},
-        "load.0.force.2": [1.0, 2.0],
+        "load.1.force.2": [1.0, 2.0],
         "velocity.0.value.1": {"distribution": "norm", "loc": 0.0, "scale": 0.1},
     }
 }
@@ -149,8 +149,8 @@ def test_draws_are_those_of_studies():
     columns = {path: np.array([draw[path] for draw in draws]) for path in DRAWN["draw"]}
     assert stats.kstest(columns["velocity.0.value.0"] + 0.5, "uniform").pvalue > 0.05
     assert stats.kstest(columns["velocity.0.value.1"] / 0.1, "norm").pvalue > 0.05
-    ones = int((columns["load.0.force.2"] == 1.0).sum())
-    assert set(columns["load.0.force.2"]) == {1.0, 2.0} and stats.binomtest(ones, 400, 0.5).pvalue > 0.05
+    ones = int((columns["load.1.force.2"] == 1.0).sum())
+    assert set(columns["load.1.force.2"]) == {1.0, 2.0} and stats.binomtest(ones, 400, 0.5).pvalue > 0.05
 
 
 def test_options_and_values():
@@ -165,7 +165,10 @@ def test_options_and_values():
     assert env.run.observe("v") == pytest.approx(PERIOD * FORCE / 4.0, rel=1e-8)
     for options, message in [
         ({"draws": {}}, 'options: "draws" is none, did you mean "draw"'),
-        ({"set": {"velocity.7.value": [1, 0, 0]}}, "velocity.7"),
+        ({"set": {"velocity.7.value": [1, 0, 0]}, "draw": {"point_mass.0.mass": [1.0]}}, "velocity.7"),
+        ({"set": {"velocity.0.value": [1, 0, 0]}}, "options: velocity.0.value.0 is a part of velocity.0.value: give"),
+        ({"set": {"gym.reward": "1"}}, "options: gym.reward: [gym] is the same in all episodes"),
+        ({"draw": {"load.0.force.2": [1.0]}}, "options: load.0.force.2 is set by the agent"),
         ({"draw": {"velocity.0.value.0": {"from": 1}}}, "draw: velocity.0.value.0: to is missing"),
     ]:
         with pytest.raises(InputError, match=re.escape(message)):
@@ -392,9 +395,14 @@ WRONG = [
     ({"inputs": {"load.0.force": [2.0, 1.0]}}, "low < high"),
     ({"inputs": {"load.0.force": [1.0]}}, r"must be \[low, high\]"),
     ({"inputs": {"load.0.forc": [0.0, 1.0]}}, 'did you mean "force"'),
-    ({"inputs": {"load.1.force": [0.0, 1.0]}}, '"1" is not the number or name of a'),
+    ({"inputs": {"load.2.force": [0.0, 1.0]}}, '"2" is not the number or name of a'),
     ({"inputs": {"gravity.acceleration": [0.0, 1.0]}}, r"the scene has no \[gravity\]"),
     ({"observations": []}, "observations is empty"),
+    ({"observations": ["x", "v", "x"]}, 'observations: "x" stands there twice'),
+    ({"draw": {"gym.reward": ["x"]}}, "draw: gym.reward: .gym. is the same in all episodes"),
+    ({"draw": {"load.0.force.2": [1.0]}}, "draw: load.0.force.2 is set by the agent"),
+    ({"draw": {"load.0.force": [[1.0, 0.0, 0.0]]}}, "draw: load.0.force is set by the agent"),
+    ({"draw": {"velocity.0.value.0": [1.0], "velocity.0.value": [[0.0, 0.0, 0.0]]}}, "value.0 is a part of velocity"),
     ({"observations": ["z"]}, 'observations: "z" is not an observable'),
     ({"observations": {"x": [1.0, 0.0]}}, "low < high"),
     ({"reward": "x + z"}, 'reward: "x . z": "z" is not known here'),
