@@ -272,6 +272,7 @@ class Inputs:
             return name, number, self._with_rate(name, effect, key, command.value, t)
         keys = [*INPUTS.get(name, ()), *RATES.get(name, {})]
         if key not in keys:
+            keys = [key for key in keys if name != "winch" or getattr(effect, key) is not None]
             raise InputError(f"{quote(key)} is not a key of [{name}] that a command may set, {nearest(key, keys)}")
         if name == "winch":
             return name, number, effect.commanded(key, _finite(command.value, 1)[0])

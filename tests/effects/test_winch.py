@@ -453,6 +453,7 @@ def test_commands():
         ("winch.0.tension", 3.0, "tension is not a key of this winch in the scene, which has power"),
         ("winch.0.power", "much", "must be a finite number"),
         ("winch.0.end", 3.0, '"end" is not a key of \\[winch\\] that a command may set'),
+        ("winch.0.speed_limit", 3.0, "a command may set, known: power"),
     ):
         with pytest.raises(refweb.InputError, match=text):
             run.set(path, value)
