@@ -193,7 +193,7 @@ def with_reason(system, t, error, remedy="", tangents=True):
     if (system.net.threads or system.net.wound) and error.x is not None:
         from .thread_reasons import reason_of
 
-        if (reason := reason_of(system, error.x, tangents)) is not None:
+        if (reason := reason_of(system, t, error.x, tangents)) is not None:
             return NotFound(f"no equilibrium found at step {t:g}: {reason}", error.stats)
     if system.contact and error.x is not None and (kink := kink_remark(system, error.x, remedy)) is not None:
         return NotFound(f"no equilibrium found at step {t:g}: {kink}", error.stats)

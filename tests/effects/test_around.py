@@ -110,6 +110,18 @@ def test_atwood_over_a_drum(method):
     agrees(run.results["pull"], pull, pull)
 
 
+@pytest.mark.parametrize("lighter", [0, 1])
+@pytest.mark.parametrize("share", [0.0, 1e-3, 0.03, 0.5])
+def test_unequal_loads_over_a_drum(lighter, share):
+    """In statics the thread slides until the lighter end is at the drum, whichever end that is, and however light."""
+    masses = {lighter: share, 1 - lighter: 1.0}
+    rope = {"nodes": [0, "drum", 1], "around": [OVER]}
+    given = scene([[-R, 0, -1.0], [R, 0, -1.0]], [], rope, DRUM | {"fixed": True}, {"kind": "static"}, masses)
+    text = f'end, node {lighter}, is at body "drum": the load at node {1 - lighter} is more than that end can hold'
+    with pytest.raises(refweb.SolverError, match=text):
+        refweb.run(given)
+
+
 @pytest.mark.ordinary("ida", "adams", "central-difference", "order *")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_load_unwinds_a_drum(method):

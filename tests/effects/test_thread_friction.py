@@ -100,6 +100,24 @@ def test_capstan():
     assert 0.0 < slips[0] < slips[1] < slips[2]
 
 
+def over_an_arch(load):
+    """A thread with friction over 20 rings of half a circle, with 1 kg at its first end and a load at its last."""
+    turn = np.linspace(np.pi, 0.0, 20)[:, None]
+    points = np.vstack([[-1, 0, -2], np.hstack([np.cos(turn), 0.0 * turn, np.sin(turn)]), [1, 0, -2]])
+    nodes = list(range(22))
+    rope = {"nodes": nodes, "friction": 0.2, "modulus": 1e8}
+    return scene(
+        points.tolist(), nodes[1:-1], rope, {"kind": "static"}, {0: 1.0, 21: load},
+        gravity={"acceleration": [0.0, 0.0, -G]},
+    )  # fmt: skip
+
+
+def test_a_load_just_beyond_the_capstan():
+    """As one far beyond: by a share of 1e-5 above the limit."""
+    with pytest.raises(refweb.SolverError, match="node 0, is at node 1: the load at node 21 is more than that end and"):
+        refweb.run(over_an_arch((1.0 + 1e-5) * np.exp(0.2 * np.pi)))
+
+
 @pytest.mark.parametrize("friction", [{}, {"friction": 0.3}])
 def test_a_load_beyond_the_capstan(friction):
     """The thread runs through; the message names the end that is pulled to its ring, and the load."""
