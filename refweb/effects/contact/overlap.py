@@ -26,6 +26,9 @@ one for all lines at a node in place of their ends, with (1 − 2 ξ)²     0.00
 ∫ δ² ds along all lines, which is another law of depth, of power 1.5   0
 =====================================================================  ==================================
 
+A line that turns by an angle θ round an edge with r θ < 2 L is pushed along by θ/4 (1 − r θ/(2 L))² of the push on
+average, whatever the stiffness, see `refweb.statics.sharp_edges`, which statics asks.
+
 Keys of `plain` stand in ``run.json``, `runner` reads the stiffness of `too_soft`, and `line_body_ccd` uses `CORE`.
 """
 
@@ -296,11 +299,16 @@ class Overlaps:
         True in dynamics, where bodies have energy; False in statics, where they are pushed.
     pairs : refweb.effects.contact.pair_overlap.PairOverlaps, optional
         Contacts of bodies with bodies, if there are any.
+
+    Attributes
+    ----------
+    edges : dict of str to refweb.statics.sharp_edges.Edge
+        Edges of bodies by name that are sharp for the elements, in the last equilibrium.
     """
 
     def __init__(self, scene, system, moving, pairs=None):
         self.system, self._chosen, self._moving = system, scene.chosen, moving
-        self._contact = scene.contact
+        self._contact, self.edges = scene.contact, {}
         self._initial = [0.0] * len(system.net.bodies)
         self._laws = [scene.contact.law_of(body) for body in system.net.bodies]
         self._load_steps = getattr(scene.solve, "load_steps", ())
@@ -349,6 +357,9 @@ class Overlaps:
         net, body = self.system.net, deepest.body
         if deepest.line is None:
             return
+        if (edge := self.edges.get(body.name)) is not None and edge.share > self._contact.friction_of(body):
+            yield _at_an_edge(body, edge)
+            return
         length = float(net.natural_length[net.line == deepest.line].max())
         share = push_along(body, deepest.overlap, length)
         if share > max(TOLD, self._contact.friction_of(body)):
@@ -370,6 +381,23 @@ class Overlaps:
             yield from self._pushed_along(deepest)
         if self.pairs is not None:
             yield from self.pairs.remarks()
+
+
+def _at_an_edge(body, edge):
+    """Finding on a push along a line at a sharp edge, see `refweb.statics.sharp_edges`."""
+    enough = edge.enough(TOLD)
+    key = next((key for key in ("rounding", "radius") if hasattr(body.shape, key)), None)
+    needed = rounded_up(enough * edge.length)
+    larger = "" if key is None or needed > size_of(body) else f"a {key} of at least {needed:.2g} m, or "
+    return Finding(
+        "push-along-lines",
+        f'line {edge.line} turns by {math.degrees(edge.angle):.3g}° at an edge of body "{body.name}" with a radius of '
+        f"{edge.radius:.3g} m, which is sharp for elements of {edge.length:.3g} m: contact may push along the line by "
+        f"{100.0 * edge.share:.2g} % of its push on average, by where nodes are, to which no ± is open and which does "
+        f"not fall with the stiffness; {larger}elements of at most {edge.radius / enough:.2g} m make that less than "
+        f"{100.0 * TOLD:g} %",
+        "contact",
+    )
 
 
 def first_stiffness(system, body, exponent, load_steps=()):

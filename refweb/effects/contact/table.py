@@ -85,6 +85,11 @@ class Contact(Table):
     does not contain this error: a finding reports it if it is above 5 % and above friction. More elements,
     ``subdivide``, and a larger stiffness reduce it.
 
+    Straight elements cannot bend round an edge. Where a line turns by an angle θ round one of radius r, contact pushes
+    along the line by θ/4 (1 − r θ/(2 L))² of the push on average, and by twice this at most, if r θ < 2 L. No stiffness
+    reduces this, but a larger ``rounding`` of the body, or elements that are shorter than r θ/2. Statics has a finding
+    that reports it as above.
+
     A line can only pass through a body by its middle, where the push changes its direction. The penetration check
     follows the depth of every line from the start of a run: before each drift of an explicit step, and on the
     interpolants of cvode and ida. ``passage`` of ``run.json`` is "certified" for ``bodies`` if no line has reached the
