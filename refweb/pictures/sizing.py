@@ -74,7 +74,7 @@ def draw(summary):
         if answer is not None:
             style = {"marker": "*", "color": COLOURS[1], "linestyle": "none", "markersize": 14.0}
             (star,) = axes.plot(*_columns([answer], factor), **style)
-            entries.append((star, "the design" if summary["status"] == "solved" else "the nearest design"))
+            entries.append((star, "the nearest design" if summary["status"] == "infeasible" else "the design"))
         axes.axvline(0.0, color=DARK, linewidth=0.8, linestyle=":")
         label(axes, summary["sizing"]["minimise"], unit)
         legend(axes, entries, columns=2)

@@ -24,6 +24,7 @@ from .problem import Problem
 from .requirements import Sizing, load
 from .runs import Runs
 from .search import BESIDE, best, method_of, searched
+from .smooth import ACTIVE
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -31,7 +32,9 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 GOVERNS = 1e-6
-"""Reserve up to which a requirement governs a design by gradients."""
+"""Difference of reserves up to which a requirement is the tightest."""
+SHOWN = 1e-3
+"""Part of the gradient of the objective up to which the conditions of an optimum hold."""
 
 
 @dataclass(eq=False, repr=False)
@@ -51,14 +54,15 @@ class Sized:
     requirements : list of dict
         Of each requirement ``name``, ``condition``, ``probability``, ``reserve`` over its limit with its ends ``least``
         and ``most``, ``holds`` (true, false or None: undecided), ``governs``, and ``costs``: change of the objective
-        for a limit that is 1 % stricter, None where it is not known.
+        for a limit that is 1 % stricter, None where it is not known or the conditions of an optimum do not hold.
     optimality : dict or None
         By gradients ``residual``, the part of the gradient of the objective that the active requirements and bounds do
         not balance, and ``at_bound``, numbers at a bound.
     designs : list of dict
         All designs that were run: ``values``, ``objective``, ``reserve``, the smallest one, and ``holds``.
-    status : {"running", "solved", "infeasible", "failed", "interrupted"}
-        "infeasible" if no design meets all requirements; ``values`` are those of the design that is nearest to it.
+    status : {"running", "solved", "unconfirmed", "infeasible", "failed", "interrupted"}
+        "unconfirmed" if the design meets all requirements, but by gradients the conditions of an optimum do not hold,
+        so that a better one may exist; "infeasible" if no design meets all requirements; ``values`` are those of the design that is nearest to it.
     message : str
         Reason for another status than "solved".
     method : str
@@ -189,21 +193,36 @@ def _conclude(sized, runs, judged, optimum, spent):
     unit = {item.name: item.unit for item in results_among(judged.rows[0])}.get(sized.sizing.minimise, "")
     sized.values = runs.problem.space.values(judged.design)
     sized.objective = {"value": judged.value, "error": 0.5 * (high - low), "unit": unit}
-    sized.requirements = [_requirement(*row, runs, judged, optimum) for row in enumerate(runs.problem.requirements)]
+    shown = optimum if optimum is not None and optimum.residual <= SHOWN else None
+    sized.requirements = [
+        _requirement(*row, runs, judged, shown, sized.method) for row in enumerate(runs.problem.requirements)
+    ]
     *_, sized.scene = runs.problem.space.scene(judged.design)
     sized.scene = sized.scene.replace(title=f"{sized.title}: design"[:200])
     if judged.feasible is not True:
         sized.status, sized.message = "infeasible", _nearest(sized)
-    elif optimum is not None:
-        sized.optimality = {"residual": optimum.residual, "at_bound": optimum.bounds}
+    else:
+        if optimum is not None:
+            sized.optimality = {"residual": optimum.residual, "at_bound": optimum.bounds}
+        if shown is None and sized.method == "gradients":
+            sized.status, sized.message = "unconfirmed", _unconfirmed(optimum)
     _add_notes(sized, runs, judged)
 
 
-def _requirement(number, name, runs, judged, optimum):
+def _unconfirmed(optimum):
+    """Text on a design by gradients at which the conditions of an optimum do not hold."""
+    known = "are not known" if optimum is None else f"hold to {optimum.residual:.1e} alone"
+    kink = "the search may have ended at a kink, where two lines share a largest value"
+    return f'conditions of an optimum {known}: {kink}; a better design may exist: try more starts or "evolution"'
+
+
+def _requirement(number, name, runs, judged, optimum, method):
     """Entry of a requirement."""
     given, reserve = runs.problem.sizing.requirements[name], judged.reserves[number]
     multiplier = None if optimum is None else optimum.multipliers.get(name, 0.0)
     tightest = reserve.low <= judged.tightest + GOVERNS
+    if method == "gradients":
+        tightest = tightest and reserve.low <= ACTIVE
     return {
         "name": name,
         "condition": given.condition,

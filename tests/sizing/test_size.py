@@ -186,6 +186,17 @@ def test_where_no_design_meets_the_requirements(tmp_path, capsys):
     assert json.loads((tmp_path / "s" / "run.json").read_text())["values"]["cable.area"] == pytest.approx(2e-6)
 
 
+def test_a_search_that_ends_early_confirms_nothing(tmp_path, capsys):
+    """After one run the stress is far below its limit: nothing governs, no cost is known, and the status says so."""
+    path = write(tmp_path, parameters={"cable.area": {**AREA, "start": 1e-4}}, starts=1, runs=1, trade_off=False)
+    assert main(["size", str(path), "--out", str(tmp_path / "s")]) == 0
+    assert "a better design may exist" in " ".join(capsys.readouterr().out.replace("│", " ").split())
+    found = json.loads((tmp_path / "s" / "run.json").read_text())
+    (strong,) = found["requirements"]
+    assert found["status"] == "unconfirmed" and strong["holds"] and strong["least"] > 0.5
+    assert not strong["governs"] and strong["costs"] is None
+
+
 # Options
 
 
