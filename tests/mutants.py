@@ -804,6 +804,7 @@ MUTANTS = [
     Mutant("sizing/formulas", "_less(a.low, b.high) / scale", "_less(a.low, b.low) / scale"),
     Mutant("sizing/runs", " and run[0].key not in self.rows", ""),
     Mutant("sizing/case", "if gradient.left is None:", "if gradient.left is not gradient:"),
+    Mutant("sizing/smooth", "value - point.wide[part]", "value"),
     Mutant("sizing/case", "-allowed / stress**2 * slope", "allowed / stress**2 * slope"),
     Mutant(
         "sizing/search",

@@ -10,6 +10,8 @@ import re
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from ..errors import InputError, SolverError
 
 SIZES = {"cable_mass": "kg", "net_mass": "kg", "total_mass": "kg", "cable_length": "m", "packed_volume": "m³"}
@@ -22,6 +24,8 @@ QUANTITIES = (*SIZES, *STRENGTH, *(f"frequency_{n}" for n in range(1, 11)))
 """Names that every scene has besides its results."""
 GOVERNING = "stress of the smallest margin"
 """Name of the stress that margin and utilisation follow from."""
+NEAR, MOST = 0.3, 16
+"""Distance to the largest value, over it, within which lines have derivatives of their own, and their number."""
 STEP = 1e-3
 """Step of a difference of a size over its number: sizes are polynomials of low degree, or close to them."""
 
@@ -29,6 +33,11 @@ STEP = 1e-3
 def slope_of(name, path):
     """Column of the derivative of a result by the number at a path."""
     return f"{name} by {path}"
+
+
+def of_line(name, line):
+    """Column of the value of a line, for a result that is the largest of lines."""
+    return f"{name} of line {line}"
 
 
 class Task(NamedTuple):
@@ -68,9 +77,13 @@ class Task(NamedTuple):
         for path, number in self.numbers if sizes else ():
             by_difference = _by_difference(scene, path, number)
             slopes |= {slope_of(n, path): by_difference[n] for n in sizes}
+        if self.numbers:
+            slopes |= _of_lines(scene, solution, self.results, self.numbers)
         governing = _Governing(scene, solution, summary) if strength and self.numbers else None
         for name, (path, _) in itertools.product(self.results, self.numbers):
             try:
+                if slope_of(name, path) in slopes:
+                    continue
                 if name in observed:
                     gradient = solution.gradient(name, path)
                     if gradient.left is None:  # at a kink those by several paths have no sum
@@ -80,6 +93,45 @@ class Task(NamedTuple):
             except (InputError, SolverError):
                 continue
         return slopes
+
+
+def _of_lines(scene, solution, names, numbers):
+    """Values and derivatives of the lines close to the largest one, whose derivatives are those of the result."""
+    from ..results.observables.line import Strain, Stress, Tension
+    from ..results.observables.observe import Observe
+    from ..statics.gradients import Gradients
+
+    cells, near, net = {}, {}, solution.state.system.net
+    for observe in scene.observables:
+        if observe.name not in names or observe.select not in (None, "max") or observe.part is not None:
+            continue
+        if type(observe.observable) in (Strain, Stress, Tension):
+            elements = observe.observable.elements(net)
+            values = observe.observable.values(solution.state)[elements]
+            largest = np.full(len(net.web.lines), -np.inf)
+            np.maximum.at(largest, net.line[elements], values)
+            order = np.argsort(-largest, kind="stable")[:MOST]
+            lines = order[largest[order] >= largest.max() - NEAR * abs(largest.max())]
+            near[observe.name] = [
+                (float(largest[n]), Observe(name=of_line(observe.name, n), quantity=observe.quantity, line=int(n)))
+                for n in lines
+            ]
+    observed = scene.replace(observe=(*scene.observables, *(o for lines in near.values() for _, o in lines)))
+    gradients = Gradients(replace(solution, scene=observed)) if near else None
+    for name, lines in near.items():
+        try:
+            of_name = {}
+            for value, observe in lines:
+                slopes = {path: gradients.gradient(observe.name, path) for path, _ in numbers}
+                if all(slope.left is None for slope in slopes.values()):
+                    of_name[observe.name] = value
+                    of_name |= {slope_of(observe.name, path): float(slope) for path, slope in slopes.items()}
+            first = lines[0][1].name
+            if first in of_name:
+                cells |= of_name | {slope_of(name, path): of_name[slope_of(first, path)] for path, _ in numbers}
+        except (InputError, SolverError):
+            continue
+    return cells
 
 
 def sizes_of(system):

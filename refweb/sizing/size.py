@@ -62,7 +62,8 @@ class Sized:
         All designs that were run: ``values``, ``objective``, ``reserve``, the smallest one, and ``holds``.
     status : {"running", "solved", "unconfirmed", "infeasible", "failed", "interrupted"}
         "unconfirmed" if the design meets all requirements, but by gradients the conditions of an optimum do not hold,
-        so that a better one may exist; "infeasible" if no design meets all requirements; ``values`` are those of the design that is nearest to it.
+        so that a better one may exist; "infeasible" if no design meets all requirements, where ``values`` are those of
+        the design that is nearest to it.
     message : str
         Reason for another status than "solved".
     method : str

@@ -7,8 +7,10 @@ bounds has multipliers λ ≥ 0 with
 
 (Karush, Kuhn and Tucker), where bounds have multipliers as well. `refweb.sizing.sqp` finds it.
 
-Derivatives are those of the adjoint. One that no adjoint gives, as that of a frequency or of a largest value that two
-lines share, is a difference of runs.
+Derivatives are those of the adjoint. One that no adjoint gives, as that of a frequency, is a difference of runs.
+
+A largest value has a kink where two lines share it. A condition that this value is below a limit is one for each line
+that is close to it, and each of these is smooth.
 """
 
 from __future__ import annotations
@@ -18,25 +20,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .case import slope_of
+from .case import of_line, slope_of
 from .runs import middle
 from .space import Design
 from .sqp import minimise
 
 INSIDE = 1e-9
-"""Distance that reserves keep from 0, so that a requirement holds for the whole ±, which is added twice."""
+"""Distance that the lower ends of reserves keep from 0."""
 STEP = 1e-4
 """Step of differences of runs, over the range."""
 PRECISE, BY_DIFFERENCES, NEAR = 1e-11, 1e-6, 1e-5
 """Lengths of steps, over ranges, at which a search ends: by adjoints, by differences, and where none is feasible."""
 ACTIVE = 1e-5
 """Reserve below which a requirement counts as active, and distance of a fraction to a bound."""
-NEARBY = 1e-2
-"""Violation, over its limit, above which another search from the same place is of no use."""
 ROUNDED = 1e-12
 """Distance of a fraction to a bound that is one of rounding."""
 FARTHEST = 1e3
-"""Largest violation of a requirement, over its limit, that is looked for."""
+"""Largest violation of a requirement, over its limit, that is looked for, and reserve of lines that are not close."""
 
 
 class Optimum(NamedTuple):
@@ -61,13 +61,16 @@ class Optimum(NamedTuple):
 
 
 class Point(NamedTuple):
-    """A design: objective over its size with gradient, reserves (parts,) with gradients (parts, n), half widths."""
+    """A design: objective over its size with gradient, reserves and their half widths (parts,), and constraints.
+
+    ``rows`` has a value and a gradient (n,) by the number of a part and by its line, or None for all.
+    """
 
     f: float
     df: np.ndarray
     r: np.ndarray
-    dr: np.ndarray
     wide: np.ndarray
+    rows: dict[tuple[int, int | None], tuple[float, np.ndarray]]
 
 
 class Smooth:
@@ -85,6 +88,7 @@ class Smooth:
         self.runs, self.options, self.problem = runs, options, runs.problem
         self.count, self.size, self.coarse, self._points = len(self.problem.space.free), None, False, {}
         self.parts = [name for name, f in self.problem.requirements.items() for _ in f.parts]
+        self._keys = {(n, None): n for n in range(len(self.parts))}
 
     def design(self, u):
         """The design at some fractions, which are 0 or 1 at a bound but for rounding."""
@@ -100,10 +104,9 @@ class Smooth:
     def _computed(self, design):
         (judged,) = self.runs.of([design], slopes=True)
         if not math.isfinite(judged.value):
-            zeros = np.zeros((len(self.parts), self.count))
-            return Point(
-                math.inf, zeros[0] if len(zeros) else np.zeros(self.count), -np.ones(len(zeros)), zeros, zeros[:, 0]
-            )
+            none, count = np.zeros(self.count), len(self.parts)
+            rows = {(n, None): (-1.0, none) for n in range(count)}
+            return Point(math.inf, none, -np.ones(count), np.zeros(count), rows)
         values, row = self.runs.values_of(judged), judged.rows[0]
         numbers = {name: middle(v) if isinstance(v, tuple) else v for name, v in values.items()}
         slopes = {name: self._slope(name, row, design) for name in self.problem.results}
@@ -114,13 +117,53 @@ class Smooth:
         self.coarse = self.coarse or bool(lacking)
         ((f, df),) = self.problem.objective.slopes(numbers, slopes)
         self.size = self.size or abs(f) or 1.0
-        r, dr, wide = [], [], []
+        r, wide, rows, lines = [], [], {}, self._lines(row, design)
         for formula in self.problem.requirements.values():
-            for (value, slope), reserve in zip(formula.slopes(numbers, slopes), formula.reserves(values), strict=True):
+            each = self._by_line(formula, numbers, slopes, lines)
+            pairs = zip(formula.slopes(numbers, slopes), formula.reserves(values), strict=True)
+            for part, ((value, slope), reserve) in enumerate(pairs):
+                near = {line: found[part] for line, found in each.items()}
+                if not near or min(v for v, _ in near.values()) < value - ROUNDED * (1.0 + abs(value)):
+                    near = {None: (value, slope)}
+                rows |= {(len(r), line): (v, np.zeros(self.count) + dv) for line, (v, dv) in near.items()}
                 r.append(value)
-                dr.append(np.zeros(self.count) + slope)
                 wide.append(max(value - reserve.low, 0.0))
-        return Point(f / self.size, (np.zeros(self.count) + df) / self.size, np.array(r), np.array(dr), np.array(wide))
+        df = (np.zeros(self.count) + df) / self.size
+        return Point(f / self.size, df, np.array(r), np.array(wide), rows)
+
+    def _lines(self, row, design):
+        """{Line: (value, gradient)} by result, of lines whose value is close to the largest."""
+        lines = {}
+        for name in self.problem.results:
+            head = of_line(name, "")
+            at = [key.removeprefix(head) for key in row if key.startswith(head) and key.removeprefix(head).isdecimal()]
+            known = {
+                int(n): (row[head + n], self._slope(head + n, row, design)) for n in at if row[head + n] is not None
+            }
+            if known:
+                lines[name] = known
+        return lines
+
+    def _by_line(self, formula, numbers, slopes, lines):
+        """Value and gradient of each part by line, of a formula that holds one largest value."""
+        names = formula.used & lines.keys()
+        if len(names) != 1:
+            return {}
+        (name,) = names
+        return {
+            line: formula.slopes(numbers | {name: value}, slopes | {name: slope})
+            for line, (value, slope) in lines[name].items()
+        }
+
+    def _constraints(self, point, kept):
+        """Lower ends above the reserves that are kept, and gradients, of all lines that were close so far."""
+        for key in point.rows:
+            self._keys.setdefault(key, len(self._keys))
+        r, dr = np.full(len(self._keys), FARTHEST), np.zeros((len(self._keys), self.count))
+        for (part, line), (value, slope) in point.rows.items():
+            at = self._keys[part, line]
+            r[at], dr[at] = value - point.wide[part] - kept[part], slope
+        return r, dr
 
     def _slope(self, name, row, design):
         """Gradient of a result by fractions, None where the row lacks one."""
@@ -152,40 +195,34 @@ class Smooth:
         """Least design from a start, with reserves of at least ``reserve``; the fractions."""
         u, kept = np.array(u, float), np.full(len(self.parts), reserve + INSIDE)
         self.at(u)
-        for _ in range(3):
-            u = minimise(
-                lambda u, kept=kept: (self.at(u).f, self.at(u).df, self.at(u).r - kept, self.at(u).dr),
-                u,
-                np.zeros(self.count),
-                np.ones(self.count),
-                BY_DIFFERENCES if self.coarse else PRECISE,
-            )
-            lacking = reserve + INSIDE - (self.at(u).r - self.at(u).wide)
-            if not INSIDE <= lacking.max(initial=0.0) <= NEARBY:
-                break
-            kept = kept + 2.0 * np.maximum(lacking, 0.0)
-        return u
+        return minimise(
+            lambda u: (self.at(u).f, self.at(u).df, *self._constraints(self.at(u), kept)),
+            u,
+            np.zeros(self.count),
+            np.ones(self.count),
+            BY_DIFFERENCES if self.coarse else PRECISE,
+        )
 
     def nearest(self, u):
         """Design whose largest violation is least, from a start: t is least with r + t ≥ 0; the fractions."""
-        ones = np.ones((len(self.parts), 1))
 
         def functions(ut):
-            point = self.at(ut[:-1])
-            return ut[-1], np.eye(self.count + 1)[-1], point.r + ut[-1], np.hstack([point.dr, ones])
+            r, dr = self._constraints(self.at(ut[:-1]), np.zeros(len(self.parts)))
+            return ut[-1], np.eye(self.count + 1)[-1], r + ut[-1], np.hstack([dr, np.ones((len(r), 1))])
 
         start = np.append(u, max(-self.at(u).r.min(), 0.0))
         lower, upper = np.append(np.zeros(self.count), -1.0), np.append(np.ones(self.count), FARTHEST)
         return minimise(functions, start, lower, upper, NEAR)[:-1]
 
-    def _multipliers(self, u, kept):
+    def _multipliers(self, u):
         """(Multipliers of all parts, those of bounds, what they leave of the gradient over its size)."""
         from scipy.optimize import nnls
 
         point = self.at(u)
+        r, dr = self._constraints(point, np.full(len(self.parts), INSIDE))
         sides = np.where(u <= ACTIVE, 1.0, np.where(u >= 1.0 - ACTIVE, -1.0, 0.0))
-        at_bound, active = np.flatnonzero(sides), np.flatnonzero(point.r - kept <= ACTIVE)
-        normals = np.vstack([point.dr[active].reshape(-1, self.count), (np.eye(self.count) * sides)[at_bound]])
+        at_bound, active = np.flatnonzero(sides), np.flatnonzero(r <= ACTIVE)
+        normals = np.vstack([dr[active].reshape(-1, self.count), (np.eye(self.count) * sides)[at_bound]])
         scale = np.linalg.norm(normals, axis=1)
         scale[scale == 0.0] = 1.0
         solved, left = (
@@ -193,12 +230,13 @@ class Smooth:
         )
         solved = solved / scale
         multipliers, of_bounds = np.zeros(len(self.parts)), np.zeros(self.count)
-        multipliers[active], of_bounds[at_bound] = solved[: len(active)], solved[len(active) :]
+        np.add.at(multipliers, np.array([part for part, _ in self._keys])[active], solved[: len(active)])
+        of_bounds[at_bound] = solved[len(active) :]
         return multipliers, of_bounds, float(left / (np.linalg.norm(point.df) or 1.0))
 
     def optimum(self, u):
         """The `Optimum` at some fractions."""
-        multipliers, of_bounds, residual = self._multipliers(u, np.full(len(self.parts), INSIDE))
+        multipliers, of_bounds, residual = self._multipliers(u)
         by_name, at_bound = {}, {}
         for name, value in zip(self.parts, multipliers, strict=True):
             if value > 0.0:

@@ -36,7 +36,8 @@ def minimise(functions, x, lower, upper, tolerance):
     Parameters
     ----------
     functions : callable
-        Returns at x (f, its gradient (n,), constraints r ≥ 0 (m,), their gradients (m, n)).
+        Returns at x (f, its gradient (n,), constraints r ≥ 0 (m,), their gradients (m, n)). Later
+        points may have further constraints behind these.
     x, lower, upper : ndarray, shape (n,)
         Start and bounds.
     tolerance : float
@@ -125,7 +126,7 @@ def _updated(curvature, step, at, after, multipliers):
     """B of BFGS after a step, with Powell's damping; as it is where the functions have no values."""
     if not math.isfinite(after[0]):
         return curvature
-    change = after[1] - at[1] - (after[3] - at[3]).T @ multipliers
+    change = after[1] - at[1] - (after[3][: len(multipliers)] - at[3]).T @ multipliers
     along = curvature @ step
     old, new = step @ along, step @ change
     if new < CURVED * old:

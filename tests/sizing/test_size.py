@@ -166,6 +166,36 @@ def test_a_spinning_arm_as_fast_as_its_root_bears(start, tmp_path):
     assert found.values["omega"] == pytest.approx(exact, rel=1e-8) and found.optimality["residual"] < 1e-9
 
 
+CHAIN = {
+    **BARS,
+    "web": {
+        "kind": "inline",
+        "points": [[0, 0, 0], [0, 0, -1], [0, 0, -2]],
+        "lines": [[0, 1], [1, 2]],
+        "supports": [0],
+        "groups": {"upper": [0]},
+    },
+    "cable": {**BARS["cable"], "groups": {"upper": {"area": 1e-5}}},
+    "load": [{"node": n, "force": [0.0, 0.0, -LOAD]} for n in (1, 2)],
+}
+
+
+@pytest.mark.parametrize("start", [1e-5, 3e-5])
+def test_where_two_lines_share_the_largest_stress(start, tmp_path):
+    """A chain of two lines with a load at each node is least where both have the stress of the limit.
+
+    The largest stress has a kink there. The limit is met to 1e-9 of it; sizes go as its inverse.
+    """
+    areas = {n: {"paths": [p], **AREA} for n, p in {"upper": "cable.groups.upper.area", "lower": "cable.area"}.items()}
+    areas["upper"]["start"] = start
+    found = sized(tmp_path, tables=CHAIN, parameters=areas, starts=1)
+    assert found.status == "solved" and found.optimality["residual"] < 1e-9
+    assert found.values["upper"] == pytest.approx(2.0 * LOAD / LIMIT, rel=1e-8)
+    assert found.values["lower"] == pytest.approx(LOAD / LIMIT, rel=1e-8)
+    (strong,) = found.requirements
+    assert strong["governs"] and strong["costs"] == pytest.approx(0.01 * found.objective["value"], rel=1e-7)
+
+
 def test_at_a_bound(tmp_path):
     """Mass falls with the area until its bound, where no requirement governs; the bound has the multiplier."""
     found = sized(tmp_path, parameters={"cable.area": {"from": 2e-5, "to": 1e-4}}, starts=1)
@@ -291,19 +321,25 @@ def test_with_a_probability(tmp_path):
 
 
 def test_derivatives_of_a_run():
-    """Those of the adjoint are those of runs; one of two alike lines by a node is left out, as it is a kink."""
+    """Those of the adjoint are those of runs.
+
+    Two alike lines share the largest stress, and have opposite derivatives by the place of the node. That of the pull
+    on the supports is left out, as it is a kink.
+    """
     tables = {
         **BARS,
         "observe": [{"name": "side", "quantity": "stress", "line": 0}, {"name": "most", "quantity": "stress"}],
     }
+    tables["observe"] += [{"name": "pull", "quantity": "reaction", "node": [0, 2], "select": "max"}]
     tables["cable"] = {**BARS["cable"], "strength": 2e8}
     numbers = (("web.points.1.0", 0.0), ("cable.density", DENSITY))
     names = ("cable_mass", "packed_volume", "margin", "utilisation")
-    task = Task(names, (*names, "side", "most"), numbers)
+    task = Task(names, (*names, "side", "most", "pull"), numbers)
     found = task(refweb.Scene.from_dict(tables))["more"]
-    assert "most by web.points.1.0" not in found and found["cable_mass by web.points.1.0"] == pytest.approx(
-        0.0, abs=1e-12
-    )
+    assert "pull by web.points.1.0" not in found and "pull by cable.density" in found
+    assert found["cable_mass by web.points.1.0"] == pytest.approx(0.0, abs=1e-12)
+    left, right = (found[f"most of line {line} by web.points.1.0"] for line in (0, 1))
+    assert left == found["side by web.points.1.0"] and right == pytest.approx(-left, rel=1e-9)
     length = 2.0 * math.hypot(1.0, 0.6)
     assert found["cable_mass by cable.density"] == pytest.approx(1e-5 * length, rel=1e-10)
     assert found["packed_volume by cable.density"] == pytest.approx(0.0, abs=1e-15)
