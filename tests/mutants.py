@@ -808,8 +808,8 @@ MUTANTS = [
     Mutant("sizing/case", "-allowed / stress**2 * slope", "allowed / stress**2 * slope"),
     Mutant(
         "sizing/search",
-        "feasible = [j for j in judged if j.feasible is True]",
-        "feasible = [j for j in judged if j.feasible is not False]",
+        "j for j in judged if j.feasible is True and",
+        "j for j in judged if j.feasible is not False and",
     ),
     Mutant("sweeps/chances", "between + float(np.mean(np.square(within)))", "between"),
     Mutant("sweeps/expressions", "return True if holds(a.high, b.low)", "return True if holds(a.low, b.low)"),

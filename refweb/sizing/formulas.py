@@ -34,6 +34,11 @@ class Formula(Expression):
         super().__init__(text, names, compares)
         self.parts = list(_parts(self._tree)) if compares else [self._tree]
 
+    @property
+    def tree(self):
+        """Its syntax tree."""
+        return self._tree
+
     def number(self, values):
         """The `refweb.sweeps.expressions.Interval` of an arithmetic expression, with values by name."""
         try:

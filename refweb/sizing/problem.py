@@ -5,6 +5,7 @@ Names in formulas are those of results, of free numbers and of `refweb.sizing.ca
 
 from __future__ import annotations
 
+import ast
 import math
 
 from ..errors import InputError, in_file
@@ -14,7 +15,7 @@ from ..sweeps.expressions import ANY, Interval
 from .case import QUANTITIES, SIZES, sizes_of
 from .formulas import Formula
 from .requirements import Free
-from .space import Design, Space
+from .space import Design, Space, setting
 
 ALIKE = 1e-12
 """Relative difference of sizes up to which a free number has no effect on them."""
@@ -69,18 +70,19 @@ class Problem:
             if name in known:
                 raise InputError(f"parameters: {short(name)} is the name of a result: choose another, with paths")
         self._refuse_twice()
-        with in_file("minimise:"):
+        with in_file("minimise"):
             self.objective = Formula(sizing.minimise, [*self.space.names, *known], False)
         self.requirements = {}
         for name, requirement in sizing.requirements.items():
-            with in_file(f"requirements: {short(name)}:"):
+            with in_file(f"requirements: {short(name)}"):
                 self.requirements[name] = Formula(requirement.condition, [*self.space.names, *known], True)
                 self._refuse_certain(self.requirements[name], scenes)
+                self._refuse_equations(self.requirements[name], {*names, *QUANTITIES, *self.space.free} - {*of_throw})
         formulas = [self.objective, *self.requirements.values()]
         self.used = {name for formula in formulas for name in formula.used} - set(self.space.names)
         self.quantities = tuple(name for name in QUANTITIES if name in self.used)
         self.results = tuple(name for name in (*names, *QUANTITIES) if name in self.used)
-        with in_file("minimise:"):
+        with in_file("minimise"):
             self._refuse_constant(first)
 
     def _each_scene(self, first):
@@ -96,8 +98,8 @@ class Problem:
         at = {}
         for name, given in self.sizing.parameters.items():
             options = self.space.listed.get(name, ())
-            paths = given.paths if isinstance(given, Free) else [path for option in options for path in option.settings]
-            for path in dict.fromkeys(paths):
+            of_free = [setting(path, 1.0)[0] for path in given.paths] if isinstance(given, Free) else []
+            for path in dict.fromkeys([*of_free, *(path for option in options for path in option.settings)]):
                 if path in at:
                     raise InputError(f"parameters: {short(name)} and {short(at[path])} both set {path}: leave one out")
                 at[path] = name
@@ -135,6 +137,12 @@ class Problem:
         if formula.used <= values.keys() and (verdict := formula(values)) is not None:
             always = "is true of every design within bounds" if verdict else "is true of no design within bounds"
             raise InputError(f"{quote(formula.text)} {always}: leave it out or change its limit")
+
+    def _refuse_equations(self, formula, measured):
+        """Refuse a condition that results or numbers between bounds are equal to something."""
+        if any(isinstance(node, ast.Eq) for node in ast.walk(formula.tree)) and (of := sorted(formula.used & measured)):
+            remedy = f"give a range, abs({of[0]} - value) < width"
+            raise InputError(f"{quote(formula.text)}: an equation holds for no whole ± of {of[0]}: {remedy}")
 
     def _refuse_constant(self, first):
         """Refuse a minimum of sizes that are the same for all designs, or of nothing that depends on the design."""

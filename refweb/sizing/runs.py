@@ -106,12 +106,14 @@ class Runs:
         Keys of all runs that were asked for.
     fresh : int
         Number of runs since the start.
+    ends : list of (tuple of int, float or None)
+        Of each search from a start the options and the objective at its end, None where requirements are not met.
     """
 
     def __init__(self, problem, out, crew):
         self.problem, self.crew, self.tell = problem, crew, lambda text, share: None
         self.path = None if out is None else pathlib.Path(out).absolute()
-        self.rows, self.judged, self.fresh = {}, {}, 0
+        self.rows, self.judged, self.fresh, self.ends = {}, {}, 0, []
         self.asked, self._files, self._table = set(), {}, None
         if self.path is not None and holds_rows(out, "size"):
             stored = case_rows.read(self.path / case_rows.NAME)
@@ -216,6 +218,8 @@ class Runs:
         if lacking is None:
             objectives = [problem.objective.number(known) for known in values]
             ends = [sum(part) / len(objectives) for part in zip(*objectives, strict=True)]
+            if not all(map(math.isfinite, ends)):
+                message, ends = f"{problem.sizing.minimise} has no finite value", (math.inf, math.inf)
         else:
             names = [item.name for item in case_rows.results_among(lacking)]
             message = lacking["message"] or f"no value of {', '.join(sorted(problem.used.difference(names)))}"

@@ -81,7 +81,9 @@ def _gradients(runs, optima):
         starts, ends = space.starts(sizing.starts, sizing.seed), []
         for start in starts:
             u = smooth.optimise(start)
-            if runs.of([smooth.design(u)], slopes=True)[0].feasible is True:
+            (judged,) = runs.of([smooth.design(u)], slopes=True)
+            runs.ends.append((options, judged.value if judged.feasible is True else None))
+            if judged.feasible is True:
                 ends.append(u)
         if ends:
             solved.append((smooth, min(ends, key=lambda u: smooth.at(u).f)))
@@ -159,7 +161,7 @@ def best(runs, optima):
     Without one it is the design whose largest violation is least.
     """
     judged = list(runs.judged.values())
-    feasible = [j for j in judged if j.feasible is True]
+    feasible = [j for j in judged if j.feasible is True and math.isfinite(j.value)]
     if not feasible:
         known = [j for j in judged if math.isfinite(j.value)]
         return (max(known, key=lambda j: j.tightest) if known else None), None

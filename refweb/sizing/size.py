@@ -5,6 +5,7 @@ Keys of `Sized.summary` are those of ``run.json``, which `results.sizing_text` a
 
 from __future__ import annotations
 
+import ast
 import math
 import pathlib
 from collections.abc import Callable
@@ -60,10 +61,10 @@ class Sized:
         not balance, and ``at_bound``, numbers at a bound.
     designs : list of dict
         All designs that were run: ``values``, ``objective``, ``reserve``, the smallest one, and ``holds``.
-    status : {"running", "solved", "unconfirmed", "infeasible", "failed", "interrupted"}
+    status : {"running", "solved", "unconfirmed", "undecided", "infeasible", "failed", "interrupted"}
         "unconfirmed" if the design meets all requirements, but by gradients the conditions of an optimum do not hold,
-        so that a better one may exist; "infeasible" if no design meets all requirements, where ``values`` are those of
-        the design that is nearest to it.
+        so that a better one may exist; "infeasible" if no design meets all requirements, and "undecided" if one may
+        within ±, where ``values`` are those of the nearest design.
     message : str
         Reason for another status than "solved".
     method : str
@@ -194,18 +195,19 @@ def _conclude(sized, runs, judged, optimum, spent):
     unit = {item.name: item.unit for item in results_among(judged.rows[0])}.get(sized.sizing.minimise, "")
     sized.values = runs.problem.space.values(judged.design)
     sized.objective = {"value": judged.value, "error": 0.5 * (high - low), "unit": unit}
-    shown = optimum if optimum is not None and optimum.residual <= SHOWN else None
+    confirmed = optimum if optimum is not None and optimum.residual <= SHOWN else None
     sized.requirements = [
-        _requirement(*row, runs, judged, shown, sized.method) for row in enumerate(runs.problem.requirements)
+        _requirement(*row, runs, judged, confirmed, sized.method) for row in enumerate(runs.problem.requirements)
     ]
     *_, sized.scene = runs.problem.space.scene(judged.design)
     sized.scene = sized.scene.replace(title=f"{sized.title}: design"[:200])
     if judged.feasible is not True:
-        sized.status, sized.message = "infeasible", _nearest(sized)
+        sized.status = "infeasible" if judged.feasible is False else "undecided"
+        sized.message = _nearest(sized)
     else:
         if optimum is not None:
             sized.optimality = {"residual": optimum.residual, "at_bound": optimum.bounds}
-        if shown is None and sized.method == "gradients":
+        if confirmed is None and sized.method == "gradients":
             sized.status, sized.message = "unconfirmed", _unconfirmed(optimum)
     _add_notes(sized, runs, judged)
 
@@ -244,10 +246,12 @@ def _nearest(sized):
     wanted = f" with probability {worst['probability']:g}" if worst["probability"] is not None else ""
     how = "is not decided within ±" if worst["holds"] is None else f"fails by {-100.0 * worst['least']:.3g} %"
     text = "no design within bounds meets all requirements"
+    advice = "; a run with a smaller ± decides it" if worst["holds"] is None else ""
     return (
         f"{text}: nearest is {design}, where {worst['name']}, {worst['condition']}{wanted}, {how} of its limit".replace(
             "± of its limit", "±"
         )
+        + advice
     )
 
 
@@ -269,15 +273,32 @@ def _add_notes(sized, runs, judged):
         names = [
             name for name, verdict in zip(runs.problem.requirements, lower.verdicts, strict=True) if verdict is None
         ]
-        text = (
-            f"{len(better)} lesser designs are not decided within ± and count as not meeting the requirements, such as "
-        )
+        count = "1 lesser design is" if len(better) == 1 else f"{len(better)} lesser designs are"
+        text = f"{count} not decided within ± and counted as not meeting the requirements, such as "
         sized.notes.append(f"{text}{design} by {', '.join(names)}: a run with a smaller ± decides them")
     if failed := [j for j in every if j.message]:
-        sized.notes.append(f"{len(failed)} designs have no result: {failed[0].message}")
+        count = "1 design has" if len(failed) == 1 else f"{len(failed)} designs have"
+        sized.notes.append(f"{count} no result: {failed[0].message}")
+    _note_starts(sized, runs, judged)
     lacking = {item.name for item in results_among(judged.rows[0]) if judged.rows[0].get(f"{item.name} ±") is None}
     if lacking := sorted(lacking & runs.problem.used):
         sized.notes.append(f"the ± of {', '.join(lacking)} is not known: it is compared by its value alone")
+
+
+def _note_starts(sized, runs, judged):
+    """Note where the searches from several starts ended, and conditions of which each follows one part alone."""
+    ends = [value for options, value in runs.ends if options == judged.design.options]
+    if len(ends) > 1:
+        reached = sum(value is not None and value <= judged.value + SHOWN * abs(judged.value) for value in ends)
+        others = sorted(value for value in ends if value is not None)[reached:]
+        text = f"{reached} of {len(ends)} starts end at this objective"
+        text += f", others at {', '.join(f'{value:.4g}' for value in others)}" if others else ""
+        text += f", {ends.count(None)} at no design that meets the requirements" if None in ends else ""
+        sized.notes.append(f"{text}: gradients find an optimum near each start")
+    for name, formula in runs.problem.requirements.items() if sized.method == "gradients" else ():
+        if any(isinstance(node, ast.Or) for node in ast.walk(formula.tree)):
+            text = 'holds "or": each start follows one side alone, and designs of the other may be better'
+            sized.notes.append(f"{name} {text}; size each side by itself")
 
 
 def _write(sized, runs):
@@ -285,15 +306,22 @@ def _write(sized, runs):
     if runs.path is None:
         return
     from ..pages.page import report
+    from ..results.error_budget import OPEN
     from ..results.folder import read_summary
     from ..runner import run
 
     folder, file, text = runs.path / "design", runs.path / "design.toml", as_toml(sized.scene.to_dict())
     before = file.read_text(encoding="utf-8") if file.is_file() else None
-    if before == text and (read_summary(folder) or {}).get("status") == "solved":
-        return
-    with written(runs.path):
-        write_text(pathlib.Path(file), text)
-    runs.tell("running the design", 1.0)
-    run(sized.scene, out=folder, force=folder.exists(), progress=False)
-    report(folder)
+    summary = read_summary(folder) or {}
+    if before != text or summary.get("status") != "solved":
+        with written(runs.path):
+            write_text(pathlib.Path(file), text)
+        runs.tell("running the design", 1.0)
+        summary = run(sized.scene, out=folder, force=folder.exists(), progress=False).summary()
+        report(folder)
+    sized.notes += [f"the design: {text}" for text in summary.get("warnings", ())]
+    parts = {name: entry.get("parts") or {} for name, entry in summary.get("results", {}).items()}
+    used = [name for name in runs.problem.used if parts.get(name, {}).get("elements") == OPEN]
+    if used:
+        text = "± is that of these elements: finer ones may change it, see [accuracy] refine"
+        sized.notes.append(f"{', '.join(sorted(used))}: {text}")

@@ -122,7 +122,7 @@ class Smooth:
             each = self._by_line(formula, numbers, slopes, lines)
             pairs = zip(formula.slopes(numbers, slopes), formula.reserves(values), strict=True)
             for part, ((value, slope), reserve) in enumerate(pairs):
-                near = {line: found[part] for line, found in each.items()}
+                near = {line: pairs_of[part] for line, pairs_of in each.items()}
                 if not near or min(v for v, _ in near.values()) < value - ROUNDED * (1.0 + abs(value)):
                     near = {None: (value, slope)}
                 rows |= {(len(r), line): (v, np.zeros(self.count) + dv) for line, (v, dv) in near.items()}

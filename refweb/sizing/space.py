@@ -80,7 +80,7 @@ class Space:
     @property
     def paths(self):
         """Paths of the scene that numbers between bounds set, in order."""
-        return [_set(path, 1.0)[0] for given in self.free.values() for path in given.paths]
+        return [setting(path, 1.0)[0] for given in self.free.values() for path in given.paths]
 
     @property
     def combinations(self):
@@ -109,7 +109,7 @@ class Space:
     def settings(self, design):
         """Values by path of the scene, and "scene" where there are several."""
         pairs = [
-            _set(path, f.at(share))[:2]
+            setting(path, f.at(share))[:2]
             for f, share in zip(self.free.values(), design.shares, strict=True)
             for path in f.paths
         ]
@@ -122,7 +122,7 @@ class Space:
         rows = []
         for n, (f, share) in enumerate(zip(self.free.values(), design.shares, strict=True)):
             for path in f.paths:
-                at, _, slope = _set(path, f.at(share))
+                at, _, slope = setting(path, f.at(share))
                 rows.append((at, n, slope * f.slope(share)))
         return rows
 
@@ -141,7 +141,7 @@ def _base(sizing, name):
     return base_of(path if path.is_file() else name)
 
 
-def _set(path, value):
+def setting(path, value):
     """(Path of the scene, value there, its derivative by the given value)."""
     if match := DIAMETER.fullmatch(path):
         if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0.0:
@@ -160,7 +160,7 @@ def _options(given, folder):
     options = []
     for number, row in enumerate(rows):
         with refused_at(f"row {number + 1}:"):
-            pairs = [_set(f"{given.of}.{key}", value)[:2] for key, value in row.items() if key != "name"]
+            pairs = [setting(f"{given.of}.{key}", value)[:2] for key, value in row.items() if key != "name"]
         options.append(Option(str(row.get("name", f"row {number + 1}")), dict(pairs)))
     labels = [option.label for option in options]
     if twice := next((label for label in labels if labels.count(label) > 1), None):
@@ -169,7 +169,7 @@ def _options(given, folder):
 
 
 def _all(paths, value):
-    return dict(_set(path, value)[:2] for path in paths)
+    return dict(setting(path, value)[:2] for path in paths)
 
 
 def _rows_of(source, folder):

@@ -295,6 +295,25 @@ def test_undecided_designs_count_as_not_meeting(tmp_path):
     assert len(found.notes) == 1 and found.notes[0].startswith("2 lesser designs are not decided within ±")
 
 
+def test_where_nothing_is_decided_and_where_the_minimum_has_no_value(tmp_path):
+    """A stress of 3 ± 0.5 may be below 3: the status says so. 1/0 is no size that designs are ordered by."""
+    executor = MadeUp()
+    executor.error = 0.5
+    keys = {"requirements": {"below": "max_stress < 3"}, "parameters": {"cable.area": [3e-5, 4e-5]}}
+    found = sized(tmp_path, executor, minimise="max_stress", **keys)
+    assert found.status == "undecided" and found.message.endswith("a run with a smaller ± decides it")
+    with pytest.raises(refweb.SolverError, match="has no finite value"):
+        sized(tmp_path, MadeUp(), minimise="1/(max_stress - max_stress)", **keys)
+
+
+def test_starts_and_sides_in_the_notes(tmp_path):
+    """Of a condition with "or" each start follows one side, and the notes say where all of them ended."""
+    wanted = {"either": "max_stress < 1e8 or deflection < 1e-9"}
+    found = sized(tmp_path, requirements=wanted, starts=2)
+    assert found.status == "solved" and found.notes[0].startswith("2 of 2 starts end at this objective")
+    assert found.notes[1].startswith('either holds "or"')
+
+
 def test_with_a_probability(tmp_path):
     """Of draws that all have the same seed; the lower end of the interval of Clopper and Pearson is above 0.7."""
     keys = {
@@ -425,6 +444,11 @@ WRONG = {
     "no condition": ({"requirements": {"strong": "max_stress"}}, "compares nothing"),
     "a condition": ({"minimise": "max_stress < 1"}, "is a condition, and must be a number"),
     "a number": ({"minimise": "3"}, "depends on no free number"),
+    "area and diameter": (
+        {"parameters": {"cable.area": AREA, "cable.diameter": {"from": 1e-3, "to": 2e-3}}},
+        "both set",
+    ),
+    "an equation": ({"requirements": {"strong": "max_stress == 1e8"}}, "holds for no whole ± of max_stress"),
     "no effect": ({"minimise": "cable_length"}, "does not depend on cable.area: every design is as good"),
     "probability": ({"requirements": {"s": {"condition": "max_stress < 1e8", "probability": 0.5}}}, "without [draws]"),
     "count": ({"count": 4}, "has no meaning without [draws]"),
