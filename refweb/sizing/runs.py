@@ -10,6 +10,7 @@ import hashlib
 import json
 import math
 import pathlib
+import statistics
 from typing import Any, NamedTuple
 
 from ..errors import InputError
@@ -51,6 +52,8 @@ class Judged(NamedTuple):
         True if a requirement holds for the whole ±, False if for no part of it, else None.
     message : str
         Reason for which it has no results, else empty.
+    spread : float
+        Standard deviation of the mean of the objective over draws, 0 of one draw.
     """
 
     design: Design
@@ -59,6 +62,7 @@ class Judged(NamedTuple):
     reserves: tuple[Interval, ...]
     verdicts: tuple[bool | None, ...]
     message: str = ""
+    spread: float = 0.0
 
     @property
     def feasible(self):
@@ -214,17 +218,19 @@ class Runs:
         rows = [self.rows.get(case.key, {"status": "refused", "message": case.part}) for case, *_ in cases]
         values = [self._values(design, row) for row in rows]
         lacking = next((row for row, known in zip(rows, values, strict=True) if known is None), None)
-        message, ends = "", (math.inf, math.inf)
+        message, ends, spread = "", (math.inf, math.inf), 0.0
         if lacking is None:
             objectives = [problem.objective.number(known) for known in values]
             ends = [sum(part) / len(objectives) for part in zip(*objectives, strict=True)]
+            if len(objectives) > 1 and all(map(math.isfinite, ends)):
+                spread = statistics.stdev(map(middle, objectives)) / math.sqrt(len(objectives))
             if not all(map(math.isfinite, ends)):
                 message, ends = f"{problem.sizing.minimise} has no finite value", (math.inf, math.inf)
         else:
             names = [item.name for item in case_rows.results_among(lacking)]
             message = lacking["message"] or f"no value of {', '.join(sorted(problem.used.difference(names)))}"
         pairs = [self._of_requirement(name, values) for name in problem.requirements]
-        return Judged(design, rows, Interval(*ends), *map(tuple, zip(*pairs, strict=True)), one_line(message))
+        return Judged(design, rows, Interval(*ends), *map(tuple, zip(*pairs, strict=True)), one_line(message), spread)
 
     def _values(self, design, row):
         """Values by name for formulas; None where the row has no results."""

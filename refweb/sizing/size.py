@@ -51,7 +51,7 @@ class Sized:
     values : dict
         Free numbers of the design by name.
     objective : dict
-        ``value``, ``error`` and ``unit`` of what is least.
+        ``value``, ``error`` and ``unit`` of what is least, of draws of its mean.
     requirements : list of dict
         Of each requirement ``name``, ``condition``, ``probability``, ``reserve`` over its limit with its ends ``least``
         and ``most``, ``holds`` (true, false or None: undecided), ``governs``, and ``costs``: change of the objective
@@ -194,7 +194,7 @@ def _conclude(sized, runs, judged, optimum, spent):
     low, high = judged.objective
     unit = {item.name: item.unit for item in results_among(judged.rows[0])}.get(sized.sizing.minimise, "")
     sized.values = runs.problem.space.values(judged.design)
-    sized.objective = {"value": judged.value, "error": 0.5 * (high - low), "unit": unit}
+    sized.objective = {"value": judged.value, "error": 0.5 * (high - low) + _of_mean(sized, judged), "unit": unit}
     confirmed = optimum if optimum is not None and optimum.residual <= SHOWN else None
     sized.requirements = [
         _requirement(*row, runs, judged, confirmed, sized.method) for row in enumerate(runs.problem.requirements)
@@ -210,6 +210,21 @@ def _conclude(sized, runs, judged, optimum, spent):
         if confirmed is None and sized.method == "gradients":
             sized.status, sized.message = "unconfirmed", _unconfirmed(optimum)
     _add_notes(sized, runs, judged)
+
+
+def _of_mean(sized, judged):
+    """± of the mean of the objective over draws by Student's t, which a note names; 0 without draws."""
+    if not sized.sizing.draws:
+        return 0.0
+    count, level = sized.sizing.count, sized.sizing.confidence
+    text = f"{sized.sizing.minimise} is the mean of {count} draws"
+    if count < 2:
+        sized.notes.append(f"{text}, whose ± is not known")
+        return 0.0
+    from scipy.stats import t
+
+    sized.notes.append(f"{text}, whose ± holds with a confidence of {level:g}")
+    return float(t.ppf(0.5 * (1.0 + level), count - 1)) * judged.spread
 
 
 def _unconfirmed(optimum):
@@ -276,6 +291,10 @@ def _add_notes(sized, runs, judged):
         count = "1 lesser design is" if len(better) == 1 else f"{len(better)} lesser designs are"
         text = f"{count} not decided within ± and counted as not meeting the requirements, such as "
         sized.notes.append(f"{text}{design} by {', '.join(names)}: a run with a smaller ± decides them")
+    alike = [j for j in every if j.feasible is True and j is not judged and j.objective.low < judged.objective.high]
+    if sized.method == "enumeration" and alike:
+        count = "1 other design is" if len(alike) == 1 else f"{len(alike)} other designs are"
+        sized.notes.append(f"{count} as good within ± of {sized.sizing.minimise}: their order is not decided")
     if failed := [j for j in every if j.message]:
         count = "1 design has" if len(failed) == 1 else f"{len(failed)} designs have"
         sized.notes.append(f"{count} no result: {failed[0].message}")

@@ -295,6 +295,16 @@ def test_undecided_designs_count_as_not_meeting(tmp_path):
     assert len(found.notes) == 1 and found.notes[0].startswith("2 lesser designs are not decided within ±")
 
 
+def test_designs_that_are_as_good_within_their_error(tmp_path):
+    """1 ± 0.5 and 1.5 ± 0.5 have no order; 3 ± 0.5 is larger than both."""
+    executor = MadeUp()
+    executor.error = 0.5
+    keys = {"requirements": {"above": "max_stress > 0"}, "parameters": {"cable.area": [1e-5, 1.5e-5, 3e-5]}}
+    found = sized(tmp_path, executor, minimise="max_stress", **keys)
+    assert found.status == "solved" and found.values["cable.area"] == 1e-5
+    assert found.notes == ["1 other design is as good within ± of max_stress: their order is not decided"]
+
+
 def test_where_nothing_is_decided_and_where_the_minimum_has_no_value(tmp_path):
     """A stress of 3 ± 0.5 may be below 3: the status says so. 1/0 is no size that designs are ordered by."""
     executor = MadeUp()
@@ -319,14 +329,14 @@ def test_with_a_probability(tmp_path):
     keys = {
         "draws": {"load.0.force.2": {"distribution": "uniform", "loc": 1.0, "scale": 2.0}},
         "count": 40,
-        "minimise": "max_stress",
+        "minimise": "max_stress + max_tension",
         "requirements": {"likely": {"condition": "max_stress > max_tension", "probability": 0.7}},
     }
     executor = MadeUp()
     areas = [1e-5 * (1.0 + 0.25 * n) for n in range(9)]
     found = sized(tmp_path, executor, parameters={"cable.area": areas}, **keys)
     study = refweb.Study(scene="s", parameters=keys["draws"], sample="random", count=40)
-    from scipy.stats import binomtest
+    from scipy.stats import binomtest, ttest_1samp
 
     from refweb.sweeps.design import points
 
@@ -335,6 +345,9 @@ def test_with_a_probability(tmp_path):
     first = next(n for n, low in enumerate(lower) if low > 0.7)
     assert found.values["cable.area"] == areas[first] and len(executor.ran) == 9 * 40
     assert found.requirements[0]["least"] == pytest.approx(lower[first] / 0.7 - 1.0)
+    mean = ttest_1samp(drawn + 1e5 * areas[first], 0.0).confidence_interval(0.95)
+    assert found.objective["value"] + found.objective["error"] == pytest.approx(mean.high, rel=1e-12)
+    assert found.notes[0].startswith("max_stress + max_tension is the mean of 40 draws")
     with pytest.raises(refweb.InputError, match="is not shown by count = 4 draws"):
         sized(tmp_path, executor, parameters={"cable.area": areas}, **keys | {"count": 4})
 
