@@ -170,7 +170,7 @@ class FurtherRuns:
         if text == HORIZON:
             self.solution.horizon = horizon(self.simulation, self.solution.results, None, tell)
         else:
-            self.solution.horizon["ensemble"] = ensemble(self.simulation, MEMBERS, tell, APART)
+            self.solution.horizon |= ensemble(self.simulation, MEMBERS, tell, APART)
 
     def _chaotic(self, observable):
         """Tell if a result is chaotic: it is wide and small differences cost `LOST` digits, or they cost all 12.
@@ -190,7 +190,7 @@ class FurtherRuns:
         if self.solution.utilisation is not None and (horizon := self.solution.horizon):
             if lost_digits(horizon, np.inf) < 12:
                 used = self._without_chance(used)
-            elif (mean := horizon.get("ensemble", {}).get(UTILISATION)) is not None:
+            elif (mean := horizon.get("utilisation")) is not None:
                 used["parts"]["chance"] = self._chance(self.solution.utilisation.value, mean)
         return errors | {UTILISATION: used}
 

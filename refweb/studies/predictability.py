@@ -41,7 +41,7 @@ def horizon(simulation, results, members=None, tell=None):
         ``perturbation`` [m]; ``growth`` of the difference, e-folds per second [1/s], by least squares from the start
         to where no digit is left; ``digits``, a list of (k, time at which fewer than k digits of the largest
         displacement are left [s], None where they are left at the end), k = 12 … 1; ``statistical``, names of results
-        behind the last of these times; ``ensemble``, of each result ``mean`` and ``deviation``, the standard one.
+        behind the last of these times; and what `ensemble` returns.
     """
     tell = tell or (lambda text, share: None)
     times = simulation.schedule.times
@@ -65,7 +65,7 @@ def horizon(simulation, results, members=None, tell=None):
         "statistical": [name for name, r in results.items() if end is not None and r.time > end],
     }
     if members is not None:
-        horizon_data["ensemble"] = ensemble(simulation, members, tell)
+        horizon_data |= ensemble(simulation, members, tell)
     return horizon_data
 
 
@@ -103,7 +103,14 @@ def lost_digits(horizon, time):
 
 
 def ensemble(simulation, count, tell, size=PERTURBATION):
-    """Mean and standard deviation of each result over runs of different seeds, whose starts differ by ``size``."""
+    """Statistics over runs of different seeds, whose starts differ by ``size``.
+
+    Returns
+    -------
+    dict
+        ``ensemble``, of each result ``mean`` and ``deviation``, the standard one; and ``utilisation``, both of the
+        utilisation if there is one.
+    """
     watch, values = simulation.watch, []
     for seed in range(1, count + 1):
         integrator = _integrator(simulation)
@@ -117,4 +124,6 @@ def ensemble(simulation, count, tell, size=PERTURBATION):
         values.append(list(values_found.values()))
         tell("ensemble", seed / count)
     mean, deviation, names = np.mean(values, axis=0), np.std(values, axis=0, ddof=1), list(values_found)
-    return {n: {"mean": float(m), "deviation": float(d)} for n, m, d in zip(names, mean, deviation, strict=True)}
+    both = {n: {"mean": float(m), "deviation": float(d)} for n, m, d in zip(names, mean, deviation, strict=True)}
+    used = both.pop(UTILISATION, None)
+    return {"ensemble": both} | ({} if used is None else {"utilisation": used})

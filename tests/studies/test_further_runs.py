@@ -136,6 +136,16 @@ def test_the_command_writes_what_it_prints(tmp_path, capsys):
     assert np.ptp(np.asarray(picture.active_scalars)) > 200
 
 
+def test_a_statistical_result_beside_a_strength_is_written(tmp_path, monkeypatch):
+    """The utilisation has an ensemble as results have one, and ``trust.json`` holds texts as names."""
+    monkeypatch.setattr(further_runs.FurtherRuns, "_chaotic", lambda self, observable: True)
+    scene = bounced(1e4, duration=0.02, level="full")
+    scene = scene.replace(cable=replace(scene.cable, strength=1e9), solve=replace(scene.solve, safety=0.5))
+    scene.trust(out=tmp_path / "out", progress=False)
+    horizon = json.loads((tmp_path / "out" / "trust.json").read_text(encoding="utf-8"))["horizon"]
+    assert list(horizon["ensemble"]) == ["place"] and horizon["utilisation"]["deviation"] >= 0.0
+
+
 def test_a_scene_asks_for_it_itself():
     level = replace(bounced(1e4).accuracy, level="full", budget=30.0)
     asked = refweb.run(bounced(1e4).replace(accuracy=level))

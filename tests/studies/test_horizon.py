@@ -1,6 +1,7 @@
 """How long a motion is determined: a linear oscillator for ever, an unstable one for a time that is known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,6 +87,16 @@ def test_mean_and_deviation_of_an_ensemble(monkeypatch):
     assert found["last"]["mean"] == pytest.approx(grown * mean, rel=0.01)
     assert found["last"]["deviation"] == pytest.approx(grown * deviation, rel=0.01)
     assert found["last"]["deviation"] / found["last"]["mean"] == pytest.approx(deviation / mean, rel=1e-6)
+
+
+def test_the_utilisation_of_an_ensemble_is_written(tmp_path):
+    """A bar with a strength: its utilisation stands beside the results, whose names are texts, in ``run.json``."""
+    scene = oscillator(-1e-3, 1.0, ensemble=2)
+    solution = refweb.run(scene.replace(cable=replace(scene.cable, strength=1e6)), out=tmp_path / "out")
+    found = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))["horizon"]
+    assert list(found["ensemble"]) == list(solution.results)
+    # Starts differ by 1e-12 of the length, and 1 s is far before the horizon.
+    assert found["utilisation"]["mean"] == pytest.approx(solution.utilisation.value, rel=1e-6)
 
 
 def test_only_what_lies_beyond_the_horizon_is_statistical():
