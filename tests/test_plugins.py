@@ -6,6 +6,7 @@ import pathlib
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import packages
@@ -285,3 +286,52 @@ def test_a_package_that_pip_installs(folder, tmp_path):
     done = process(target, "-m", "refweb", "run", pathlib.Path(folder, "scene.toml"), "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))["versions"]["my-webs"] == "0.3"
+
+
+@table
+class Misplaced(Table):
+    """A load whose parts a test changes."""
+
+    force: float = real(unit="N")
+    change = staticmethod(lambda term: term)
+
+    def on(self, net):
+        return type(self).change(refweb.Load(node="all", force=(0.0, 0.0, self.force)).on(net))
+
+
+def changed(**parts):
+    """A function that replaces parts of a term by what functions make of them."""
+    return lambda term: replace(term, **{name: make(getattr(term, name)) for name, make in parts.items()})
+
+
+WRONG_PARTS = {
+    "nothing": (lambda term: None, r"on\(net\) returns None and must return a ForceTerm"),
+    "a row too large": (changed(cells=lambda c: c + np.int32(2)), "row 3 of cell 1 must be 0 to 2: net.find"),
+    "a negative row": (changed(cells=lambda c: c - np.int32(1)), "row -1 of cell 0 must be 0 to 2: net.find"),
+    "cells of 64 bits": (changed(cells=lambda c: c.astype(np.int64)), r"cells \(int64, .* array of int32"),
+    "data of 32 bits": (changed(data=lambda d: d.astype(np.float32)), r"data \(float32, .* array of float64"),
+    "columns of another array": (changed(data=lambda d: np.hstack([d, d])[:, ::2]), "not contiguous"),
+    "data of fewer cells": (changed(data=lambda d: d[1:]), "data has 2 rows for 3 cells"),
+    "cells of no element": (changed(data=lambda d: None), "data = None means that cells are the 2 elements"),
+    "no tangent": (changed(tangent=lambda t: None), "tangent = None must be a Tangent: leave it out"),
+    "no velocity": (changed(velocity=lambda v: None), "velocity = None must be a VelocityForce: leave it out"),
+    "a function of Python": (changed(force=lambda k: k.py_func), "force is a function and must be a kernel"),
+    "no force": (changed(force=lambda k: None), "force is None and must be a kernel"),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG_PARTS)
+@pytest.mark.parametrize("solve", [refweb.Static(), refweb.Dynamic(duration=1e-3)])
+def test_an_effect_that_kernels_could_not_read_is_refused(clean, monkeypatch, wrong, solve):
+    """Cells out of range would be memory of others; this net has 3 rows and 2 lines."""
+    change, message = WRONG_PARTS[wrong]
+    refweb.register("effect", "misplaced", Misplaced)
+    monkeypatch.setattr(Misplaced, "change", staticmethod(change))
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[-1, 0, 0], [0, 0, 0], [1, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2]),
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0),
+        effects=[Misplaced(force=0.1)],
+        solve=solve,
+    )
+    with pytest.raises(refweb.InputError, match=f'^effect "misplaced": .*{message}'):
+        scene.build()

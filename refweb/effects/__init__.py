@@ -82,9 +82,9 @@ A scene may have several of it, as tables of a list; without the line ``several`
 
 Kernels of forces work with numbers and tuples: an array that is made in a loop takes fifty times as long as the
 computation with it. ``x`` in a kernel is the displacement of all rows, and ``net.points`` are their reference
-positions. ``cells`` are the rows that each cell couples, and ``data`` its numbers. A kernel adds to ``f`` and to
-``rates``. It must write all of ``blocks`` and ``out``, which contain old values before. Signatures are in
-`refweb.kernels`.
+positions. ``cells`` are the rows that each cell couples, of type int32, and ``data`` its numbers, of type float64. A
+kernel adds to ``f`` and to ``rates``. It must write all of ``blocks`` and ``out``, which contain old values before.
+Signatures are in `refweb.kernels`.
 
 ``net.web.find(self.node)`` finds nodes, and ``net.web.find_lines(self.lines)`` finds lines. For "all", ``net.find``
 also finds the nodes that order and subdivision add. `refweb.effects.base.column` makes cells of one row each. A field

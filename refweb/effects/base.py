@@ -353,7 +353,7 @@ class ForceTerm:
     energy : kernel, optional
         Potential of the force, if there is one; for a force with a power it is linear in time between its times.
     tangent, velocity, contact, frame, timing, elements, internal
-        Optional parts, see the classes.
+        Parts that are left out where a force has none, see the classes; none of the first six may be None.
     adds_tension : bool
         True for a force over the lines beside their law, which writes the whole tension to ``out``.
     observed : int

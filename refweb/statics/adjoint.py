@@ -25,7 +25,7 @@ from ..errors import InputError
 from ..net.elements import line_element, lumped_shares
 from ..net.laws.law import evaluate
 from ..results.state import State
-from ..system.system import parts_of
+from ..system.effect_parts import parts_of
 from .equilibrium import Equilibrium
 from .newton import Newton
 

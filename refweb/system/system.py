@@ -26,6 +26,7 @@ from ..effects.base import DAMPED_TENSION, TENSION, BreakLimits, Constraint, For
 from ..findings import Finding
 from ..net.rigid_body import row_names, with_rotations
 from ..net.rotation import turn_by
+from .effect_parts import parts_of
 from .forces import Forces, PerCell
 from .start import initial_velocity, laid
 
@@ -47,12 +48,6 @@ if TYPE_CHECKING:
 
 MOST_TURN = 0.5
 """Largest angle by which a step of statics turns a body [rad]."""
-
-
-def parts_of(effects: Sequence[Any], net: Net) -> list[Any]:
-    """Terms, motions, constraints and limits of effects on a net, in their order, a list."""
-    parts = [effect.on(net) for effect in effects if hasattr(effect, "on")]
-    return [item for part in parts for item in (part if isinstance(part, list) else [part])]
 
 
 class System:
