@@ -47,5 +47,10 @@ def nearest(name, known):
     close = closest(name, known)
     if close:
         return f'did you mean "{close}"?'
-    listed = ", ".join(known)
-    return "known: " + (listed if len(listed) <= 150 else listed[:150].rpartition(", ")[0] + ", ...")
+    return f"known: {row_of(known)}"
+
+
+def row_of(names):
+    """Names in a row, cut behind 150 characters."""
+    text = ", ".join(names)
+    return text if len(text) <= 150 else text[:150].rpartition(", ")[0] + ", ..."

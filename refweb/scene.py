@@ -252,7 +252,8 @@ class Scene:
         for key in given:
             if key not in tables and not known(EFFECTS, key):
                 hint = nearest(key, [*tables, *possible(EFFECTS)])
-                raise InputError(f"{_as_given(key, given[key])}: unknown table or key, {hint}")
+                of = ", or of a plug-in that is not installed" if isinstance(given[key], dict | list) else ""
+                raise InputError(f"{_as_given(key, given[key])}: unknown table or key{of}, {hint}")
         Head(schema=given.get("schema", 1))
         parts = {key: given[key] for key in ("title", "seed") if key in given}
         parts |= {"folder": None if folder is None else pathlib.Path(folder), "file": file}

@@ -163,7 +163,7 @@ REFUSED = [
     ({"gone": {}}, rf'^plug-in effect "gone" {GONE}$'),
     ({"wrong": {}}, r'^plug-in effect "wrong" of my_webs: "my_webs.wrong:Wrong" must be a class derived from .*Table$'),
     ({"gone_twice": {}}, r'^plug-in effect "gone_twice" of \w+ and \w+: several packages have one of this name'),
-    ({"gon": {}}, r'unknown table or key, did you mean "gone"\?$'),
+    ({"gon": {}}, r'unknown table or key, or of a plug-in that is not installed, did you mean "gone"\?$'),
 ]
 
 
@@ -204,7 +204,7 @@ class Uplift(Table):
 @pytest.fixture
 def clean(monkeypatch):
     """What is registered is gone behind the test."""
-    for name in ("uplift",):
+    for name in ("uplift", "misplaced"):
         monkeypatch.setitem(registry.EFFECTS, name, None)
         monkeypatch.delitem(registry.EFFECTS, name)
 

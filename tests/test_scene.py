@@ -412,13 +412,22 @@ def test_parameters_of_the_law(law, given, filled):
 
 
 STILL = {"node": 0, "displacement": [[0, 0, 0, 0]]}
+UNKNOWN = "unknown table or key, or of a plug-in that is not installed"
 # Each wrong scene: where the chain is changed, to what, and what the one line says.
 WRONG = [
     # unknown tables and keys
-    ("gravty", {"acceleration": [0, 0, 1]}, '[gravty]: unknown table or key, did you mean "gravity"?'),
+    (
+        "gravty",
+        {"acceleration": [0, 0, 1]},
+        '[gravty]: unknown table or key, or of a plug-in that is not installed, did you mean "gravity"?',
+    ),
     ("tite", "x", 'tite = "x": unknown table or key, did you mean "title"?'),
-    ("quux", {"a": 1}, "[quux]: unknown table or key, known: schema, title, seed, web"),
-    ("links", [{"nodes": [0, 1]}], "[[links]]: unknown table or key"),
+    (
+        "quux",
+        {"a": 1},
+        "[quux]: unknown table or key, or of a plug-in that is not installed, known: schema, title, seed, web",
+    ),
+    ("links", [{"nodes": [0, 1]}], f"[[links]]: {UNKNOWN}"),
     ("cable.groups", {"end": {"order": 2}}, "[cable] groups.end order = 2: unknown key, known: law, material, modulus"),
     ("solve.start", "equilibrium", '[solve] start = "equilibrium": unknown key, known: kind, method, load_steps, mass'),
     ("solve.duration", 0.25, "[solve] duration = 0.25: unknown key"),

@@ -17,6 +17,7 @@ import pathlib
 import re
 import shlex
 import shutil
+from collections import Counter
 
 import numpy as np
 
@@ -87,6 +88,8 @@ def so_far(folder, summary):
     text = f"it has reached {at}" if at else "it has written no row"
     if summary.get("kind") in ("sweep", "size"):
         text = _rows(folder)
+        if summary["kind"] == "sweep":
+            summary = {**summary, "count": _counted(folder, summary["count"])}
     if alive is False:
         return {**summary, "status": "killed", "message": f"its process is dead; {text}; {remedy(folder)}"}
     return {**summary, "message": f"{text}; {'its process is alive' if alive else 'whether it is alive is not known'}"}
@@ -100,6 +103,17 @@ def _rows(folder):
     except OSError:
         count = 0
     return f"it has written {max(count, 0)} row{'s' * (count != 1)}"
+
+
+def _counted(folder, count):
+    """Number of cases of each status by the table of a study; ``count`` is that at its start."""
+    from .case_rows import read
+
+    written = Counter(row["status"] for row in read(folder / "results.csv"))
+    for status in ("skipped", "waiting"):  # which have no rows before the end
+        written[status] = written[status] or count.get(status, 0)
+    written["waiting"] = sum(count.values()) - sum(number for key, number in written.items() if key != "waiting")
+    return {status: number for status, number in written.items() if number > 0}
 
 
 def remedy(folder):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..compiled.rows import records_of
-from ..effects.base import FELT, STRAIN, TOUCH
+from ..effects.base import FELT, STRAIN, TOUCH, ContactForce
 from ..findings import Finding
 from .columns import static_energies
 
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
     from ..net.net import Net
     from ..system.system import System
+
+STIFF = 1e-12
+"""Least stiffness of a row over its largest, in other directions, that counts as one."""
 
 
 class State:
@@ -145,14 +148,34 @@ class State:
 
     @cached_property
     def slack_nodes(self) -> NDArray[np.int64]:
-        """Free nodes without a taut line, a taut thread or a bar, whose position is not unique."""
+        """Free nodes whose position is not unique: no taut line, taut thread, bar or other stiffness holds them."""
         net = self.system.net
         fixed = np.all(self.system.supported, axis=1)
         fixed[net.web.bare] = True  # by a link
         fixed[net.cells[net.law_is("bar") | ~self.element_slack].ravel()] = True
         for thread in net.threads:
             fixed[thread.segments[thread.tensions(self.threads[thread.name]) > 0.0].ravel()] = True
-        return np.flatnonzero(~fixed[: net.nodes])
+        open_ = np.flatnonzero(~fixed[: net.nodes])
+        return open_[~self._stiff(fixed)[open_]] if len(open_) else open_
+
+    def _stiff(self, fixed):
+        """True for rows that effects hold, by a positive stiffness against all that is fixed, shape (rows,)."""
+        system = self.system
+        sums = np.zeros((system.rows, 3, 3))
+        for term in system.terms:
+            if term.over_lines or term.observed or term.contact != ContactForce() or not term.tangent.stiffness:
+                continue
+            count, arity = term.cells.shape
+            blocks = np.zeros((count, 3 * arity, 3 * arity))
+            numbers = system.data_of(term, self.time)
+            term.tangent.stiffness(self.time, self.x, self.v, blocks, term.cells, numbers, False)
+            for k in range(arity):
+                others = fixed[np.delete(term.cells, k, axis=1)].all(axis=1)
+                part = slice(3 * k, 3 * k + 3)
+                np.add.at(sums, term.cells[others, k], blocks[others, part, part])
+        sums += system.supported[:, :, None] * np.eye(3) * np.abs(sums).max(axis=(1, 2), initial=0.0)[:, None, None]
+        least, _, most = np.linalg.eigvalsh(0.5 * (sums + sums.transpose(0, 2, 1))).T
+        return least > STIFF * most
 
     @cached_property
     def reaction(self) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ import re
 from typing import Any, NamedTuple
 
 from ..errors import InputError
-from ..messages import nearest, quote
+from ..messages import nearest, quote, row_of
 
 LONGEST = 2000
 """Largest number of characters of a condition."""
@@ -137,7 +137,10 @@ class Expression:
             if quoted or name in ("and", "or", "not", "true", "false", *FUNCTIONS):
                 return {"true": "True", "false": "False"}.get(name) or match.group()
             if name not in known:
-                raise InputError(f"{quote(text)}: {quote(name)} is not known here, {nearest(name, known)}")
+                hint = nearest(name, known)
+                if not hint.startswith("known"):
+                    hint += f" Known: {row_of(known)}"
+                raise InputError(f"{quote(text)}: {quote(name)} is not known here, {hint}")
             self.used.add(known[name])
             key = f"_{len(self._aliases)}"
             self._aliases[key] = known[name]

@@ -166,7 +166,7 @@ def _check(study, base, cases):
     scene.build()
     of_throw = [] if scene.throw is None else scene.throw.numbers
     for name, text in study.conditions.items():
-        with in_file(f"conditions: {short(name)}:"):
+        with in_file(f"conditions: {short(name)}"):
             Expression(text, [*study.parameters, *(item.name for item in scene.observables), *of_throw])
 
 
@@ -242,6 +242,11 @@ class Kept:
                 self.rows[row["case"]] = case_rows.result_cells(row)
         unasked = {row["case"]: row for row in stored if row["case"] and row["case"] not in asked}
         self._aside = list(unasked.values())
+        if count := len(self._aside):
+            study_run.reasons.append(
+                f"{count} row{'s' * (count > 1)} of another study, of other cases or another scene, set aside in "
+                f"{case_rows.ASIDE}"
+            )
         before = (read_summary(self.path) or {}).get("versions", {}) if full and self.rows else study_run.versions
         if changed := [f"{k} {v} after {before.get(k)}" for k, v in study_run.versions.items() if before.get(k) != v]:
             study_run.warnings.append(

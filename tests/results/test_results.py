@@ -15,8 +15,14 @@ import pyvista
 from vtkmodules.vtkCommonCore import reference
 
 import refweb
+from refweb.dynamics.integrators.drift_source import suspects
+from refweb.effects.base import Balance, ForceTerm, Tangent, column
+from refweb.kernels import ENERGY, STIFFNESS, kernel
+from refweb.kernels import FORCE as FORCE_KERNEL
 from refweb.net import elements
+from refweb.registry import EFFECTS
 from refweb.results.solution import Result, read_results
+from refweb.tables import Table, real, table
 
 STEPS = (0.5, 1.0, 2.0, 3.0)
 MODULUS, AREA, DENSITY, WEIGHT = 1e5, 1e-4, 300.0, np.array([0.3, 0.0, -2.0])
@@ -409,6 +415,59 @@ def test_slack_nodes_are_counted():
     (text,) = solution.warnings
     assert "2 nodes hang on slack lines" in text and "1, 2" in text
     assert solution.solver["slack_nodes"] == 2 and solution.state.slack.all() and not solution.tension.any()
+
+
+@table
+class SpringToPoint(Table):
+    """A linear spring of all directions, from a node to where it is at the start."""
+
+    stiffness: float = real(unit="N/m")
+
+    def on(self, net):
+        tangent = Tangent(spring_stiffness)
+        data, balance = np.array([[self.stiffness]]), Balance("spring_energy")
+        return ForceTerm("spring", column([1]), data, spring_force, balance, energy=spring_energy, tangent=tangent)
+
+
+@kernel(FORCE_KERNEL)
+def spring_force(t, x, v, f, cells, data, out):
+    for k in range(3):
+        f[cells[0, 0], k] -= data[0, 0] * x[cells[0, 0], k]
+
+
+@kernel(ENERGY)
+def spring_energy(t, x, cells, data, out):
+    out[0] = 0.5 * data[0, 0] * (x[cells[0, 0]] ** 2).sum()
+
+
+@kernel(STIFFNESS)
+def spring_stiffness(t, x, v, blocks, cells, data, definite):
+    blocks[0] = data[0, 0] * np.eye(3)
+
+
+@pytest.fixture
+def spring():
+    """The class above as an effect of scenes, until the test ends."""
+    refweb.register("effect", "spring", SpringToPoint)
+    yield SpringToPoint
+    EFFECTS.pop("spring")
+
+
+def test_a_node_on_a_slack_line_that_a_spring_holds_is_not_loose(spring):
+    """F = k z, while the line is slack: the position is unique, and has ±."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [0, 0, -1]], lines=[[0, 1]], natural_length=5.0, supports=[0]),
+        cable=refweb.Cable(law="tension-only", modulus=1e9, area=1e-6, density=0.0),
+        effects=[refweb.Load(node=1, force=(0, 0, -10.0)), spring(stiffness=100.0)],
+        observe=[refweb.Observe(name="z", quantity="displacement", node=1, component="z", reduce="min")],
+        solve=refweb.Static(),
+    )
+    solution = refweb.run(scene)
+    z = solution.results["z"]
+    text = ', or see if the energy of effect "spring" is that of its force'
+    assert suspects(solution.state.system) == text and suspects(scene.replace(effects=[]).build()) == ""
+    assert solution.warnings == [] and solution.solver["slack_nodes"] == 0
+    assert z.error is not None and abs(z.value + 0.1) <= z.error + 1e-15
 
 
 @pytest.mark.parametrize("slackness, slack", [(0.0199, False), (0.0201, True)])

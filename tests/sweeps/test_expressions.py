@@ -122,6 +122,13 @@ def test_what_cannot_be_computed(text):
         Expression(text, list(POINTS))(POINTS)
 
 
+def test_known_names_stand_beside_the_nearest():
+    with pytest.raises(refweb.InputError, match='did you mean "stress"[?] Known: stress, depth$'):
+        Expression("stres > 1", ["stress", "depth"])
+    with pytest.raises(refweb.InputError, match="is not known here, known: stress, depth$"):
+        Expression("qqq > 1", ["stress", "depth"])
+
+
 def test_a_short_name_of_two_paths_is_none():
     with pytest.raises(refweb.InputError, match='"mass" is not known here'):
         Expression("mass > 1", ["body.0.mass", "body.1.mass"])

@@ -25,6 +25,7 @@ import tomli_w
 import refweb
 from refweb.__main__ import main
 from refweb.results import case_rows
+from refweb.results.folder import so_far
 from refweb.sweeps import case as cases
 
 MODULUS, AREA = 1e6, 1e-4
@@ -121,6 +122,30 @@ def test_every_row_is_that_of_its_case(tmp_path):
     assert list(frame.columns) == columns and frame["deflection [m]"].to_list() == list(found.values("deflection"))
     summary = json.loads((tmp_path / "s" / "run.json").read_text())
     assert (summary["kind"], summary["status"], summary["cases"]) == ("sweep", "solved", 6)
+
+
+def test_rows_of_another_study_are_said_to_be_set_aside(tmp_path, capsys):
+    """Both studies have one case in common; the box at the start, that at the end and `refweb info` say the rest."""
+    refweb.sweep(arms(), {FORCE: [1.0, 2.0, 3.0]}, tmp_path / "s", MadeUp())
+    found = refweb.sweep(arms(), {FORCE: [3.0, 4.0]}, tmp_path / "s", MadeUp())
+    assert found.reasons == ["2 rows of another study, of other cases or another scene, set aside in set-aside.csv"]
+    assert main(["info", str(tmp_path / "s")]) == 0
+    assert "2 rows of another study" in capsys.readouterr().out
+
+
+def test_a_killed_study_counts_its_rows(tmp_path):
+    """``run.json`` is that of its start, and the table has what came after."""
+    folder = tmp_path / "s"
+    refweb.sweep(arms(), {FORCE: [1.0, 2.0, 3.0]}, folder, MadeUp())
+    lines = (folder / "results.csv").read_text().splitlines(keepends=True)
+    (folder / "results.csv").write_text("".join(lines[:3]))
+    before = {"kind": "sweep", "status": "running", "message": "", "count": {"waiting": 3}}
+    assert so_far(folder, before)["count"] == {"solved": 2, "waiting": 1}
+    assert so_far(folder, {**before, "count": {"skipped": 1, "waiting": 3}})["count"] == {
+        "solved": 2,
+        "skipped": 1,
+        "waiting": 1,
+    }
 
 
 def test_it_agrees_with_runs_one_by_one():

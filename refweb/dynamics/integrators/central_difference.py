@@ -366,7 +366,7 @@ class CentralDifference(Integrator):
 
     def _name_drift(self, course, before, running):
         """Name the source of an energy drift, by the steps from ``before`` [s] on."""
-        from .drift_source import name_of, source_of
+        from .drift_source import name_of, source_of, suspects
 
         system, after, state = self.system, self._again(course, before, running), course.before.copy()
         places = [(before, state[0])]
@@ -376,7 +376,8 @@ class CentralDifference(Integrator):
         of, cell = source_of(system, places)
         raise EnergyDriftError(
             f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and {course.time:.6g} s, "
-            f"limit {DRIFT:g}: energy came in with {of.name} at {name_of(system, of, cell)}; {self._remedy}",
+            f"limit {DRIFT:g}: energy came in with {of.name} at {name_of(system, of, cell)}; {self._remedy}"
+            f"{suspects(system)}",
             course.drift,
         )
 

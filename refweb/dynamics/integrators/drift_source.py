@@ -45,6 +45,18 @@ def source_of(system, places):
     return source
 
 
+def suspects(system):
+    """Further cause of a drift: effects of users with an energy, which no test of refweb holds against their forces."""
+    names = [
+        f'"{parts[0].name}"'
+        for effect, parts in system.acting
+        if any(getattr(part, "energy", None) is not None for part in parts)
+        and not type(getattr(effect, "effect", effect)).__module__.startswith("refweb.")
+    ]
+    plural = "s" * (len(names) > 1)
+    return f", or see if the energy of effect{plural} {', '.join(names)} is that of its force" if names else ""
+
+
 def name_of(system, term, cell):
     """Name of the item that a cell of a term belongs to."""
     if term.contact.pairs:
