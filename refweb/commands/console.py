@@ -7,7 +7,7 @@ from __future__ import annotations
 import contextlib
 import sys
 
-from rich.console import Console
+from rich.console import Console, Group
 from rich.panel import Panel
 from rich.table import Table as Grid
 from rich.text import Text
@@ -31,6 +31,11 @@ from ..results.summary_text import (
     verdict_of,
 )
 from ..results.units import larger, readable, scale_of
+
+OMITTED = ("by samples ±", "its ±", "verdict")
+"""Columns of a study that are left out where its table is too wide, after those of quantiles."""
+LEFT = 18
+"""Width of the frame of a box and of the names on its left."""
 
 
 def _console():
@@ -441,8 +446,20 @@ def _headed(names):
 
 
 def _columns(rows):
-    """Rows below names of columns, as a grid."""
-    grid = _headed(rows.columns)
+    """Rows below names of columns, as a grid; columns are left out, and named, before a number loses digits."""
+    console, kept = _console(), list(range(len(rows.columns)))
+    table = [rows.columns, *rows.rows]
+    widths = [max(len(word) for row in table for word in [*row[k].split(), ""]) for k in kept]
+    spare = lambda: console.width - LEFT - sum(widths[k] + 4 for k in kept)  # noqa: E731
+    omitted = []
+    for name in (*(c for c in rows.columns if c.endswith(" %")), *OMITTED):
+        if name in rows.columns and spare() < 0:
+            omitted.append(name)
+            kept.remove(rows.columns.index(name))
+    grid = _headed([rows.columns[k] for k in kept])
+    for column, k in zip(grid.columns, kept, strict=True) if spare() >= 0 else ():
+        widths[k] += min(spare(), max(len(row[k]) for row in table) - widths[k])
+        column.width = widths[k]
     for row in rows.rows:
-        grid.add_row(*map(Text, row))
-    return grid
+        grid.add_row(*(Text(row[k]) for k in kept))
+    return Group(grid, Text(f"left out, see results.csv: {', '.join(omitted)}")) if omitted else grid

@@ -91,7 +91,7 @@ def on_spread(entry):
             text = readable(of_result["error"], None, of_result["unit"])
             more = "exceeds" if of_result["error"] > spread else "is not small beside"
             spread = readable(spread, None, of_result["unit"])
-            remedy = "a smaller safety or rtol resolves the differences of cases"
+            remedy = "more [accuracy] digits, or a smaller safety, resolve the differences of cases"
             yield f"{name}: ± of up to {text} {more} the spread, {spread}: {remedy}"
 
 

@@ -9,7 +9,9 @@ from sweeps.test_sweep import FORCE, Here, arms
 
 import refweb
 from refweb.__main__ import main
+from refweb.commands import console
 from refweb.pictures.studies import draw, of_folder
+from refweb.results.study_text import Rows
 from refweb.scene import Scene
 from refweb.sweeps.design import Base, cases_of
 from refweb.sweeps.study import load, shipped
@@ -120,3 +122,16 @@ def test_shipped_studies_run(name, tmp_path):
     if name == "price-of-safety":
         errors = [row["deflection ±"] for row in found.rows]
         assert errors[-1] < 0.1 * errors[0], "of order 2: sixteen times the steps"
+
+
+def test_a_wide_table_leaves_out_columns_and_no_digits(capsys):
+    """Where the output is no terminal a box is 110 wide: quantiles are left out, and named; numbers are whole."""
+    columns = ["result", "mean", "its ±", "by samples ±", "spread", "5 %", "50 %", "95 %", "± at most", "verdict"]
+    cells = ["tension [N]", "-146.5", "1.3e+02", "9", "-25.41 ± 1.5e+02", "-118.71", "-138.31", "-184.32", "2.3e+02"]
+    rows = Rows(columns, [[*cells, "8 undetermined, 2 statistical"]], [])
+    console._box("T", [("results", console._columns(rows))])
+    printed = capsys.readouterr().out
+    assert "…" not in printed and "left out, see results.csv: 5 %, 50 %" in printed
+    assert all(word in printed for word in ("-146.5", "1.5e+02", "2.3e+02", "undetermined"))
+    console._box("T", [("results", console._columns(Rows(columns[:3], [cells[:3]], [])))])
+    assert "left out" not in capsys.readouterr().out
