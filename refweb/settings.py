@@ -99,7 +99,8 @@ class Static(Table):
     Parameters
     ----------
     method : {"newton", "relaxation"}
-        Newton's method or, independent of any tangent, dynamic relaxation.
+        Newton's method or, independent of any tangent, dynamic relaxation, with which only results with a proven bound
+        have ±.
     load_steps : sequence of float
         Values of t.
     mass : {"lumped", "consistent"}

@@ -35,8 +35,8 @@ def run(arguments):
         from ..reference.words import MATERIALS_TEXT
 
         print(f"{as_table()}\n\n{textwrap.fill(MATERIALS_TEXT.replace('`', ''), 100)}")
-    elif arguments.table in guides():
-        print(guide(arguments.table), end="")
+    elif (name := arguments.table.replace("how-to/", "own-")) in guides():
+        print(guide(name), end="")
     elif arguments.table in COMMANDS and arguments.table not in names() and explained(arguments.table) is None:
         verb = load(COMMANDS[arguments.table])
         parser = argparse.ArgumentParser(

@@ -5,9 +5,12 @@
 
 from __future__ import annotations
 
+import inspect
 import pathlib
+import re
 import textwrap
 
+from .. import registry
 from ..net import materials
 from . import glossary
 from .pages import header_of, line_of, names, pages_of
@@ -30,6 +33,15 @@ MATERIALS_TEXT = (
 """Text above the table of materials."""
 GUIDES = pathlib.Path(__file__).parent / "site" / "pages"
 """Folder of the guides: pages of the documentation site that are written by hand."""
+HOW_TO = {
+    "effect": ("An effect", "refweb.effects"),
+    "shape": ("A body shape", "refweb.net.rigid_body"),
+    "law": ("A tension law", "refweb.net.laws"),
+    "observable": ("An observable", "refweb.results.observables"),
+    "integrator": ("An integrator", "refweb.dynamics.integrators"),
+    "verb": ("A verb of the command line", "refweb.commands"),
+}
+"""Titles and modules of the guides on plug-ins, ``own-effect`` and others, ``how-to/effect`` on the site."""
 
 
 def overview():
@@ -45,12 +57,29 @@ def overview():
 
 def guides():
     """Names of the guides."""
-    return sorted(path.stem for path in GUIDES.glob("*.md"))
+    return sorted([*(path.stem for path in GUIDES.glob("*.md")), *(f"own-{name}" for name in HOW_TO)])
 
 
 def guide(name):
     """Text of a guide, as Markdown."""
+    if (kind := name.removeprefix("own-")) in HOW_TO:
+        return how_to(*HOW_TO[kind]) + "\n"
     return (GUIDES / f"{name}.md").read_text(encoding="utf-8")
+
+
+def how_to(title, module):
+    """The part of the docstring of a module that says how to write one, in Markdown."""
+    text = (inspect.getdoc(registry.load(module)) or "").split("\n\n", 1)[1]
+    text = re.sub(r"^How to write [^\n]*\n-+\n", "", text)
+    parts = [f"# {title} of your own"]
+    for block in re.split(r"\n\n(?=\S)", text):
+        prose, marked, code = block.partition("::\n\n")
+        parts.append(prose.replace("``", "`") + (":" if marked else ""))
+        if marked:
+            language = "toml" if code.lstrip().startswith(("[", "observe")) else "python"
+            code = textwrap.dedent(code).strip().replace("'''", '"""')
+            parts.append(f"```{language}\n{code}\n```")
+    return "\n\n".join(parts)
 
 
 def as_text(name, width=100):

@@ -22,7 +22,7 @@ from refweb import registry
 from refweb.__main__ import main
 from refweb.reference.glossary import explained
 from refweb.reference.pages import names
-from refweb.reference.words import overview
+from refweb.reference.words import HOW_TO, overview
 
 ROOT = pathlib.Path(__file__).parents[2]
 SITE = pathlib.Path(refweb.reference.__file__).parent / "site"
@@ -31,7 +31,7 @@ FENCE = re.compile(
     r"^```(?: ?\{ (?P<marks>[^}]*) \}|(?P<language>\w+))(?: title=\"(?P<title>[^\"]+)\")?\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
-RUN, WRITTEN, SHOWN = {"sh", "python"}, {"toml", "csv", "python"}, {"math"}
+RUN, WRITTEN, SHOWN = {"sh", "python"}, {"toml", "csv", "python"}, {"math", "text"}
 """Languages of blocks that are run, of those that are written where they have a title, and of those that are read."""
 
 
@@ -101,6 +101,16 @@ def test_help_prints_a_guide(path, capsys):
     """Its name is neither that of a table nor a term of the glossary; the overview names it."""
     assert path.stem not in names() and explained(path.stem) is None and path.stem in overview()
     assert main(["help", path.stem]) == 0 and capsys.readouterr().out == path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("kind", HOW_TO)
+def test_help_prints_how_to_write_a_plug_in(kind, capsys):
+    """By a plain name and by that of the page; code of the docstring is in it, and the overview names it."""
+    assert f"own-{kind}" in overview() and f"own-{kind}" not in names() and explained(f"own-{kind}") is None
+    assert main(["help", f"own-{kind}"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith(f"# {HOW_TO[kind][0]} of your own\n") and "```python" in printed
+    assert main(["help", f"how-to/{kind}"]) == 0 and capsys.readouterr().out == printed
 
 
 def test_pages_link_to_pages():

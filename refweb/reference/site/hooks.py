@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import inspect
 import re
-import textwrap
 from pathlib import Path
 
 from mkdocs.structure.files import File  # pyright: ignore[reportMissingImports]
 
-from refweb import registry
+from refweb import kernels, registry
 from refweb.reference import glossary, words
 
 ROOT = Path(__file__).parents[3]
@@ -26,15 +25,6 @@ KNOWN = {"validation/REFERENCE.md": "scene-files.md", "validation/REPORT.md": "v
 FIRST = """[Quick start](start.md) · [A net of your own](own-net.md) · [How far can I trust it?](trust.md) ·
 [Scene files](scene-files.md) · [Python](api.md) · [Theory](theory.md) · [Plug-ins](plug-ins.md)"""
 """Pages to begin with."""
-HOW_TO = {
-    "effect": ("An effect", "refweb.effects"),
-    "shape": ("A body shape", "refweb.net.rigid_body"),
-    "law": ("A tension law", "refweb.net.laws"),
-    "observable": ("An observable", "refweb.results.observables"),
-    "integrator": ("An integrator", "refweb.dynamics.integrators"),
-    "verb": ("A verb of the command line", "refweb.commands"),
-}
-"""Titles and modules of the pages on plug-ins."""
 PLUG_INS = (
     "refweb.tables:Table",
     "refweb.tables:table",
@@ -43,12 +33,15 @@ PLUG_INS = (
     "refweb.tables:nodes",
     "refweb.effects.base:ForceTerm",
     "refweb.effects.base:Tangent",
+    "refweb.effects.base:VelocityForce",
     "refweb.effects.base:Balance",
+    "refweb.effects.base:Timing",
     "refweb.compiled.kernel:kernel",
     "refweb.net.net:Net",
     "refweb.net.rigid_body:Shape",
     "refweb.net.laws.law:TensionLaw",
     "refweb.results.observables.observable:Observable",
+    "refweb.results.observables.balances:Booked",
     "refweb.results.probes:Probe",
     "refweb.dynamics.integrators.step_observer:StepObserver",
 )
@@ -84,21 +77,6 @@ def report():
     return re.sub(r"\[([^\]]*)\]\((?!#|https?:)[^)]*\)", r"\1", text)
 
 
-def how_to(title, module):
-    """The part of the docstring of a module that says how to write one, in Markdown."""
-    text = (inspect.getdoc(registry.load(module)) or "").split("\n\n", 1)[1]
-    text = re.sub(r"^How to write [^\n]*\n-+\n", "", text)
-    parts = [f"# {title} of your own"]
-    for block in re.split(r"\n\n(?=\S)", text):
-        prose, marked, code = block.partition("::\n\n")
-        parts.append(prose.replace("``", "`") + (":" if marked else ""))
-        if marked:
-            language = "toml" if code.lstrip().startswith(("[", "observe")) else "python"
-            code = textwrap.dedent(code).strip().replace("'''", '"""')
-            parts.append(f"```{language}\n{code}\n```")
-    return "\n\n".join(parts)
-
-
 def api():
     """Names of the package, and what plug-ins are made of, by their docstrings."""
     exported = {name: reference.replace(":", ".") for name, reference in registry.exports().items()}
@@ -110,7 +88,9 @@ def api():
     parts = ["# Python", "Names of the package `refweb`, which are imported when they are used."]
     for title, members in groups.items():
         parts += [f"## {title}", *(f"::: {exported[name]}" for name in members)]
-    return "\n\n".join([*parts, "## Parts of plug-ins", *(f"::: {name.replace(':', '.')}" for name in PLUG_INS)])
+    parts += ["## Parts of plug-ins", *(f"::: {name.replace(':', '.')}" for name in PLUG_INS)]
+    signatures = (inspect.getdoc(kernels) or "").split("\n\n", 1)[1].replace("`", "")
+    return "\n\n".join([*parts, "## Signatures of kernels", f"```text\n{signatures}\n```"]) + "\n"
 
 
 def text_of(name):
@@ -130,7 +110,7 @@ PAGES = {
     "validation.md": report,
     "contributing.md": text_of("CONTRIBUTING.md"),
     "changes.md": text_of("CHANGELOG.md"),
-    **{f"how-to/{name}.md": (lambda entry=entry: how_to(*entry)) for name, entry in HOW_TO.items()},
+    **{f"how-to/{name}.md": (lambda name=name: words.guide(f"own-{name}")) for name in words.HOW_TO},
 }
 """Texts of the pages that are made, by their name."""
 
