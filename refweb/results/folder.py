@@ -113,8 +113,8 @@ def _counted(folder, count):
         text = (folder / "results.csv").read_text(encoding="utf-8")
     except OSError:
         return count
-    whole = io.StringIO(text[: text.rfind("\n") + 1], newline="")
-    written = Counter(row["status"] for row in csv.DictReader(whole))
+    lines = io.StringIO(text[: text.rfind("\n") + 1], newline="")
+    written = Counter(row["status"] for row in csv.DictReader(lines))
     for status in ("skipped", "waiting"):  # which have no rows before the end
         written[status] = written[status] or count.get(status, 0)
     written["waiting"] = sum(count.values()) - sum(number for key, number in written.items() if key != "waiting")

@@ -174,8 +174,8 @@ class State:
                 part = slice(3 * k, 3 * k + 3)
                 np.add.at(sums, term.cells[others, k], blocks[others, part, part])
         sums += system.supported[:, :, None] * np.eye(3) * np.abs(sums).max(axis=(1, 2), initial=0.0)[:, None, None]
-        least, _, most = np.linalg.eigvalsh(0.5 * (sums + sums.transpose(0, 2, 1))).T
-        return least > STIFF * most
+        smallest, _, largest = np.linalg.eigvalsh(0.5 * (sums + sums.transpose(0, 2, 1))).T
+        return smallest > STIFF * largest
 
     @cached_property
     def reaction(self) -> NDArray[np.float64]:
