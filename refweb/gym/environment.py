@@ -76,12 +76,14 @@ class SceneEnv(gymnasium.Env):
 
     def __init__(
         self,
-        scene: Scene | str | PathLike[str],
+        scene: Scene | str | PathLike[str] | None = None,
         gym: Gym | None = None,
         values: dict[str, Any] | None = None,
         render_mode: str | None = None,
         size: tuple[int, int] = (640, 480),
     ) -> None:
+        if scene is None:
+            raise InputError('scene is missing: gymnasium.make("refweb/Scene-v0", scene="my-net.toml")')
         if not isinstance(scene, Scene):
             scene = Scene.load(scene, values)
         elif values:

@@ -163,9 +163,9 @@ class Gym(Table):
         for path in paths:
             if path.partition(".")[0] == "gym":
                 raise InputError(f"{where} {short(path)}: [gym] is the same in all episodes: give it in the scene")
-            for whole in paths:
-                if path.startswith(f"{whole}."):
-                    raise InputError(f"{where} {short(path)} is a part of {short(whole)}: give one of them")
+            for vector in paths:
+                if path.startswith(f"{vector}."):
+                    raise InputError(f"{where} {short(path)} is a part of {short(vector)}: give one of them")
         for path in draws:
             for part in self.inputs:
                 if f"{path}.".startswith(f"{part}.") or part.startswith(f"{path}."):

@@ -282,6 +282,8 @@ def test_gymnasium_finds_nothing_to_warn_of(name):
 
 
 def test_an_id_imports_what_it_needs_and_any_scene_is_an_environment():
+    with pytest.raises(InputError, match="scene is missing"):
+        gymnasium.make("refweb/Scene-v0")
     env = gymnasium.make("refweb.gym:refweb/Scene-v0", scene=scene())
     with warnings.catch_warnings():
         warnings.simplefilter("error")
