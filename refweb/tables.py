@@ -74,7 +74,8 @@ def _bounded(name, value, unit, above, at_least, below, at_most):
         (at_most, at_most is not None and not value <= at_most, "≤"),
     ):
         if bad:
-            _refuse(name, value, f"{sign} {bound:g}" + (f" [{unit}]" if unit else ""))
+            written = f"{bound:g}" if f"{bound:g}" != f"{value:g}" else f"{bound:.12g}"
+            _refuse(name, value, f"{sign} {written}" + (f" [{unit}]" if unit else ""))
     if 0.0 in (above, at_least) and 0 < value < SMALLEST:
         lower = f"≥ {SMALLEST:g}" if above == 0.0 else f"0 or ≥ {SMALLEST:g}"
         _refuse(name, value, lower + (f" [{unit}]" if unit else ""))

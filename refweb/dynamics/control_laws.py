@@ -146,6 +146,8 @@ class SpinUp(Law):
 
     def act(self, measurement: Measurement, time: float) -> NDArray[np.float64]:
         """The value."""
+        if not measurement.target.all():
+            raise ValueError("the target is 0, and must not be: it is the speed that is led to")
         return self.strength * (1.0 - measurement.value / measurement.target)
 
 

@@ -160,6 +160,13 @@ def test_spin_up_is_exponential():
     assert run.controls[0]["unit"] == "N m s"
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_spin_up_whose_target_passes_zero_is_refused_at_its_time():
+    law = {"law": "spin-up", "parameters": {"strength": 0.02}}
+    with pytest.raises(refweb.SolverError, match=r'"hub" at t = 0.1 s: .* the target is 0, and must not be'):
+        drum(law, 0.2, target=[[0.0, 1.0], [0.1, 0.0], [1.0, 0.0]])
+
+
 def test_attitude_of_a_hub():
     """PD about its axle, with a table as target; its rate by differences."""
     law = {"law": "pid", "parameters": {"proportional": 0.8, "derivative": 0.1}}
@@ -416,6 +423,7 @@ WRONG = [
     ({"law": "sliding-mode", "parameters": {"strength": 1.0, "slope": 1.0, "width": 0.0}}, "width = 0 must be > 0"),
     ({"law": "spin-up", "parameters": {"strength": 1.0}, "target": 0.0}, "target = 0 must not be zero"),
     ({"law": "pdi"}, 'did you mean "pid"'),
+    ({"angle": 1.5708}, "angle = 1.5708 must be ≤ 1.57079632679"),
     ({"parameters": {"proportionel": 1.0}}, 'did you mean "proportional"'),
     ({"law": "bang-bang", "parameters": {}}, "parameters.strength is missing"),
     ({"measures": ["xx"]}, "is not an observable"),
