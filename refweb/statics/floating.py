@@ -152,6 +152,31 @@ def between_slack_lines(system, equilibrium):
     return Floating(free, moves / np.abs(moves).max(axis=(1, 2), keepdims=True), parts)
 
 
+def _without_slip(system, x, moves):
+    """Combinations of moves, (k, rows, 3), in which no thread slips over a ring that has friction.
+
+    A tangent lets rings slip on to either side, but friction resists a thread that turns back.
+    """
+    slips, position = [np.zeros((len(moves), 0))], system.net.points + x
+    for thread in system.net.threads:
+        if any(thread.friction):
+            first, second = thread.segments.T
+            along = position[second] - position[first]
+            along /= np.linalg.norm(along, axis=1)[:, None]
+            slips.append(((moves[:, second] - moves[:, first]) * along).sum(axis=2))
+    _, size, vectors = np.linalg.svd(moves.reshape(len(moves), -1).T, full_matrices=False)
+    basis = vectors[size > OPEN * size.max(initial=0.0)]
+    if not len(basis):
+        return moves
+    turned, slip, _ = np.linalg.svd(basis @ np.hstack(slips))
+    without = turned.T[np.count_nonzero(slip > OPEN * size.max()) :] @ basis
+    if not len(without):
+        return np.zeros_like(moves)
+    mixed = np.random.default_rng(2).uniform(-1.0, 1.0, (len(moves), len(without))) @ without
+    some = np.tensordot(mixed, moves, axes=1)
+    return some / np.abs(some).max(axis=(1, 2))[:, None, None]
+
+
 class NullSpace:
     """Moves without stiffness of a tangent K, by the factorization of K + τ G.
 
@@ -190,15 +215,17 @@ class NullSpace:
 
     def floating(self, system, x):
         """Parts that may move at no cost about a displacement x, a `Floating`; None where there are none."""
-        moves, levers = np.zeros((SAMPLES, system.rows, 3)), system.levers[:, None]
+        rings = sum(len(thread.friction) for thread in system.net.threads if any(thread.friction))
+        moves, levers = np.zeros((SAMPLES + rings, system.rows, 3)), system.levers[:, None]
         for move, p in zip(
-            moves, np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, len(system.free))), strict=True
+            moves, np.random.default_rng(0).uniform(-1.0, 1.0, (len(moves), len(system.free))), strict=True
         ):
             change = self.part(p)
             if change is not None and (largest := np.abs(levers * system.rows_of(change)).max(initial=0.0)) > OPEN:
                 move.ravel()[system.free] = change / largest
+        moves = _without_slip(system, x, moves) if rings else moves
         for part_held in system.unsupported_parts:  # which the tangent's anchors hold
-            moves[:, part_held.rows, part_held.axis] += np.random.default_rng(1).uniform(0.5, 1.0, (SAMPLES, 1))
+            moves[:, part_held.rows, part_held.axis] += np.random.default_rng(1).uniform(0.5, 1.0, (len(moves), 1))
         free = np.any(np.abs(levers * moves) > OPEN, axis=0)
         # What may move at no cost turns as well, where it goes on: its other components change to second order.
         free |= free.any(axis=1)[:, None] & ~system.supported

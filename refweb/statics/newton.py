@@ -364,7 +364,7 @@ class Newton:
 
         Rounding of a line's ends and of its tension leaves a force of machine precision times T + k |x| at its nodes.
         Moves without stiffness are left out; they follow from the duality bound or, without one, from the null space of
-        the tangent.
+        the tangent. So is slip that turns back over a ring with friction, which resists it.
         """
         system, asked = self.system, self.follows or state.stats.get("smallest_pivot") is not None
         if not asked and (by_factor := self._deviations_by_factor_at_hand(state)) is not None:
@@ -376,7 +376,7 @@ class Newton:
             null = NullSpace(self.factor, self._tiny * system.pattern.matrix(self.geometric))
             if not system.convex:
                 state.floating = null.floating(system, state.x)
-            if state.floating is not None:
+            if state.floating is not None or any(any(thread.friction) for thread in system.net.threads):
                 solve = null.solve
         forces = self.disturbing(state)
         deviations = [solve(force) for force in forces]

@@ -108,8 +108,26 @@ def over_an_arch(load):
     rope = {"nodes": nodes, "friction": 0.2, "modulus": 1e8}
     return scene(
         points.tolist(), nodes[1:-1], rope, {"kind": "static"}, {0: 1.0, 21: load},
-        gravity={"acceleration": [0.0, 0.0, -G]},
+        gravity={"acceleration": [0.0, 0.0, -G]}, accuracy={},
+        observe=[{"name": f"z{n}", "quantity": "position", "node": n, "component": "z"} for n in (0, 21)],
     )  # fmt: skip
+
+
+def test_equal_loads_with_friction():
+    """All rings slip outward, the tension falls by e^(−μθ) at each, and friction resists what would turn back.
+
+    The ends are where the natural length of half the thread is used up. They have ±, and are not open.
+    """
+    step = np.pi / 19.0
+    chord, turns = 2.0 * np.sin(0.5 * step), 0.5 * step + step * np.arange(10)
+    stretch = 1.0 + G * np.exp(-0.2 * turns) / 1e3
+    share = np.append(np.ones(9), 0.5)  # of the segment at the top each half has a half
+    exact = -(1.0 + G / 1e3) * (2.0 + (share * chord * (1.0 - 1.0 / stretch)).sum())
+    solution = refweb.run(over_an_arch(1.0))
+    assert not any(f.code == "loose-nodes" for f in solution.findings)
+    for result in solution.results.values():
+        assert result.error is not None and result.error < 1e-9
+        assert result.value == pytest.approx(exact, abs=result.error + 1e-11)
 
 
 def test_a_load_just_beyond_the_capstan():
