@@ -159,6 +159,7 @@ def check_hits(seeds):
         assert found.keys() <= kinds and (not given or found.keys() == kinds), found
 
 
+@pytest.mark.slow
 def test_random_hits():
     check_hits(range(12))
 

@@ -306,6 +306,11 @@ ALIKE = (
     "winch-drum",
     "drawstring",
     "platform-on-ropes",
+    "closing-net",
+    "arms",
+    "four-satellites",
+    "net-capture",
+    "corner-control",
 )
 """Scenes that call for what others call for, on another web, or each part of which others call for."""
 

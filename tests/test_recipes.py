@@ -101,6 +101,7 @@ def test_energies(tmp_path, capsys):
     assert whole == pytest.approx(0.5 * 0.2 * 5.0**2, rel=1.01 * drift) and history["dissipated_energy"][-1] > 0.0
 
 
+@pytest.mark.slow
 def test_pandas_and_pyvista(tmp_path):
     """In a process of its own, as OpenGL that is broken ends the one that it is in."""
     pandas = pytest.importorskip("pandas")

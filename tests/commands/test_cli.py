@@ -17,7 +17,15 @@ from refweb.__main__ import main
 from refweb.statics import load_steps
 
 WRONG = {
-    "unknown table": ("[[load]]", "[[loads]]", '[[loads]]: unknown table or key, did you mean "load"?'),
+    "unknown table": (
+        "[[load]]",
+        "[[loads]]",
+        '[[loads]]: unknown table or key, or of a plug-in that is not installed, did you mean "load"?',
+    ),
+        "[[load]]",
+        "[[loads]]",
+        '[[loads]]: unknown table or key, or of a plug-in that is not installed, did you mean "load"?',
+    ),
     "unknown key": ("side =", "sides =", '[web] sides = 0.5: unknown key, did you mean "side"?'),
     "kind": ('"window"', '"windows"', '[web] kind = "windows": unknown kind, did you mean "window"?'),
     "mesh": ('"square"', '"squares"', '[web] mesh = "squares" must be one of'),

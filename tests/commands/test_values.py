@@ -14,7 +14,8 @@ WRONG = {
     "cable.aera=1": 'net.toml with cable.aera = 1: [cable] aera = 1: unknown key, did you mean "area"?',
     "cable.area=-1": "net.toml with cable.area = -1: [cable] area = -1.0 must be > 0 [m²]",
     "cable.area=wide": 'net.toml with cable.area = "wide": [cable] area = "wide" must be a number [m²]',
-    "cabel.area=1": 'net.toml with cabel.area = 1: [cabel]: unknown table or key, did you mean "cable"?',
+    "cabel.area=1": "net.toml with cabel.area = 1: [cabel]: unknown table or key, or of a plug-in "
+    'that is not installed, did you mean "cable"?',
     "load.0.node=center": 'net.toml with load.0.node = "center": [[load]] 1 node = "center" names no node',
     "load.5.node=1": "net.toml: load.5.node = 1: load.5: the number must be 0 … 0; 1 adds one",
     "solve.kind=dynamic": 'net.toml with solve.kind = "dynamic": [solve] duration is missing',

@@ -163,6 +163,7 @@ def test_error_of_elements():
     assert "discretisation" not in refweb.run(catenary(8)).summary()["results"]["sag"]
 
 
+@pytest.mark.slow
 def test_error_of_elements_in_motion(tmp_path):
     """A taut string that is plucked in its fundamental: its phase, which elements of order 1 and lumped mass delay."""
     count, end = 8, 0.1

@@ -27,6 +27,7 @@ def snap(gap, end=0.07):
     ).results
 
 
+@pytest.mark.slow
 def test_energy_tells_of_kinks_that_lie_alike():
     """It flies back as fast as it came, half a period π √(L m/EA) after the line was taut.
 

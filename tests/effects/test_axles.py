@@ -205,6 +205,7 @@ def paddle(method, **more):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_contact_with_friction_turns_a_body_on_an_axle():
     """A paddle off its axle that strikes a line: central differences and CVODE agree within their ±."""
     first, second = paddle("central-difference").results, paddle("bdf").results

@@ -245,6 +245,7 @@ def test_a_ball_that_slides_ends_rolling(solve):
     assert s.state.v[row, 0] == pytest.approx(5 / 7, rel=deep / radius)
 
 
+@pytest.mark.slow
 def test_a_box_slides_to_rest():
     """Over (v √(v² + s²) + s² asinh(v/s))/(2 μ g), s being the slip velocity, and does not turn."""
     k, v, slip, mu = 1e5, 1.0, 1e-2, 0.3
@@ -441,6 +442,7 @@ def test_meshes(pair, files, monkeypatch):
     test_force_is_the_slope_of_an_energy(pair, LAWS[0])
 
 
+@pytest.mark.slow
 def test_a_mesh_is_the_box_that_it_is(files):
     """Force of a ball on a block from a file and on a box with sharp edges, beyond a face, an edge and a corner."""
     ball = dict(name="a", radius=0.1, mass=1.0)

@@ -647,6 +647,7 @@ def oblique(**solve):
     return solution.state.x, solution.state.v, solution.history["dissipated_energy"][-1]
 
 
+@pytest.mark.slow
 def test_integrators_agree_on_a_hit_with_losses():
     """CVODE and IDA to their tolerances, central differences with errors of order 2."""
     x, v, lost = oblique(method="cvode", rtol=1e-11, family="adams")

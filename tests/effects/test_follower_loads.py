@@ -104,6 +104,7 @@ def arc_tension(natural, push):
     return push * 0.5 / np.sin(brentq(excess, 1e-6, np.pi - 1e-6, xtol=1e-15))
 
 
+@pytest.mark.ordinary("2-1.0", "1-1.5", "3-1.5", "1-0.98")
 @pytest.mark.parametrize("natural", [0.98, 1.0, 1.5])
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_arc_converges_with_twice_the_order(order, natural):

@@ -101,6 +101,7 @@ def test_stiffness_on_a_plane_follows_from_the_shortest_line():
     assert 0.3 * deep < told["overlap"] < deep
 
 
+@pytest.mark.slow
 def test_a_ball_rolls_down_a_slope():
     """5/7 g sin α, without slip, of bodies on ground; and a box on it rests."""
     angle = 0.3
@@ -277,6 +278,7 @@ def test_keys_of_ground_are_checked(keys, message):
         refweb.Body(name="it", position=(0, 0, 0), **keys)
 
 
+@pytest.mark.slow
 def test_the_error_of_terrain_is_that_of_the_ground(tmp_path):
     """None on a slope, whatever its rim; of waves it falls with the grid."""
     slope = write_csv(tmp_path / "slope.csv", grid_of(lambda x, y: 0.2 * x - 0.1 * y))

@@ -99,6 +99,7 @@ def test_a_lift_converges_to_its_closed_form(law):
         assert abs(slope(error, 1.0 / nsteps) - 2.0) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", nets.some([Cvode, Ida], 2))
 def test_a_lift_by_sundials(solver):
     """Errors of a method of order 2 go with rtol to the power 2/3, by 21 over two decades; half is asked for."""

@@ -67,6 +67,7 @@ def closed(history, size):
 HAULED, SLIPPED, TURNED = (TENSION, 0.0, 30.0), (BRAKE, -1.5, 0.0), (SPEEDS, 0.0, MASS * G)
 
 
+@pytest.mark.ordinary("central-difference-winch1-*", "ida-*")
 @pytest.mark.parametrize(
     "method, winch, start, pull",
     [

@@ -139,6 +139,7 @@ def test_force_is_minus_the_slope_of_energy(body, place, exponent):
         np.testing.assert_allclose(change, -product, rtol=0, atol=2e-6 * np.abs(product).max())
 
 
+@pytest.mark.slow
 @pytest.mark.ordinary("body0")
 @pytest.mark.parametrize("body", [WALL, TOP])
 def test_a_net_that_flies_into_it_is_thrown_back(body, tmp_path):

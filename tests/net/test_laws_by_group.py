@@ -130,6 +130,7 @@ SAME = 1e-14
 """The same sums, but compiled apart: products may or may not be fused into them, a few roundings of 1.1e-16."""
 
 
+@pytest.mark.slow
 @pytest.mark.ordinary("1")
 @pytest.mark.parametrize("order", [1, 2])
 def test_each_line_has_its_law(order):

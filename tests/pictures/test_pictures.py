@@ -114,6 +114,7 @@ def test_picture(film, monkeypatch, no_opengl):
     assert count > 500 and share > 0.02
 
 
+@pytest.mark.slow
 def test_both_ways_of_drawing_show_the_same(film, monkeypatch, tmp_path):
     images, found = drawing.images, []
     monkeypatch.setattr(drawing, "images", lambda *job: found.append(images(*job)) or found[-1])
@@ -139,6 +140,7 @@ def test_a_window_that_kills_the_child_is_survived(film, monkeypatch, tmp_path, 
     assert "Error" not in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_one_renderer_is_kept_for_a_film(film, monkeypatch, tmp_path):
     """One child for all frames, which is gone at the end; its images are those of a child of their own."""
     children, start = [], drawing.Renderer.start_child
@@ -213,6 +215,7 @@ def test_curved_elements_of_a_run_are_drawn(no_opengl, tmp_path, order):
     assert np.linalg.norm(frame.paths - chord, axis=2).max() > 0.02
 
 
+@pytest.mark.slow
 def test_a_frame_in_memory_is_that_of_its_folder(tmp_path):
     """To the last bit: curved elements, a body, supports, all that is known of lines and nodes; and so is its page."""
     scene = refweb.Scene(
@@ -417,6 +420,7 @@ def modes():
     return refweb.modes("catenary", 2)
 
 
+@pytest.mark.slow
 def test_a_mode_says_its_frequency(modes, no_opengl, tmp_path):
     """With ± and unit; a folder of modes is drawn as they are in memory."""
     found = modes.results["frequency_2"]

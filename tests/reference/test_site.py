@@ -74,9 +74,14 @@ def follow(path, folder, slow):
 SLOW = [path for path in PAGES if any(long for *_, long in blocks(path))]
 
 
+LONG = ("learning", "size-a-net")
+"""Pages whose blocks take more than 5 s of CPU: training of a policy, and a study of nets; both are slow tests."""
+
+
 @pytest.mark.parametrize(
     "path, slow",
-    [(path, False) for path in PAGES] + [pytest.param(path, True, marks=pytest.mark.slow) for path in SLOW],
+    [pytest.param(path, False, marks=[pytest.mark.slow] * (path.stem in LONG)) for path in PAGES]
+    + [pytest.param(path, True, marks=pytest.mark.slow) for path in SLOW],
     ids=lambda value: value.stem if isinstance(value, pathlib.Path) else str(value),
 )
 def test_a_page_does_what_it_says(path, slow, tmp_path):

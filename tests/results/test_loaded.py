@@ -190,6 +190,7 @@ def test_what_is_no_run_is_refused(tmp_path):
         refweb.load(tmp_path / "modes")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no locks that end with a process")
 def test_a_killed_run_says_that_it_is_dead_and_how_far_it_came(tmp_path, capsys):
     """It says that it is alive before, and nobody may write into its folder then."""

@@ -203,6 +203,7 @@ def test_at_a_bound(tmp_path):
     assert list(found.optimality["at_bound"]) == ["cable.area"] and found.optimality["residual"] < 1e-12
 
 
+@pytest.mark.slow
 def test_where_no_design_meets_the_requirements(tmp_path, capsys):
     """At the largest area the stress is nearest to its limit; the text says by how much it fails."""
     path = write(tmp_path, parameters={"cable.area": {"from": 1e-7, "to": 2e-6}}, starts=1)

@@ -190,6 +190,7 @@ def rest_of(seed):
     return True, shared
 
 
+@pytest.mark.slow
 def test_balls_in_random_nets():
     """Shares balance all forces by a program of its own; most nets share the push."""
     rests = [rest_of(seed) for seed in range(4)]

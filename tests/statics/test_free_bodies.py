@@ -418,6 +418,7 @@ def test_two_balls_that_hang_from_one_point():
         refweb.run(hanging(5.0))
 
 
+@pytest.mark.slow
 def test_a_rope_that_a_wheel_alone_holds():
     """Two equal weights on a rope over a wheel: it has their weight, though nothing else holds the web."""
     points = [[-0.25, 0, -1], [-0.25, 0, 0], [0, 0, 0.25], [0.25, 0, 0], [0.25, 0, -1]]

@@ -75,6 +75,7 @@ def check_slopes(left):
 NAMES = [o.name for o in OBSERVE]
 
 
+@pytest.mark.ordinary("tension-only", "elastic-plastic", "smooth", "linear")
 @pytest.mark.parametrize("law", LAWS)
 def test_taylor_of_laws(law):
     """Of every result by modulus, area, density, prestrain and a load; a table has no modulus."""
@@ -87,6 +88,7 @@ def test_taylor_of_laws(law):
 YIELDS = dict(yield_stress=1e5, hardening=2e6)
 
 
+@pytest.mark.slow
 def test_taylor_of_lines_that_yield():
     """Some of them beyond their yield stress: by yield stress, hardening, modulus, area by group, and a load."""
     scene = net("elastic-plastic", **YIELDS)

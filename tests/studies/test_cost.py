@@ -71,6 +71,7 @@ def ladder(found, method):
     return [t for t in found.trials if t.method == method and t.status == "solved"]
 
 
+@pytest.mark.slow
 def test_what_is_compared(found):
     """The first observable that a state alone determines, by every method at every setting."""
     assert found.observable.name == "centre" and found.status == "solved"

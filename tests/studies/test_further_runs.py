@@ -90,6 +90,7 @@ def test_a_start_on_the_edge_is_statistical():
     assert found.results["place"].error >= 2.0 * spread["deviation"] > 0.0
 
 
+@pytest.mark.slow
 def test_first_touch_has_no_limit_by_what_finer_elements_and_stiffer_contact_do():
     scene = refweb.Scene.load("triangle-impact", {"solve.duration": 0.05})
     peak = refweb.Observe(name="peak", quantity="reaction", body="ball", reduce="max")

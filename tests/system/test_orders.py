@@ -511,6 +511,7 @@ def test_values_of_a_line_are_its_largest_and_supports_carry_the_weight(order, s
     np.testing.assert_array_equal(np.flatnonzero(reaction), net.web.rim)
 
 
+@pytest.mark.slow
 def test_divided_lines_move_as_several_lines_do():
     """A cable of 4 lines in 3 pieces each, and one of 12 lines, under the same load: the same motion, the same peaks.
 
@@ -589,6 +590,7 @@ def segment_distance(a, b, c):
     return np.linalg.norm(a + place * (b - a) - c)
 
 
+@pytest.mark.ordinary("several lines-2-2", "several lines-1-5", "where*-3-1", "the middle*")
 @pytest.mark.parametrize("order, subdivide", FINER)
 @pytest.mark.parametrize("ball", BALLS)
 def test_contact_of_a_straight_line_is_one_at_any_division(ball, order, subdivide):

@@ -46,6 +46,7 @@ def calls(mesh, cells):
     return count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mesh", some(["hexagon", "triangle", "square"], 3))
 def test_no_loop_over_lines_or_nodes(mesh):
     """Nine times the lines, thousands more, take a few calls for each further row of cells."""
