@@ -5,6 +5,8 @@
 import contextlib
 import json
 
+from ..errors import InputError
+
 
 def add_scene(parser):
     """The scene to work on."""
@@ -44,6 +46,30 @@ def print_json(content):
 def add_force(parser):
     """Leave to replace results."""
     parser.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")
+
+
+def add_workers(parser, runs="it", use=""):
+    """Add the options for workers: their help names the ``runs``, and the ``use`` of several processes."""
+    text = f"processes of this machine{use} (default: one for each processor)"
+    parser.add_argument("--workers", type=int, metavar="N", help=text)
+    text = f"run {runs} on a Dask cluster, tcp://HOST:PORT of its scheduler; needs refweb[cluster]"
+    parser.add_argument("--scheduler", metavar="ADDRESS", help=text)
+
+
+@contextlib.contextmanager
+def workers_of(arguments, text):
+    """Options of `refweb.sweep` and `refweb.size` for the workers asked for; progress begins with a text."""
+    from ..results.progress import followed
+    from ..sweeps import workers
+
+    if arguments.workers is not None and arguments.scheduler is not None:
+        raise InputError(
+            f"--workers {arguments.workers} has no meaning with --scheduler, whose workers are there: leave it out"
+        )
+    with contextlib.ExitStack() as stack:
+        executor = stack.enter_context(workers.cluster(arguments.scheduler)) if arguments.scheduler else None
+        tell = stack.enter_context(followed(True, text))
+        yield {"executor": executor, "workers": arguments.workers, "progress": tell}
 
 
 @contextlib.contextmanager

@@ -6,16 +6,15 @@ Keys are the format of requirements files, and the docstring of `Sizing` is text
 from __future__ import annotations
 
 import math
-import os
 import pathlib
-import tomllib
 from dataclasses import field as plain_field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError, in_file, refused_at
 from ..messages import nearest, quote, short
-from ..sweeps.study import Distribution, Range, Study
+from ..scene import SHIPPED_SIZINGS
+from ..sweeps.study import Distribution, Range, Study, between, is_file_of, plain, refuse_unknown, tables_of
 from ..sweeps.study import read_parameters as read_draws
 from ..tables import Several, Table, boolean, checked, choice, field, integer, real, table, text
 
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
 
     from ..scene import Scene
 
-SHIPPED_SIZINGS = pathlib.Path(__file__).parent / "shipped"
-"""Folder of the requirements files shipped with refweb."""
 SCENE_FILE = "scene.toml"
 """File of a scene that was given in Python, in the folder of its sizing."""
 METHODS = ("auto", "gradients", "enumeration", "evolution", "direct")
@@ -52,11 +49,7 @@ class Free(NamedTuple):
 
     def at(self, share: float) -> float:
         """The number at a fraction of its range, 0 to 1."""
-        if share in (0.0, 1.0):
-            return self.high if share else self.low
-        if self.log:
-            return math.exp(math.log(self.low) * (1.0 - share) + math.log(self.high) * share)
-        return self.low + (self.high - self.low) * share
+        return between(self.low, self.high, self.log, share)
 
     def share(self, value: float) -> float:
         """The fraction of its range at which a number is."""
@@ -361,8 +354,7 @@ class Sizing(Table):
             for name, r in self.requirements.items()
         }
         if self.draws:
-            study = Study(scene="drawn", parameters=self.draws, sample="random", count=self.count)
-            given["draws"] = study.to_dict()["parameters"]
+            given["draws"] = {path: plain(drawn) for path, drawn in self.draws.items()}
         return given
 
 
@@ -385,14 +377,7 @@ def shipped() -> dict[str, pathlib.Path]:
 
 def is_sizing(source: Any) -> bool:
     """True for a requirements file, and for the name of a shipped one if no file has that name."""
-    path = pathlib.Path(source)
-    if not os.path.isfile(path):  # False of a name that no file can have
-        return path.name.removesuffix(".toml") in shipped() and len(path.parts) == 1
-    try:
-        given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except (ValueError, OSError, RecursionError):
-        return False
-    return "web" not in given and {"scene", "requirements"} <= given.keys()
+    return is_file_of(source, shipped(), lambda keys: "web" not in keys and {"scene", "requirements"} <= keys)
 
 
 def load(source: str | PathLike[str]) -> Sizing:
@@ -403,23 +388,10 @@ def load(source: str | PathLike[str]) -> Sizing:
     InputError
         Where there is no such file or name, or it is wrong.
     """
-    path, known = pathlib.Path(source), shipped()
-    if not path.is_file():
-        if (name := str(path).removesuffix(".toml")) not in known:
-            hint = nearest(path.stem, known)
-            raise InputError(f"{short(str(source))}: no such file and no shipped requirements, {hint}")
-        path = known[name]
-    try:
-        given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except (ValueError, OSError, RecursionError) as error:
-        raise InputError(f"{path.name}: cannot be read: {error}") from None
+    path, given = tables_of(source, shipped(), "requirements")
     with in_file(path.name):
         if "requirements" not in given:
             wanted = "a scene, [parameters], [requirements] and what to minimise"
             raise InputError(f"holds no requirements: a requirements file has {wanted}")
-        known_keys = [key for key in Sizing.keys({}) if key != "folder"]
-        for key in given:
-            if key not in known_keys:
-                hint = nearest(key, known_keys)
-                raise InputError(f"{short(key)} = {quote(given[key])}: unknown table or key, {hint}")
+        refuse_unknown(given, Sizing)
         return Sizing(**{"title": path.stem, **given, "folder": path.resolve().parent})

@@ -203,7 +203,7 @@ class Runs:
             for case, base, (task, settings) in missing.values()
         ]
         single = local and len(jobs) == 1
-        for outcome in map(solve, jobs) if single else through(jobs, _Lasting(self.crew)) if jobs else ():
+        for outcome in map(solve, jobs) if single else through(jobs, self.crew, last=False) if jobs else ():
             row = {"case": outcome.key, **missing[outcome.key][0].values, **outcome.cells}
             self.rows[outcome.key] = row
             self.fresh += 1
@@ -259,16 +259,6 @@ class Runs:
         reserves = [FAILED] if None in values else [r for known in values for r in formula.reserves(known)]
         verdict = False if False in verdicts else None if None in verdicts else True
         return Interval(min(r.low for r in reserves), min(r.high for r in reserves)), verdict
-
-
-class _Lasting:
-    """Workers that go on after some jobs: `refweb.sweeps.workers.through` stops others at its end."""
-
-    def __init__(self, crew):
-        self.local, self.parallel, self.submit, self.renew = crew.local, crew.parallel, crew.submit, crew.renew
-
-    def stop(self):
-        """Do nothing: the end of the sizing stops the workers."""
 
 
 def _as_toml(sizing):

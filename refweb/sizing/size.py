@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError, SolverError
+from ..errors import SolverError
 from ..messages import quote
 from ..results.case_rows import results_among, written
 from ..results.files import as_toml, write_text
@@ -20,7 +20,7 @@ from ..results.progress import followed
 from ..results.provenance import versions
 from ..results.run_status import Clock, recorded
 from ..sweeps.study_result import finite
-from ..sweeps.workers import Given, Processes
+from ..sweeps.workers import crew_of
 from .problem import Problem
 from .requirements import Sizing, load
 from .runs import Runs
@@ -142,13 +142,9 @@ def size(
         Where no design gives a result, and where the folder cannot be written or the executor takes no more runs.
     """
     clock = Clock()
-    if executor is not None and workers is not None:
-        raise InputError(f"workers = {workers} has no meaning with an executor, which has its own: leave one out")
-    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
-        raise InputError(f"workers = {quote(workers)} must be a whole number ≥ 1")
+    crew = crew_of(executor, workers)
     sized, problem = prepared(requirements)
-    crew = Processes(workers) if executor is None else executor
-    runs = Runs(problem, out, crew if isinstance(crew, Given | Processes) else Given(crew))
+    runs = Runs(problem, out, crew)
     sized.recorded = runs.recorded
     if announce is not None:
         announce(sized)
@@ -256,22 +252,28 @@ def _requirement(number, name, runs, judged, optimum, method):
 
 def _nearest(sized):
     """Text on the design that is nearest to meeting all requirements."""
-    worst = min(sized.requirements, key=lambda entry: entry["least"])
-    design = ", ".join(f"{name} = {_short(value)}" for name, value in sized.values.items())
+    worst, design = min(sized.requirements, key=lambda entry: entry["least"]), _text_of(sized.values)
     wanted = f" with probability {worst['probability']:g}" if worst["probability"] is not None else ""
-    how = "is not decided within ±" if worst["holds"] is None else f"fails by {-100.0 * worst['least']:.3g} %"
+    how = f"fails by {-100.0 * worst['least']:.3g} % of its limit"
+    if worst["holds"] is None:
+        how = "is not decided within ±; a run with a smaller ± decides it"
     text = "no design within bounds meets all requirements"
-    advice = "; a run with a smaller ± decides it" if worst["holds"] is None else ""
+    return f"{text}: nearest is {design}, where {worst['name']}, {worst['condition']}{wanted}, {how}"
+
+
+def _text_of(values):
+    """Free numbers of a design as text."""
+    texts = {name: f"{value:.4g}" if isinstance(value, float) else quote(value) for name, value in values.items()}
+    return ", ".join(f"{name} = {value}" for name, value in texts.items())
+
+
+def _count(designs, adjective, verb, of_several):
+    """Number of some designs, with an adjective and a verb, which is another one ``of_several``."""
     return (
-        f"{text}: nearest is {design}, where {worst['name']}, {worst['condition']}{wanted}, {how} of its limit".replace(
-            "± of its limit", "±"
-        )
-        + advice
+        f"{len(designs)} {adjective}design {verb}"
+        if len(designs) == 1
+        else f"{len(designs)} {adjective}designs {of_several}"
     )
-
-
-def _short(value):
-    return f"{value:.4g}" if isinstance(value, float) else quote(value)
 
 
 def _add_notes(sized, runs, judged):
@@ -282,22 +284,17 @@ def _add_notes(sized, runs, judged):
     ]
     if judged.feasible is True and better:
         lower = min(better, key=lambda j: j.value)
-        design = ", ".join(
-            f"{name} = {_short(value)}" for name, value in runs.problem.space.values(lower.design).items()
-        )
-        names = [
-            name for name, verdict in zip(runs.problem.requirements, lower.verdicts, strict=True) if verdict is None
-        ]
-        count = "1 lesser design is" if len(better) == 1 else f"{len(better)} lesser designs are"
-        text = f"{count} not decided within ± and counted as not meeting the requirements, such as "
-        sized.notes.append(f"{text}{design} by {', '.join(names)}: a run with a smaller ± decides them")
+        verdicts = zip(runs.problem.requirements, lower.verdicts, strict=True)
+        by = ", ".join(name for name, verdict in verdicts if verdict is None)
+        text = f"{_count(better, 'lesser ', 'is', 'are')} not decided within ± and counted as not meeting the "
+        text += f"requirements, such as {_text_of(runs.problem.space.values(lower.design))} by {by}"
+        sized.notes.append(f"{text}: a run with a smaller ± decides them")
     alike = [j for j in every if j.feasible is True and j is not judged and j.objective.low < judged.objective.high]
     if sized.method == "enumeration" and alike:
-        count = "1 other design is" if len(alike) == 1 else f"{len(alike)} other designs are"
+        count = _count(alike, "other ", "is", "are")
         sized.notes.append(f"{count} as good within ± of {sized.sizing.minimise}: their order is not decided")
     if failed := [j for j in every if j.message]:
-        count = "1 design has" if len(failed) == 1 else f"{len(failed)} designs have"
-        sized.notes.append(f"{count} no result: {failed[0].message}")
+        sized.notes.append(f"{_count(failed, '', 'has', 'have')} no result: {failed[0].message}")
     _note_starts(sized, runs, judged)
     lacking = {item.name for item in results_among(judged.rows[0]) if judged.rows[0].get(f"{item.name} ±") is None}
     if lacking := sorted(lacking & runs.problem.used):

@@ -148,12 +148,12 @@ class Expression:
 
         plain = _NAME.sub(alias, text)
         try:
-            self._tree = ast.parse(plain.strip(), mode="eval").body
+            self.tree = ast.parse(plain.strip(), mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise InputError(f"{quote(text)}: is not a condition, such as max_stress > 2e8") from None
-        self._check(self._tree, 0)
-        condition = isinstance(self._tree, ast.Compare | ast.BoolOp) or (
-            isinstance(self._tree, ast.UnaryOp) and isinstance(self._tree.op, ast.Not)
+        self._check(self.tree, 0)
+        condition = isinstance(self.tree, ast.Compare | ast.BoolOp) or (
+            isinstance(self.tree, ast.UnaryOp) and isinstance(self.tree.op, ast.Not)
         )
         if condition and compares is False:
             raise InputError(f"{quote(text)}: is a condition, and must be a number, such as total_mass")
@@ -195,7 +195,7 @@ class Expression:
             For a sum of texts, an index out of range, and other operations that cannot be computed.
         """
         try:
-            return self._truth(self._tree, values)
+            return self._truth(self.tree, values)
         except (TypeError, AttributeError, ValueError, IndexError):
             raise self._refused(values) from None
 
@@ -257,7 +257,7 @@ class Formula(Expression):
 
     def __init__(self, text, names, compares=True):
         super().__init__(text, names, compares)
-        tree = ast.fix_missing_locations(ast.Expression(_Plain().visit(copy.deepcopy(self._tree))))
+        tree = ast.fix_missing_locations(ast.Expression(_Plain().visit(copy.deepcopy(self.tree))))
         self._code = compile(tree, "<formula>", "eval")
 
     def __call__(self, values):
@@ -281,7 +281,7 @@ class Formula(Expression):
         InputError
             For them, and for an index out of range.
         """
-        self._refuse_no_number(self._tree, values)
+        self._refuse_no_number(self.tree, values)
 
     def _refuse_no_number(self, node: Any, values):
         kind = self._kind(node, values)

@@ -16,20 +16,28 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError, in_file, refused_at
 from ..messages import nearest, quote, short
+from ..scene import SHIPPED_STUDIES
 from ..tables import Several, Table, boolean, checked, choice, field, integer, numbers_list, real, table, text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Collection, Iterator
     from os import PathLike
 
-SHIPPED_STUDIES = pathlib.Path(__file__).parent / "shipped"
-"""Folder of the studies shipped with refweb."""
 DESIGNS = ("grid", "zip")
 """Ways to combine lists and ranges."""
 SAMPLES = ("random", "sobol", "halton", "latin-hypercube")
 """Ways to take samples of ranges and distributions."""
 MOST_CASES = 1_000_000
 """Largest number of cases."""
+
+
+def between(low: float, high: float, log: bool, share: float) -> float:
+    """The number at a fraction of a range, 0 to 1: in equal steps, or with ``log`` in equal ratios."""
+    if share in (0.0, 1.0):
+        return high if share else low
+    if log:
+        return math.exp(math.log(low) * (1.0 - share) + math.log(high) * share)
+    return low + (high - low) * share
 
 
 class Range(NamedTuple):
@@ -42,11 +50,7 @@ class Range(NamedTuple):
 
     def at(self, share: float) -> float:
         """The number at a fraction of the range, 0 to 1."""
-        if share in (0.0, 1.0):
-            return self.high if share else self.low
-        if self.log:
-            return math.exp(math.log(self.low) * (1.0 - share) + math.log(self.high) * share)
-        return self.low + (self.high - self.low) * share
+        return between(self.low, self.high, self.log, share)
 
 
 class Distribution(NamedTuple):
@@ -340,16 +344,52 @@ def shipped() -> dict[str, pathlib.Path]:
     return {path.stem: path for path in sorted(SHIPPED_STUDIES.glob("*.toml"))}
 
 
-def is_study(source: Any) -> bool:
-    """True for a study file, and for the name of a shipped study if no file and no shipped scene has that name."""
+def is_file_of(source: Any, shipped: Collection[str], fits: Callable[[Any], bool]) -> bool:
+    """True for a TOML file whose keys fit a kind, and for a name that is ``shipped`` if no file has it."""
     path = pathlib.Path(source)
     if not os.path.isfile(path):  # False of a name that no file can have
-        return path.name.removesuffix(".toml") in shipped() and len(path.parts) == 1
+        return path.name.removesuffix(".toml") in shipped and len(path.parts) == 1
     try:
-        given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return fits(tomllib.loads(path.read_bytes().decode("utf-8-sig")).keys())
     except (ValueError, OSError, RecursionError):
         return False
-    return not given.keys() & {"web", "requirements"} and {"scene", "parameters"} <= given.keys()
+
+
+def tables_of(
+    source: str | PathLike[str], shipped: dict[str, pathlib.Path], kind: str
+) -> tuple[pathlib.Path, dict[str, Any]]:
+    """The path of a TOML file, or of a name that is ``shipped``, and its tables; ``kind`` names it in messages.
+
+    Raises
+    ------
+    InputError
+        Where there is no such file or name, and where it cannot be read.
+    """
+    path = pathlib.Path(source)
+    if not path.is_file():
+        if (name := str(path).removesuffix(".toml")) not in shipped:
+            hint = nearest(path.stem, shipped)
+            raise InputError(f"{short(str(source))}: no such file and no shipped {kind}, {hint}")
+        path = shipped[name]
+    try:
+        return path, tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except (ValueError, OSError, RecursionError) as error:
+        raise InputError(f"{path.name}: cannot be read: {error}") from None
+
+
+def refuse_unknown(given: dict[str, Any], kind: type[Table]) -> None:
+    """Refuse a table or key of a file that its kind does not have; `InputError`."""
+    known = [key for key in kind.keys({}) if key != "folder"]
+    for key in given:
+        if key not in known:
+            raise InputError(f"{short(key)} = {quote(given[key])}: unknown table or key, {nearest(key, known)}")
+
+
+def is_study(source: Any) -> bool:
+    """True for a study file, and for the name of a shipped study if no file and no shipped scene has that name."""
+    return is_file_of(
+        source, shipped(), lambda keys: not keys & {"web", "requirements"} and {"scene", "parameters"} <= keys
+    )
 
 
 def load(source: str | PathLike[str]) -> Study:
@@ -360,26 +400,11 @@ def load(source: str | PathLike[str]) -> Study:
     InputError
         Where there is no such file or study, or it is wrong.
     """
-    path, known = pathlib.Path(source), shipped()
-    if not path.is_file():
-        if (name := str(path).removesuffix(".toml")) not in known:
-            raise InputError(f"{short(str(source))}: no such file and no shipped study, {nearest(path.stem, known)}")
-        path = known[name]
-    try:
-        given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except (ValueError, OSError, RecursionError) as error:
-        raise InputError(f"{path.name}: cannot be read: {error}") from None
+    path, given = tables_of(source, shipped(), "study")
     with in_file(path.name):
         if "web" in given and "parameters" not in given:
             raise InputError("is a scene, not a study, which has a scene and [parameters]: use refweb run")
         if "requirements" in given:
             raise InputError("holds requirements, and is no study: use refweb size")
-        unknown = [key for key in given if key not in _study_keys()]
-        if unknown:
-            key = unknown[0]
-            raise InputError(f"{short(key)} = {quote(given[key])}: unknown table or key, {nearest(key, _study_keys())}")
+        refuse_unknown(given, Study)
         return Study(**{"title": path.stem, **given, "folder": path.resolve().parent})
-
-
-def _study_keys():
-    return [key for key in Study.keys({}) if key != "folder"]

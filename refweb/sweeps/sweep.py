@@ -32,7 +32,7 @@ from .design import Base, cases_of, files_of
 from .expressions import Expression
 from .study import Study, load
 from .study_result import Sweep, columns_of, row_of
-from .workers import Given, Processes, through
+from .workers import crew_of, through
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -86,18 +86,13 @@ def sweep(
         Where the folder cannot be written or the executor takes no more cases.
     """
     clock = Clock()
-    if executor is not None and workers is not None:
-        raise InputError(f"workers = {workers} has no meaning with an executor, which has its own: leave one out")
-    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
-        raise InputError(f"workers = {quote(workers)} must be a whole number ≥ 1")
+    crew = crew_of(executor, workers)
     study_run, base = prepared(scene, parameters, options)
     kept = Kept(out, study_run) if out is not None else Kept(None, study_run)
     study_run.path = kept.path
     study_run.gather(kept.rows)
     if announce is not None:
         announce(study_run)
-    crew = Processes(workers) if executor is None else executor
-    crew = crew if isinstance(crew, Given | Processes) else Given(crew)
     kept.begin(scene if isinstance(scene, Scene) else None)
     try:
         with recorded(study_run, clock, lambda: _done(study_run, kept)), followed(progress, "starting workers") as tell:

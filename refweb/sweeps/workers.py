@@ -18,8 +18,8 @@ import threading
 from collections import Counter, deque
 from typing import Any
 
-from ..errors import SolverError
-from ..messages import one_line
+from ..errors import InputError, SolverError
+from ..messages import one_line, quote
 from .case import Outcome, solve
 
 TRIES = 3
@@ -132,6 +132,23 @@ class Given:
             future.cancel()
 
 
+def crew_of(executor, workers):
+    """Workers of an executor, or so many processes of this machine, None for one for each processor.
+
+    Raises
+    ------
+    InputError
+        For both at once, and a number that is not whole or below 1.
+    """
+    if executor is not None and workers is not None:
+        raise InputError(f"workers = {workers} has no meaning with an executor, which has its own: leave one out")
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        raise InputError(f"workers = {quote(workers)} must be a whole number ≥ 1")
+    if executor is None:
+        return Processes(workers)
+    return executor if isinstance(executor, Given | Processes) else Given(executor)
+
+
 @contextlib.contextmanager
 def cluster(address):
     """The workers of a running Dask cluster, by the address of its scheduler, tcp://HOST:PORT.
@@ -140,8 +157,6 @@ def cluster(address):
     ------
     Given
     """
-    from ..errors import InputError
-
     try:
         from distributed import Client
     except ImportError:
@@ -159,7 +174,7 @@ def cluster(address):
         client.close()
 
 
-def through(jobs, workers):
+def through(jobs, workers, last=True):
     """Outcomes of jobs, each once, in the order in which they arrive.
 
     Parameters
@@ -167,7 +182,9 @@ def through(jobs, workers):
     jobs : iterable of Job
         Jobs to run.
     workers : Processes or Given
-        Workers that run the jobs; they are stopped at the end, also at an early one.
+        Workers that run the jobs.
+    last : bool
+        True to stop the workers at the end, also at an early one.
 
     Yields
     ------
@@ -196,7 +213,8 @@ def through(jobs, workers):
         if refused is not None:
             raise refused
     finally:
-        workers.stop()
+        if last:
+            workers.stop()
 
 
 def _any_alone(running):
