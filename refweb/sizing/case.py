@@ -63,8 +63,9 @@ class Task(NamedTuple):
 
         solution = run(scene, progress=False)
         summary = solution.summary()
-        results, sizes = dict(summary["results"]), sizes_of(scene.build())
-        results |= {n: {"value": sizes[n], "error": 0.0, "unit": SIZES[n]} for n in self.names if n in SIZES}
+        results, of_web = dict(summary["results"]), [n for n in self.names if n in SIZES]
+        sizes = sizes_of(scene.build()) if of_web else {}
+        results |= {n: {"value": sizes[n], "error": 0.0, "unit": SIZES[n]} for n in of_web}
         results |= {n: _of_strength(n, summary) for n in self.names if n in STRENGTH}
         if frequencies := [n for n in self.names if FREQUENCY.fullmatch(n)]:
             results |= _frequencies(scene, frequencies)
@@ -72,36 +73,44 @@ class Task(NamedTuple):
 
     def _slopes(self, scene, solution, summary):
         """Derivatives by column; one that no adjoint gives is left out."""
-        slopes, observed = {}, [o.name for o in scene.observables]
+        if not self.numbers:
+            return {}
+        from ..statics.gradients import Gradients
+
+        slopes, near = {}, _near_lines(scene, solution, self.results)
         sizes, strength = ([n for n in self.results if n in known] for known in (SIZES, STRENGTH))
         for path, number in self.numbers if sizes else ():
             by_difference = _by_difference(scene, path, number)
             slopes |= {slope_of(n, path): by_difference[n] for n in sizes}
-        if self.numbers:
-            slopes |= _of_lines(scene, solution, self.results, self.numbers)
-        governing = _Governing(scene, solution, summary) if strength and self.numbers else None
+        more = [observe for lines in near.values() for _, observe in lines]
+        more += [_governing(summary)] if strength else []
+        try:
+            gradients = Gradients(replace(solution, scene=scene.replace(observe=(*scene.observables, *more))))
+        except InputError:
+            return slopes
+        slopes |= _of_lines(gradients, near, [path for path, _ in self.numbers])
+        observed = [o.name for o in scene.observables]
         for name, (path, _) in itertools.product(self.results, self.numbers):
             try:
                 if slope_of(name, path) in slopes:
                     continue
                 if name in observed:
-                    gradient = solution.gradient(name, path)
+                    gradient = gradients.gradient(name, path)
                     if gradient.left is None:  # at a kink those by several paths have no sum
                         slopes[slope_of(name, path)] = float(gradient)
                 elif name in STRENGTH:
-                    slopes[slope_of(name, path)] = governing.slope(name, path)
+                    slopes[slope_of(name, path)] = _slope_of_strength(gradients, summary, name, path)
             except (InputError, SolverError):
                 continue
         return slopes
 
 
-def _of_lines(scene, solution, names, numbers):
-    """Values and derivatives of the lines close to the largest one, whose derivatives are those of the result."""
+def _near_lines(scene, solution, names):
+    """(Value, `Observe`) of lines close to the largest, by the name of a result that is the largest value of lines."""
     from ..results.observables.line import Strain, Stress, Tension
     from ..results.observables.observe import Observe
-    from ..statics.gradients import Gradients
 
-    cells, near, net = {}, {}, solution.state.system.net
+    near, net = {}, solution.state.system.net
     for observe in scene.observables:
         if observe.name not in names or observe.select not in (None, "max") or observe.part is not None:
             continue
@@ -116,19 +125,23 @@ def _of_lines(scene, solution, names, numbers):
                 (float(largest[n]), Observe(name=of_line(observe.name, n), quantity=observe.quantity, line=int(n)))
                 for n in lines
             ]
-    observed = scene.replace(observe=(*scene.observables, *(o for lines in near.values() for _, o in lines)))
-    gradients = Gradients(replace(solution, scene=observed)) if near else None
+    return near
+
+
+def _of_lines(gradients, near, paths):
+    """Values and derivatives of the lines close to the largest one, whose derivatives are those of the result."""
+    cells = {}
     for name, lines in near.items():
         try:
             of_name = {}
             for value, observe in lines:
-                slopes = {path: gradients.gradient(observe.name, path) for path, _ in numbers}
+                slopes = {path: gradients.gradient(observe.name, path) for path in paths}
                 if all(slope.left is None for slope in slopes.values()):
                     of_name[observe.name] = value
                     of_name |= {slope_of(observe.name, path): float(slope) for path, slope in slopes.items()}
             first = lines[0][1].name
             if first in of_name:
-                cells |= of_name | {slope_of(name, path): of_name[slope_of(first, path)] for path, _ in numbers}
+                cells |= of_name | {slope_of(name, path): of_name[slope_of(first, path)] for path in paths}
         except (InputError, SolverError):
             continue
     return cells
@@ -197,25 +210,20 @@ def _by_difference(scene, path, number):
     }
 
 
-class _Governing:
-    """The stress that the margin of safety and the utilisation of a static solution follow from."""
+def _governing(summary):
+    """Observable of the stress that the margin of safety and the utilisation of a static solution follow from."""
+    from ..results.observables.observe import Observe
 
-    def __init__(self, scene, solution, summary):
-        from ..results.observables.observe import Observe
-        from ..statics.gradients import Gradients
+    return Observe(name=GOVERNING, quantity="stress", line=summary["margin"]["line"])
 
-        self.margin, self.used = summary["margin"], summary["utilisation"]
-        observe = Observe(name=GOVERNING, quantity="stress", line=self.margin["line"])
-        observed = scene.replace(observe=(*scene.observables, observe))
-        self._gradients = Gradients(replace(solution, scene=observed))
 
-    def slope(self, name, path):
-        """Derivative of the margin or of the utilisation by the number at a path."""
-        from ..statics.gradients import LIMITS
+def _slope_of_strength(gradients, summary, name, path):
+    """Derivative of the margin or of the utilisation by the number at a path."""
+    from ..statics.gradients import LIMITS
 
-        margin = self.margin
-        if path.rpartition(".")[2] in LIMITS or margin["value"] is None or margin["line"] != self.used["line"]:
-            raise InputError(f"{name} depends on {path} in another way than by a stress")
-        slope = float(self._gradients.gradient(GOVERNING, path))
-        stress, allowed = margin["stress"], margin["allowed"]
-        return slope / margin["strength"] if name == "utilisation" else -allowed / stress**2 * slope
+    margin = summary["margin"]
+    if path.rpartition(".")[2] in LIMITS or margin["value"] is None or margin["line"] != summary["utilisation"]["line"]:
+        raise InputError(f"{name} depends on {path} in another way than by a stress")
+    slope = float(gradients.gradient(GOVERNING, path))
+    stress, allowed = margin["stress"], margin["allowed"]
+    return slope / margin["strength"] if name == "utilisation" else -allowed / stress**2 * slope

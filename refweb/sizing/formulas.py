@@ -17,7 +17,7 @@ FALSE, TRUE = exact(-1.0), exact(1.0)
 """Reserves of what has no number, such as an equation."""
 
 
-class Formula(Expression):
+class Criterion(Expression):
     """An arithmetic expression, or a condition with its reserve.
 
     Parameters
@@ -32,17 +32,12 @@ class Formula(Expression):
 
     def __init__(self, text, names, compares):
         super().__init__(text, names, compares)
-        self.parts = list(_parts(self._tree)) if compares else [self._tree]
-
-    @property
-    def tree(self):
-        """Its syntax tree."""
-        return self._tree
+        self.parts = list(_parts(self.tree)) if compares else [self.tree]
 
     def number(self, values):
         """The `refweb.sweeps.expressions.Interval` of an arithmetic expression, with values by name."""
         try:
-            value = self._value(self._tree, values)
+            value = self._value(self.tree, values)
             if isinstance(value, Interval):
                 return value
         except (TypeError, AttributeError, ValueError, IndexError):

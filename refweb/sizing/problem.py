@@ -13,7 +13,7 @@ from ..messages import quote, short
 from ..results.observables.observe import bounds_by_name
 from ..sweeps.expressions import ANY, Interval
 from .case import QUANTITIES, SIZES, sizes_of
-from .formulas import Formula
+from .formulas import Criterion
 from .requirements import Free
 from .space import Design, Space, setting
 
@@ -33,9 +33,9 @@ class Problem:
     ----------
     space : refweb.sizing.space.Space
         Space of designs.
-    objective : refweb.sizing.formulas.Formula
+    objective : refweb.sizing.formulas.Criterion
         Formula of the objective.
-    requirements : dict of str to refweb.sizing.formulas.Formula
+    requirements : dict of str to refweb.sizing.formulas.Criterion
         Conditions by name.
     used : set of str
         Names that formulas use, without free numbers.
@@ -55,7 +55,8 @@ class Problem:
         self.sizing, self.space = sizing, Space(sizing)
         self.drawn = sizing.drawn()
         first = Design(tuple(self.space.starts(1, 0)[0]) if self.space.free else (), (0,) * len(self.space.listed))
-        self._check_ends(first)
+        for design in self._beside(first):
+            self.space.scene(design, self.drawn[0])  # each end and option makes a scene
         names, scenes = None, []
         for design in self._each_scene(first):
             *_, scene = self.space.scene(design, self.drawn[0])
@@ -71,12 +72,12 @@ class Problem:
                 raise InputError(f"parameters: {short(name)} is the name of a result: choose another, with paths")
         self._refuse_twice()
         with in_file("minimise"):
-            self.objective = Formula(sizing.minimise, [*self.space.names, *known], False)
-        self.requirements = {}
+            self.objective = Criterion(sizing.minimise, [*self.space.names, *known], False)
+        self.requirements, within = {}, self._within(scenes)
         for name, requirement in sizing.requirements.items():
             with in_file(f"requirements: {short(name)}"):
-                self.requirements[name] = Formula(requirement.condition, [*self.space.names, *known], True)
-                self._refuse_certain(self.requirements[name], scenes)
+                self.requirements[name] = Criterion(requirement.condition, [*self.space.names, *known], True)
+                self._refuse_certain(self.requirements[name], within)
                 self._refuse_equations(self.requirements[name], {*names, *QUANTITIES, *self.space.free} - {*of_throw})
         formulas = [self.objective, *self.requirements.values()]
         self.used = {name for formula in formulas for name in formula.used} - set(self.space.names)
@@ -87,11 +88,18 @@ class Problem:
 
     def _each_scene(self, first):
         """The first design with each of the scenes."""
-        if len(self.space.bases) == 1:
-            yield first
-            return
-        for number in range(len(self.space.bases)):
+        yield first
+        for number in range(1, len(self.space.bases)):
             yield Design(first.shares, (number, *first.options[1:]))
+
+    def _beside(self, first):
+        """The first design with each end of each number between bounds, and with each other option."""
+        for n in range(len(first.shares)):
+            for end in (0.0, 1.0):
+                yield Design((*first.shares[:n], end, *first.shares[n + 1 :]), first.options)
+        for n, options in enumerate(self.space.listed.values()):
+            for number in range(1, len(options)):
+                yield Design(first.shares, (*first.options[:n], number, *first.options[n + 1 :]))
 
     def _refuse_twice(self):
         """Refuse two free numbers at one path."""
@@ -103,16 +111,6 @@ class Problem:
                 if path in at:
                     raise InputError(f"parameters: {short(name)} and {short(at[path])} both set {path}: leave one out")
                 at[path] = name
-
-    def _check_ends(self, first):
-        """Refuse free numbers whose ends, or options, make no scene with the first of all others."""
-        for n in range(len(self.space.free)):
-            for end in (0.0, 1.0):
-                self.space.scene(Design((*first.shares[:n], end, *first.shares[n + 1 :]), first.options), self.drawn[0])
-        for n, options in enumerate(self.space.listed.values()):
-            for number in range(1, len(options)):
-                choice = (*first.options[:n], number, *first.options[n + 1 :])
-                self.space.scene(Design(first.shares, choice), self.drawn[0])
 
     def _within(self, scenes):
         """Interval of each name over all designs; values of options that are no numbers are left out."""
@@ -129,11 +127,9 @@ class Problem:
                 values[name] = Interval(min(labels), max(labels))
         return values
 
-    def _refuse_certain(self, formula, scenes):
-        """Refuse a requirement that holds for all designs, or for none."""
-        values = self._within(scenes)
-        if not formula.used <= values.keys() | set(self.space.listed):
-            values |= {name: ANY for name in formula.used - values.keys() - set(self.space.listed)}
+    def _refuse_certain(self, formula, within):
+        """Refuse a requirement that holds for all designs, or for none, of `_within`."""
+        values = dict.fromkeys(formula.used - set(self.space.listed), ANY) | within
         if formula.used <= values.keys() and (verdict := formula(values)) is not None:
             always = "is true of every design within bounds" if verdict else "is true of no design within bounds"
             raise InputError(f"{quote(formula.text)} {always}: leave it out or change its limit")
@@ -152,16 +148,8 @@ class Problem:
         if not used <= set(SIZES):
             return
         before = self._sizes(first, used)
-        for n in range(len(self.space.free)):
-            for end in (0.0, 1.0):
-                changed = Design((*first.shares[:n], end, *first.shares[n + 1 :]), first.options)
-                if _differ(before, self._sizes(changed, used)):
-                    return
-        for n, options in enumerate(self.space.listed.values()):
-            for number in range(1, len(options)):
-                changed = Design(first.shares, (*first.options[:n], number, *first.options[n + 1 :]))
-                if _differ(before, self._sizes(changed, used)):
-                    return
+        if any(_differ(before, self._sizes(design, used)) for design in self._beside(first)):
+            return
         numbers = ", ".join(self.space.names)
         raise InputError(f"{quote(self.sizing.minimise)} does not depend on {numbers}: every design is as good")
 

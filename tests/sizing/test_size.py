@@ -21,7 +21,7 @@ import refweb
 from refweb.__main__ import main
 from refweb.pictures.sizing import front
 from refweb.sizing.case import Task
-from refweb.sizing.formulas import Formula
+from refweb.sizing.formulas import Criterion
 from refweb.sizing.sqp import minimise
 from refweb.sweeps.case import Outcome
 from refweb.sweeps.expressions import Interval
@@ -515,7 +515,7 @@ def test_sequential_quadratic_programming(limit):
 
 def test_reserves_of_intervals():
     """Ends of all differences of two numbers within ±."""
-    formula = Formula("x > 2 * y and y < 4", ["x", "y"], True)
+    formula = Criterion("x > 2 * y and y < 4", ["x", "y"], True)
     first, second = formula.reserves({"x": Interval(3.0, 5.0), "y": Interval(0.5, 1.5)})
     assert first == (0.0, 4.0) and second == (2.5 / 4.0, 3.5 / 4.0)
     assert formula({"x": Interval(3.0, 5.0), "y": Interval(0.5, 1.6)}) is None
@@ -526,7 +526,7 @@ def test_reserves_of_intervals():
 )
 def test_reserves_and_their_slopes(text):
     """A condition is true where its reserve is above 0; the slope is that of differences."""
-    formula = Formula(text, ["x", "y"], True)
+    formula = Criterion(text, ["x", "y"], True)
     rng = np.random.default_rng(3)
     for x, y in rng.uniform(0.1, 4.0, (40, 2)):
         reserves = formula.reserves({"x": Interval(x, x), "y": Interval(y, y)})
