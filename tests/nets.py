@@ -30,6 +30,18 @@ METHODS = {
 """Every kind of steps, as keys of ``[solve]``."""
 
 
+SLACK_LINE = {
+    "web": {
+        "kind": "inline",
+        "points": [[0, 0, 0], [0.5, 0, 0]],
+        "lines": [[0, 1]],
+        "natural_length": [50.0],
+        "supports": [0],
+    },
+    "cable": {"law": "tension-only", "modulus": 1e6, "area": 1e-4, "density": 100.0},
+}
+"""Web and cable of one line that stays slack: its node and all bodies move as if it were not there."""
+
 SMALL = """
 title = "Small web"
 

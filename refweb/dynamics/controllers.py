@@ -63,6 +63,8 @@ class Controller:
     ----------
     meters : list of ndarray
         Data of the probes of observables of what is spent, see `refweb.results.observables.fuel`.
+    vector : bool
+        True if what it sets is a vector.
     largest : float
         Largest size of what is set.
     surfaces : list of float
@@ -99,11 +101,11 @@ class Controller:
         name, known = control.sets.partition(".")[0], [*INPUTS, *RATES, "body"]
         if name not in known:
             raise InputError(f"sets = {quote(control.sets)}: {quote(name)} has nothing to set, {nearest(name, known)}")
-        self._vector = name in VECTORS
+        self.vector = name in VECTORS
         self._not_negative = name == "winch" and control.sets.endswith(".tension")
-        if self._vector and len(control.measures) == 1 and control.direction is None:
+        if self.vector and len(control.measures) == 1 and control.direction is None:
             raise InputError(f"direction is missing: {control.sets} is a vector, and measures has one name")
-        if not self._vector and (len(control.measures) > 1 or control.direction is not None):
+        if not self.vector and (len(control.measures) > 1 or control.direction is not None):
             raise InputError(f"{control.sets} is one number: give one name in measures, and no direction")
         if self._attitude:
             for key, given in (("measures", control.measures), ("target", target)):
@@ -185,7 +187,7 @@ class Controller:
             raise SolverError(
                 f"[[control]] {quote(control.name)} at t = {time:.6g} s: act gave {short(repr(given))}, must be {what}"
             )
-        if self._vector and size == 1:
+        if self.vector and size == 1:
             direction = np.array(control.direction)
             value = value[0] * direction / np.linalg.norm(direction)
         if self._body is not None:
@@ -202,7 +204,7 @@ class Controller:
         self._spent, self._size, self._since = self.spent(time), norm, time
         self.largest = max(self.largest, norm)
         self._publish()
-        return value.tolist() if self._vector else float(value[0])
+        return value.tolist() if self.vector else float(value[0])
 
     def _publish(self):
         """Write what is spent to the meters."""
@@ -280,11 +282,10 @@ def check(scene: Scene, system: System) -> None:
     inputs, times = Inputs(system), row_times(scene)
     controllers = controllers_of(scene, system, [o.name for o in scene.observables], times)
     for number, made in enumerate(controllers):
-        control = made.control
-        vector = control.sets.partition(".")[0] in VECTORS
+        sets = made.control.sets
         with refused_at(f"[[control]] {number + 1}"):
-            inputs.checked(Command(0.0, control.sets, [0.0] * 3 if vector else 0.0))
-            inputs.refuse_factor(control.sets)
+            inputs.checked(Command(0.0, sets, [0.0] * 3 if made.vector else 0.0))
+            inputs.refuse_factor(sets)
     for observe in (observe for observe in scene.observables if observe.control is not None):
         with refused_at(f"[[observe]] {quote(observe.name)}"):
             made = next(made for made in controllers if made.control.name == observe.control)

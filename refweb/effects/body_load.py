@@ -50,14 +50,8 @@ def angular_velocity(x, v, cells, data, c):
     rate = v[row, 0], v[row, 1], v[row, 2]
     if load.oriented == 0.0:
         return rate
-    turned, mobility = matrix_at(x, row, cells[c, 2]), load.mobility
-    a, b, e = times_transposed(turned, rate)
-    along = (
-        mobility[0, 0] * a + mobility[0, 1] * b + mobility[0, 2] * e,
-        mobility[1, 0] * a + mobility[1, 1] * b + mobility[1, 2] * e,
-        mobility[2, 0] * a + mobility[2, 1] * b + mobility[2, 2] * e,
-    )
-    return times(turned, along)
+    turned = matrix_at(x, row, cells[c, 2])
+    return times(turned, times(load.mobility, times_transposed(turned, rate)))
 
 
 @kernel(FORCE)

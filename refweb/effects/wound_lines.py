@@ -172,11 +172,15 @@ def write_numbers(net: Net, elements: NDArray[np.int64], numbers: tuple[float, .
     return [(array, changed)]
 
 
+def elements_of(net: Net) -> NDArray[np.int64]:
+    """Elements on winches, shape (wound,)."""
+    return np.concatenate([elements for elements, _ in net.wound])
+
+
 def standing(net: Net) -> tuple[NDArray[np.bool_], Any]:
     """(True for each element on a winch, line data in which all winches stand still whatever the tension is)."""
     lines, wound = net.line_data.copy(), np.zeros(len(net.cells), dtype=bool)
-    for elements, _ in net.wound:
-        wound[elements] = True
+    wound[elements_of(net)] = True
     at = lines.column(FIRST) + NUMBERS
     lines.matrix[wound, at : at + 3] = -np.inf, np.inf, 0.0
     return wound, lines
@@ -190,7 +194,7 @@ def refuse_beside(net: Net) -> None:
     InputError
         For these.
     """
-    wound = np.concatenate([elements for elements, _ in net.wound])
+    wound = elements_of(net)
     for elements, _ in net.factors:
         for element in np.intersect1d(elements, wound)[:1]:
             raise InputError(
@@ -265,21 +269,16 @@ class WoundLines:
     def __init__(self, relax, column):
         self._relax, self._column = relax, column
 
-    @staticmethod
-    def _wound(net):
-        """Elements on winches, shape (wound,)."""
-        return np.concatenate([elements for elements, _ in net.wound])
-
     def taken_on(self, net: Net, x: NDArray[np.float64], t: float) -> NDArray[np.float64]:
         """Displacement of all rows with what winches have wound until t, from what they have before in x."""
         x, lost = x.copy(), np.zeros(len(net.cells))
-        span = t - numbers_in(net, x)[self._wound(net)[0], UNTIL]
+        span = t - numbers_in(net, x)[elements_of(net)[0], UNTIL]
         self._relax(max(span, thread_friction.LEAST), x, net.cells, net.line_data.matrix, lost, lost)
         return x
 
     def grown(self, net: Net, x: NDArray[np.float64], t: float) -> NDArray[np.float64]:
         """Length that is wound in a step, and what a winch may wind more, over that of the line [1]."""
-        wound, before = self._wound(net), numbers_in(net, x)
+        wound, before = elements_of(net), numbers_in(net, x)
         length = net.natural_length[wound]
         moved = np.abs(numbers_in(net, self.taken_on(net, x, t)) - before)[wound, SLIP] / length
         limit = net.line_data.matrix[wound, self._column + SPEED_LIMIT]

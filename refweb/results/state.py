@@ -58,7 +58,7 @@ class State:
         pressed = any(f.contact.felt for f in self.system.terms) or any(t.wraps for t in self.system.net.threads)
         felt = self.system.contact_forces.of(per_cell) if pressed else None
         threads = {thread.name: per_cell[i][0] for i, thread in self.system.threads.items()}
-        return force, per_cell.tension, contact, felt, threads
+        return force, per_cell.tension, contact, felt, threads, per_cell.lines[:, STRAIN]
 
     @property
     def threads(self) -> dict[str, NDArray[np.float64]]:
@@ -110,7 +110,7 @@ class State:
     def element_strain(self) -> NDArray[np.float64]:
         """Strain of each element, the largest over its quadrature points [1], shape (cells,)."""
         if self.system.net.wound:
-            return self.system.forces(self.time, self.x, self.v)[1].lines[:, STRAIN]
+            return self._forces[5]
         from ..effects.elasticity import strains
 
         strain = strains(self.system.at(self.time).net, self.x).max(axis=1)

@@ -3,8 +3,8 @@
 Each contact writes its depth and its force on the touched body to its cell, see
 `refweb.effects.base.ContactForce.felt`; of two bodies that is the force on the second. A thread that runs over bodies
 writes a force for each. The contact force on a body is the sum of these alone. It is zero if nothing touches the body,
-whatever else acts. One kernel computes this sum
-for all bodies: over the near cells in a step of the compiled loop, over all cells in a state.
+whatever else acts. One kernel computes this sum for all bodies: over the near cells in a step of the compiled loop,
+over all cells in a state.
 
 `integrators.contacts` calls the same kernels; results are those of the rows behind the nodes, and then of pairs.
 """

@@ -42,14 +42,7 @@ def scene(control=(), load=(), bodies=(), duration=1.0, **tables):
         "rates": ["vx", "vy", "vz"], "target": quaternion(SLEW), **PID, **dict(control),
     }  # fmt: skip
     given = {
-        "web": {
-            "kind": "inline",
-            "points": [[0, 0, 0], [0.5, 0, 0]],
-            "lines": [[0, 1]],
-            "natural_length": [50.0],
-            "supports": [0],
-        },
-        "cable": {"law": "tension-only", "modulus": 1e6, "area": 1e-4, "density": 100.0},
+        **nets.SLACK_LINE,
         "body": [hub_of("hub"), *bodies],
         "load": [{"body": "hub", "torque": [0.0, 0.0, 0.0], **dict(load)}],
         "observe": observe,

@@ -20,14 +20,7 @@ PID = {"law": "pid", "parameters": {"proportional": 40.0, "derivative": 6.0}}
 def scene(control=(), duration=1.0, interval=None, law=PID, **tables):
     """A mass on a slack line, whose load a control sets along x."""
     given = {
-        "web": {
-            "kind": "inline",
-            "points": [[0, 0, 0], [0.5, 0, 0]],
-            "lines": [[0, 1]],
-            "natural_length": [50.0],
-            "supports": [0],
-        },
-        "cable": {"law": "tension-only", "modulus": 1e6, "area": 1e-4, "density": 100.0},
+        **nets.SLACK_LINE,
         "point_mass": [{"node": 1, "mass": 1.0}],
         "load": [{"node": 1, "force": [0.0, 0.0, 0.0]}],
         "observe": [
