@@ -604,6 +604,15 @@ def test_a_plain_impact_has_machine_code_of_nothing_else():
     assert not set(ABSENT) & {name.rpartition(".")[2] for name in names}
 
 
+def test_a_check_has_no_machine_code_of_the_loop():
+    """It says how large steps are, beside damping as well, for which it compares bounds."""
+    checked = "main(['check', 'square-impact', '--set', 'damping.rate=1.0'])"
+    lines = ["from refweb.__main__ import main", checked, FILLED]
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=True)
+    names = {name.rpartition(".")[0].rpartition(".")[2] for name in done.stdout.splitlines()[-1].split()}
+    assert "safe_step" in names and not names & {"advance_rows", "run_steps", "begin_forces", "viscous_kick"}, names
+
+
 def test_an_effect_brings_its_own_machine_code_alone():
     """Damping by mass: its force, bounds and impulse, the kick that is iterated, and the book of its power."""
     plain = "scene = scene.replace(observe=(refweb.Observe(name='d', quantity='displacement', reduce='max'),))"

@@ -151,6 +151,16 @@ class Record:
             elif isinstance(value, Record):
                 yield from value.all_kernels()
 
+    def without_kernels(self) -> typing.Self:
+        """Copy of it with empty tables of kernels, which needs no machine code; arrays are shared."""
+        empty: dict[str, Any] = {}
+        for name, value in self.by_name().items():
+            if isinstance(value, Functions):
+                empty[name] = Functions(value.signature, ())
+            elif isinstance(value, Record):
+                empty[name] = value.without_kernels()
+        return dataclasses.replace(self, **empty)
+
 
 Vector = Annotated[np.ndarray, types.Array(types.float64, 1, "C")]
 Matrix = Annotated[np.ndarray, types.Array(types.float64, 2, "C")]

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ..compiled.rows import record_at
-from ..kernels import kernel
+from ..kernels import Indices, Matrix, kernel
 from .line_kernels import internal_number, line_at
 from .thread_segments import segment_kernel
 
@@ -491,8 +491,8 @@ def return_mapping(law, record, width):
             w[BEFORE, last] += hauled * (w[TAIL, 0] - w[HEAD, 0])
             w[SLIP, last] = w[BEFORE, last]
 
-    @kernel()
-    def find_slips(t, x, cells, data, c, w):
+    @kernel(apart=())
+    def find_slips(t: float, x: Matrix, cells: Indices, data: Matrix, c: int, w: Matrix) -> int:
         """Write the numbers of cell c where its slips are those that positions ask for; the number of its rings.
 
         A winch has wound until the time t.

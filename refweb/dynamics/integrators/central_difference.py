@@ -16,6 +16,7 @@ position, and `SHARED` is the first part of `CLOCK`. `budget.steps_with_twin` re
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 
@@ -127,10 +128,18 @@ class CentralDifference(Integrator):
 
     def bound(self, x=None, reach=np.inf):
         """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m], at any time."""
-        self.prepare()
+        model = self.model if self._prepared else self._bounded
         rest = np.zeros((self.system.rows, 3))
         x = rest if x is None else x
-        return safe_step.call(0.0, np.inf, len(self.model.lengths.elements) > 0, float(reach), 0.0, x, rest, self.model)
+        return safe_step.call(0.0, np.inf, len(model.lengths.elements) > 0, float(reach), 0.0, x, rest, model)
+
+    @functools.cached_property
+    def _bounded(self):
+        """The model with the kernels of bounds alone, for a scene whose step is asked for and that does not run."""
+        terms, bare = self.model.terms, self.model.without_kernels()
+        model = replace(bare, terms=replace(bare.terms, bounds=terms.bounds, dampings=terms.dampings))
+        prepare([safe_step, *model.all_kernels()], features(self._scheme, self.model, self._observed, self._events))
+        return model
 
     def steps_in(self, spans):
         """Number of steps in each of some spans of time [s] that a row or a corner ends, by the bound of the start."""

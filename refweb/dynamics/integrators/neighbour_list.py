@@ -35,10 +35,12 @@ from ...kernels import (
     Arrays,
     Functions,
     IndexTable,
+    Indices,
     Integers,
     Matrix,
     MatrixTable,
     Record,
+    VectorTable,
     copy_rows,
     kernel,
 )
@@ -169,6 +171,35 @@ def rows_of(chosen, cells, data):
     return some, some_data
 
 
+@kernel(apart=())
+def show_all(i: int, m: int, cells: IndexTable, data: MatrixTable, outs: MatrixTable, stored: VectorTable) -> None:
+    """Take all cells of term i, the m-th that acts nearby, into the tables of `SWAP`."""
+    source, numbers = 2 * len(data) - len(cells) + m, len(data) + m
+    cells[i], data[i], outs[i], stored[i] = cells[source], data[source], outs[source], stored[source]
+    cells[numbers] = np.empty((0, 1), dtype=np.int32)
+
+
+@kernel(apart=())
+def show_some(
+    i: int,
+    m: int,
+    chosen: Integers,
+    some: Indices,
+    numbers: Matrix,
+    cells: IndexTable,
+    data: MatrixTable,
+    outs: MatrixTable,
+    stored: VectorTable,
+) -> None:
+    """Take the chosen cells of term i, the m-th that acts nearby, and their numbers into the tables of `SWAP`."""
+    observed, column = outs[2 * len(data) - len(cells) + m], np.empty((chosen.size, 1), dtype=np.int32)
+    for n in range(chosen.size):
+        column[n, 0] = chosen[n]
+    observed[:] = 0.0
+    cells[i], data[i], cells[len(data) + m] = some, numbers, column
+    outs[i], stored[i] = np.zeros((chosen.size, observed.shape[1])), np.zeros(chosen.size)
+
+
 @functools.cache
 def swap_of(near):
     """The kernel that swaps the cells of a term, found by its kernel ``near``, of signature `SWAP`.
@@ -178,22 +209,14 @@ def swap_of(near):
 
     @kernel(SWAP)
     def swap(i, m, depth, x, cells, data, outs, stored):
-        more = len(cells) - len(data)
-        source, numbers = len(data) - more + m, len(data) + m
-        all_cells, all_data, observed = cells[source], data[source], outs[source]
         if depth == math.inf:
-            cells[i], data[i], outs[i], stored[i] = all_cells, all_data, observed, stored[source]
-            cells[numbers] = np.empty((0, 1), dtype=np.int32)
+            show_all(i, m, cells, data, outs, stored)
             return
-        touching = np.empty(all_cells.shape[0], dtype=np.int64)
-        count = near(depth, x, all_cells, all_data, touching)
-        some, some_data = rows_of(touching[:count], all_cells, all_data)
-        chosen = np.empty((count, 1), dtype=np.int32)
-        for n in range(count):
-            chosen[n, 0] = touching[n]
-        observed[:] = 0.0
-        cells[i], data[i], cells[numbers] = some, some_data, chosen
-        outs[i], stored[i] = np.zeros((count, observed.shape[1])), np.zeros(count)
+        source = 2 * len(data) - len(cells) + m
+        touching = np.empty(cells[source].shape[0], dtype=np.int64)
+        chosen = touching[: near(depth, x, cells[source], data[source], touching)]
+        some, numbers = rows_of(chosen, cells[source], data[source])
+        show_some(i, m, chosen, some, numbers, cells, data, outs, stored)
 
     return swap
 
@@ -204,17 +227,12 @@ def swap_pairs_of(pairs):
 
     @kernel(SWAP)
     def swap(i, m, depth, x, cells, data, outs, stored):
-        more = len(cells) - len(data)
-        source, numbers = len(data) - more + m, len(data) + m
-        observed = outs[source]
         if depth == math.inf:
-            cells[i], data[i], outs[i], stored[i] = cells[source], data[source], observed, stored[source]
-            cells[numbers] = np.empty((0, 1), dtype=np.int32)
+            show_all(i, m, cells, data, outs, stored)
             return
-        touching, rows, values = pairs(depth, x, cells[source], data[source])
-        observed[:] = 0.0
-        cells[i], data[i], cells[numbers] = rows, values, touching.astype(np.int32)
-        outs[i], stored[i] = np.zeros((rows.shape[0], observed.shape[1])), np.zeros(rows.shape[0])
+        source = 2 * len(data) - len(cells) + m
+        chosen, some, numbers = pairs(depth, x, cells[source], data[source])
+        show_some(i, m, chosen, some, numbers, cells, data, outs, stored)
 
     return swap
 
