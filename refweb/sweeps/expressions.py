@@ -179,7 +179,12 @@ class Expression:
         elif isinstance(node, ast.Subscript):
             at = node.slice
             fine = isinstance(node.value, ast.Name) and isinstance(at, ast.Constant) and isinstance(at.value, int)
-        if not fine or depth > DEEPEST:
+        if depth > DEEPEST:
+            raise InputError(
+                f"{quote(self.text)}: its parts are nested deeper than {DEEPEST}, as a sum of more terms is: "
+                "put halves of it in brackets"
+            )
+        if not fine:
             words = f"arithmetic, comparisons, and, or, not, {', '.join(FUNCTIONS)}, numbers, texts and names"
             raise InputError(f"{quote(self.text)}: a condition holds {words} alone")
         for child in ast.iter_child_nodes(node):
@@ -281,10 +286,9 @@ class Formula(Expression):
         InputError
             For them, and for an index out of range.
         """
-        self._refuse_no_number(self.tree, values)
+        self._refuse_no_number(self.tree, self._kind(self.tree, values))
 
-    def _refuse_no_number(self, node: Any, values):
-        kind = self._kind(node, values)
+    def _refuse_no_number(self, node: Any, kind):
         if kind != "a number":
             raise InputError(f"{quote(self.text)}: {self._written(node)} is {kind}, and must be a number")
 
@@ -302,16 +306,16 @@ class Formula(Expression):
             return _kind_of(entries[index])
         parts = [part for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr)]
         parts = parts[1:] if isinstance(node, ast.Call) else parts
-        kinds = {self._kind(part, values) for part in parts}
+        kinds = [self._kind(part, values) for part in parts]
         equals = isinstance(node, ast.Compare) and all(isinstance(op, ast.Eq | ast.NotEq) for op in node.ops)
-        if not (equals and len(kinds) == 1):
-            for part in parts:
-                self._refuse_no_number(part, values)
+        if not (equals and len(set(kinds)) == 1):
+            for part, kind in zip(parts, kinds, strict=True):
+                self._refuse_no_number(part, kind)
         return "a number"
 
     def _written(self, node: Any):
-        """A name or a constant as it is written."""
-        return self._aliases[node.id] if isinstance(node, ast.Name) else ast.unparse(node)
+        """A part with its names as they are written."""
+        return re.sub(r"\b_\d+\b", lambda alias: self._aliases.get(alias[0], alias[0]), ast.unparse(node))
 
 
 def _kind_of(value):

@@ -105,7 +105,7 @@ def test_what_is_not_a_number_decides_nothing():
         ("abs(max_stress, key=1) > 0", "is not known here"),
         ("max_stress % 2 > 0", "alone"),
         ("max_stress is 1", "is not known here"),
-        ("0 < " + "-" * 60 + "max_stress", "alone"),
+        ("0 < " + "-" * 60 + "max_stress", "nested deeper than 50"),
         ("1 < " * 900 + "max_stress", "at most 2000 characters"),
         ("f'{max_stress}' == 'a'", "is not"),
     ],
@@ -185,3 +185,15 @@ def test_formulas_are_read_as_conditions_are():
         Formula("a + 1", ("a",))
     with pytest.raises(refweb.InputError, match="cannot be computed"):
         Formula("a[3]", ("a",), compares=None)({"a": [1.0]})
+
+
+def test_types_of_a_long_sum_are_looked_at_once():
+    """A sum of 48 terms nests as deep; a look at each part for each part that has it would never end."""
+    formula = Formula(" + ".join(["force[1]"] * 48), ("force",), compares=None)
+    formula.check_types({"force": [1.0, 2.0]})
+    with pytest.raises(refweb.InputError, match=r"force\[1\] is a text, and must be a number"):
+        formula.check_types({"force": [1.0, "x"]})
+    with pytest.raises(refweb.InputError, match="nested deeper than 50, .* put halves of it in brackets"):
+        Formula(" + ".join(["force[1]"] * 60), ("force",), compares=None)
+    halves = " + ".join(["force[1]"] * 30)
+    assert Formula(f"({halves}) + ({halves})", ("force",), compares=None)({"force": [0.0, 0.5]}) == 30.0
