@@ -46,10 +46,12 @@ class Sample:
         Force on each row [N]; what supports give is its negative.
     per_cell : refweb.system.forces.PerCell
         Output of the terms for their cells.
+    rates : Rates or None
+        Its rates, where the next piece begins with them.
     """
 
     def __init__(self, system, time, x, v):
-        self._system, self.time, self.x, self.v = system, time, x, v
+        self._system, self.time, self.x, self.v, self.rates = system, time, x, v, None
         self.force, self.per_cell = system.balance(time, x, v)
         refuse_endless(system, time, self.force)
 
@@ -164,6 +166,7 @@ class SimpsonBalance:
         self._outside = Outside.of(system)
         self._pushing = [terms[i] for i in self._outside.pushing]
         self._supported, self._fixed = system.supported, np.flatnonzero(system.fixed)
+        self._axes = self._fixed % 3
 
     def rates(self, sample):
         """The `Rates` of a sample."""
@@ -173,7 +176,7 @@ class SimpsonBalance:
         if len(driven):
             flow[-7] = -(sample.force[driven] * sample.v[driven]).sum()
         if len(self._fixed):
-            flow[-6:-3] = -np.bincount(self._fixed % 3, sample.force.ravel()[self._fixed], 3)
+            flow[-6:-3] = -np.bincount(self._axes, sample.force.ravel()[self._fixed], 3)
         for term in self._pushing:
             rows = system.force_of(term, sample.time, sample.x, sample.v)
             flow[-3:] += rows[: self._linear].sum(axis=0)
@@ -208,13 +211,17 @@ class SimpsonBalance:
             jump = np.zeros(len(course.work) + 6)
             jump[-7] = self.kinetic(end.time, end.x, after) - self.kinetic(end.time, end.x, before)
             jump[-6:-3] = self.momentum(end.time, after) - self.momentum(end.time, before)
-        rates = self.rates(course.sample), self.rates(middle), self.rates(last)
+        start, rates = course.sample, (self.rates(middle), self.rates(last))
+        rates = start.rates or self.rates(start), *rates
+        end.rates = rates[-1] if last is end else None
         before = np.concatenate([course.work, course.impulse, course.ledger.pushed])
-        return Piece(course.sample, middle, end, rates, before, course.step, jump, at)
+        return Piece(start, middle, end, rates, before, course.step, jump, at)
 
     def uneven(self, course, piece):
         """Tell if powers change too much within a piece."""
         apart, end = piece.unevenness, piece.end
+        if (apart <= self._uneven * course.largest).all():
+            return False
         done = np.abs(piece.booked(end.time)[:-6]).sum()
         return (apart > self._uneven * max(course.largest, done, self.kinetic(end.time, end.x, end.v))).any()
 
@@ -276,6 +283,6 @@ class SimpsonBalance:
 
 def refuse_endless(system, t, force):
     """Refuse forces on rows, shape (rows, 3), that are not finite; names the first such row."""
-    if not np.isfinite(force).all():
+    if not np.isfinite(force.sum()) and not np.isfinite(force).all():
         name = system.row_name(int(np.flatnonzero(~np.isfinite(force).all(axis=1))[0]))
         raise IntegrationError(f"number not finite at {name}, t = {t:.6g} s: use a smaller rtol") from None

@@ -415,11 +415,13 @@ class StepObserver(Integrator):
                 piece = self._book.piece(course, stop, self._sample_at)
         for monitor in self._monitors:
             monitor.inspect(course, piece)
-        course.work, course.impulse, course.ledger.pushed[:] = np.split(piece.booked(piece.end.time), (-6, -3))
+        booked = piece.booked(piece.end.time)
+        course.work, course.impulse, course.ledger.pushed[:] = booked[:-6], booked[-6:-3], booked[-3:]
         course.sample = end = piece.end
         course.time, course.x, course.v = float(end.time), end.x, end.v
         if self._yielding is not None:
             self._refer(course)
+            course.sample.rates = None  # of other plastic strains
         if self._limits.at_corner(course.time):  # what is stored there may be gone again at the row
             self._book.note_largest(course, self._book.energies(end, course.work, course.step))
         if piece.jump is not None and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
