@@ -112,6 +112,7 @@ def check_runs(seeds):
     assert refused < 0.2 * len(seeds) and through < 0.5 * len(seeds)
 
 
+@pytest.mark.slow
 def test_runs_near_the_limit():
     check_runs(range(60))
 

@@ -74,6 +74,7 @@ def test_energy_at_the_default(impact):
         np.testing.assert_allclose(columns, [*found, sum(found)], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.ordinary("triangle-impact")
 @pytest.mark.parametrize("name", nets.some(SHIPPED, 3))
 def test_energy_at_a_quarter_of_the_default_step(name):
     scene = refweb.Scene.load(name)

@@ -74,6 +74,7 @@ def test_a_run_without_commands_has_the_bits_of_a_whole_one(name):
     np.testing.assert_array_equal(run.state.x, whole.state.x)
 
 
+@pytest.mark.ordinary("central-difference", "order 4", "cvode")
 @pytest.mark.parametrize("name", STEPS)
 def test_balances_close_and_the_whole_solution_has_the_same_bits(name):
     """Errors of the balances are those of steps: a load and gravity that jump bring no energy and no momentum."""

@@ -712,6 +712,7 @@ def slack_cable():
     return refweb.run(scene.replace(output=refweb.Output(interval=1e-3, frames=1)))
 
 
+@pytest.mark.slow
 def test_ring_stops_where_the_cable_is_taut(slack_cable):
     """No higher than the taut string allows, no lower than with all of the energy in its strain and in contact."""
     history, lowest = slack_cable.history, -slack_cable.results["ring_lowest"].value

@@ -181,6 +181,7 @@ def test_librations_of_a_dumbbell_that_hangs():
     np.testing.assert_allclose((3.0 - soft[2]) / (3.0 * N**2 * MASS * HALF / 100.0), 4.0, rtol=0.02)
 
 
+@pytest.mark.ordinary("central-difference-0.001")
 @pytest.mark.parametrize("method, drift", [("central-difference", 1e-3), ("cvode", 1e-5)])
 def test_jacobi_integral_over_ten_orbits(method, drift):
     """Of a dumbbell that swings in and across the plane: kinetic, strain and orbit energy keep their sum."""

@@ -104,7 +104,7 @@ def test_a_brake_stops_a_mass(method):
     assert run.drift < (5e-4 if method is CentralDifference else 1e-4)
 
 
-@pytest.mark.ordinary("law1-CentralDifference", "law0-Ida")
+@pytest.mark.ordinary("law1-CentralDifference")
 @pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
 @pytest.mark.parametrize("law", [LAW, CURVE])
 def test_a_mass_that_bounces_on_a_line_that_yields(method, law):

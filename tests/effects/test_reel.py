@@ -222,6 +222,7 @@ def test_the_book_of_sundials_closes():
     assert drifts[1] < 0.1 * drifts[0] < 1e-3
 
 
+@pytest.mark.slow
 def test_methods_agree():
     """A slack net under its weight whose outer lines are reeled in, by two methods: within the sum of their ±."""
     scene = refweb.Scene(

@@ -350,7 +350,7 @@ def test_power_up_to_a_speed(method, end):
     closed(history, 1e-3)
 
 
-@pytest.mark.ordinary("cvode-dense", "ida-block")
+@pytest.mark.slow
 @pytest.mark.parametrize("linear_solver", ["dense", "block"])
 @pytest.mark.parametrize("method", ["cvode", "ida"])
 def test_power_beside_arms(method, linear_solver):
@@ -374,6 +374,7 @@ def test_paying_out_at_a_power():
     closed(history, 1e-3)
 
 
+@pytest.mark.slow
 def test_power_over_a_ring():
     """Explicit steps are of order 2; with friction methods agree, and the ring takes heat of the power."""
     seen = [{"name": "z", "quantity": "displacement", "node": 2, "component": "z"}]

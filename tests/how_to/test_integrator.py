@@ -179,6 +179,7 @@ def test_errors_are_those_of_a_twin(method):
     assert off <= result.error < 100.0 * max(off, 1e-9)
 
 
+@pytest.mark.ordinary("generalised-alpha")
 def test_extremes_and_events(method):
     """A mass on a spring, thrown along it: v/ω at t = π/2ω, half of it at t = π/6ω; the run ends where a level says.
 

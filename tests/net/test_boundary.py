@@ -275,6 +275,7 @@ def test_gradient_and_hessian_are_those_of_the_field():
     )  # what `refweb.effects.contact.nonconvex_contacts` takes for the most
 
 
+@pytest.mark.slow
 def test_the_error_of_the_field_falls_with_the_grid():
     """Edges are rounded by a share of a cell; a smooth surface, of facets as small as cells, by its square."""
     edged = [field_of(*BOX, cells).error for cells in (16, 32, 64)]
@@ -303,6 +304,7 @@ def test_depth_inside_and_far_outside():
     assert (outside >= box_depth(far) - field.spacing).all()
 
 
+@pytest.mark.slow
 def test_walls_are_measured():
     assert field_of(*BOX, 64).thickness == pytest.approx(0.1, rel=0.1)
     assert field_of(*solids.torus(0.15, 0.05, 24), 64).thickness == pytest.approx(0.05, rel=0.15)

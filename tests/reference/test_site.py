@@ -78,6 +78,9 @@ LONG = ("learning", "size-a-net")
 """Pages whose blocks take more than 5 s of CPU: training of a policy, and a study of nets; both are slow tests."""
 
 
+@pytest.mark.ordinary(
+    "capture-False", "feedback-False", "own-net-False", "plug-ins-False", "python-False", "theory-False"
+)
 @pytest.mark.parametrize(
     "path, slow",
     [pytest.param(path, False, marks=[pytest.mark.slow] * (path.stem in LONG)) for path in PAGES]

@@ -49,6 +49,7 @@ def test_tensions_agree_within_both_certificates(mesh):
     assert bound.max() < 1e-3 * newton.tension.max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mesh", ["triangle", pytest.param("square", marks=pytest.mark.slow), MESHES[2]])
 def test_the_smooth_law_has_one_minimum(mesh):
     """Where all pivots of the tangent are positive the equilibrium is isolated, and both find it."""

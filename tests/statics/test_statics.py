@@ -134,6 +134,7 @@ def test_smoothing_converges_to_tension_only_at_first_order(mesh):
     assert (np.diff(series) < 0).all()
 
 
+@pytest.mark.slow
 def test_smoothing_acts_like_cable_longer_by_its_amount():
     """In the hexagon web, all taut, the tension EA(ε − η) is that of the tension-only law with L(1 + η) in place of L.
 

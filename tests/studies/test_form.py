@@ -340,6 +340,7 @@ def test_pretension(law, tension):
     np.testing.assert_allclose(np.delete(net.natural_length * 1.1 / lengths, [3, 5]), 1.0, rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_sag():
     """Lines of a net hang by the share of their length under their weight, with order 2 in their elements."""
     counts, errors = np.array([8, 16, 32]), []

@@ -160,6 +160,7 @@ def test_clopper_pearson_holds_at_its_level():
         assert ends[7] == pytest.approx((beta.ppf(tail, 7, n - 6), beta.ppf(1.0 - tail, 8, n - 7)))
 
 
+@pytest.mark.ordinary("0.02")
 @pytest.mark.parametrize("error", [0.0, 0.02])
 def test_a_known_probability_is_covered(error):
     """x uniform, p(x < 0.3) = 0.3, in 100 studies of 40 samples: also where values are off by their ±."""

@@ -145,6 +145,7 @@ def test_catenary_converges_with_the_orders_of_the_element(case, law, order):
     assert abs(fitted(counts[order - 1], at_ends) - 2 * order) < ORDER
 
 
+@pytest.mark.ordinary("light-1", "light-2", "heavy-2", "heavy-3", "inclined-1", "inclined-2", "inclined-3")
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("case", CASES)
 def test_a_divided_line_hangs_as_several_lines(case, order):
@@ -237,7 +238,7 @@ def test_the_two_masses_bracket_the_frequencies(order):
 CELLS = 4
 
 
-@pytest.mark.ordinary("2-True")
+@pytest.mark.slow
 @pytest.mark.parametrize("order, consistent", nets.some(list(itertools.product(ORDERS, [False, True])), 3))
 def test_frequencies_of_a_square_net(order, consistent):
     """A net of N × N squares of strings of side a, held at its rim: 2 cos(ωa/c) = cos(pπ/N) + cos(qπ/N), 0 < p, q < N.
@@ -358,7 +359,7 @@ def test_motion_of_a_taut_cable_converges_with_the_orders_of_the_element(order):
     assert abs(order_of_motion(order, (10, 14, 20, 28), TAUT) - (order + 1)) < ORDER
 
 
-@pytest.mark.ordinary("1-counts0-2", "3-counts2-1")
+@pytest.mark.ordinary("1-counts0-2")
 @pytest.mark.parametrize(
     "order, counts, expected", [(1, (20, 40, 80), 2), (2, (80, 113, 160), 1), (3, (40, 57, 80), 1)]
 )

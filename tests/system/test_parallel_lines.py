@@ -137,6 +137,7 @@ def test_a_pendulum_on_a_link_alone(tmp_path):
     np.testing.assert_array_equal(again.state.x, solution.state.x)
 
 
+@pytest.mark.slow
 def test_a_double_pendulum_on_links_alone():
     """Against its angles by DOP853, before it is chaotic."""
     first, second, length, other = 2.0, 0.5, 0.7, 0.4

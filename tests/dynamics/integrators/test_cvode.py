@@ -116,7 +116,7 @@ CASES += [("adams", 12, "block", order, mass) for order in (1, 2, 3) for mass in
 CASES += [("adams", 12, "dense", 3, True), ("adams", 12, "sparse", 2, False)]
 
 
-@pytest.mark.ordinary("bdf-*", "adams-12-fixed-point-*", "adams-12-block-*")
+@pytest.mark.ordinary("bdf-1-dense-1-False", "adams-12-fixed-point-1-False", "adams-12-block-2-True")
 @pytest.mark.parametrize("family, highest, linear_solver, order, consistent", nets.some(CASES, 3))
 def test_error_falls_with_the_tolerance(family, highest, linear_solver, order, consistent):
     system, tolerances = small([PUSH], order=order, consistent=consistent, size=3), TOLERANCES[highest]
@@ -357,7 +357,7 @@ def pushed(times):
     return np.interp(times, fine, whole)
 
 
-@pytest.mark.ordinary("adams-consistent")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "family, mass", nets.some([("bdf", "lumped"), ("adams", "lumped"), ("adams", "consistent")], 2)
 )
@@ -411,6 +411,7 @@ def test_work_of_motion_is_force_times_way():
     assert energy > 1.0 and found[2] < found[1] < found[0] and found[2] < 1e-6 * energy
 
 
+@pytest.mark.slow
 def test_consistent_mass_passes_a_motion_on():
     """A support that moves a line of one element by given speeds: work, and the speed of its free end.
 

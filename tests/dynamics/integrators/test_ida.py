@@ -166,6 +166,7 @@ def cross(law="tension-only", prestrain=1e-3, effects=()):
     return moving(web, effects, law=law, density=0.0, prestrain=prestrain)
 
 
+@pytest.mark.slow
 def test_cross_goes_as_far_as_its_energy():
     """½ m v² = Π(w) − Π(0), Π = 4 · ½ EA L ε²: the arms stay straight, as massless cables do.
 
@@ -206,6 +207,7 @@ def test_window_goes_as_far_as_its_energy():
     assert np.abs(run.x[middle, :2]).max() < 1e-9 and run.drift < 1e-5
 
 
+@pytest.mark.slow
 def test_light_lines_become_massless_ones():
     """A ball into a web of density ρ → 0: the difference to density 0 falls like ρ, and steps are many times fewer."""
     given = dict(prestrain=1e-2)
