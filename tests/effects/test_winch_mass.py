@@ -321,3 +321,37 @@ def test_refused(winch, tables, message):
 def test_a_thread_takes_no_drum():
     with pytest.raises(InputError, match="drum = 0 has no meaning where the winch has a thread"):
         scene({"speed": 0.0, "drum": 0}, {})
+
+
+def test_beside_a_reel_and_on_a_body():
+    """A load on a thread from a drum on a body of 1e12 kg, and on a line that a reel pays out, both with their mass.
+
+    Explicit steps and Adams' method agree, balances close, and the mass is that of both lengths, without what is on
+    the body.
+    """
+    given = {
+        "web": {"kind": "inline", "points": [[0, 0, 0], [0.6, 0.1, -1.0], [1.4, 0, 0.2]], "lines": [[1, 2]]},
+        "supports": {"nodes": [2]},
+        "cable": {**CABLE, "modulus": 1e9},
+        "body": [{"name": "ship", "radius": 0.05, "mass": 1e12, "position": [-0.1, 0.0, 0.0]}],
+        "attach": [{"body": "ship", "node": 0}],
+        "thread": [{"name": "rope", "nodes": [0, 1], **CABLE, "modulus": 1e9}],
+        "winch": [{"thread": "rope", "end": "first", "tension": 30.0, "mass": "follows"}],
+        "reel": [{"lines": [0], "factor": [[0.0, 1.0], [0.4, 1.3]], "mass": "follows"}],
+        "point_mass": [{"node": 1, "mass": MASS}],
+        "velocity": [{"node": 1, "value": [0.2, -0.3, -0.5]}],
+        "observe": [{"name": axis, "quantity": "position", "node": 1, "component": axis} for axis in "xyz"],
+        "accuracy": {"error": "none"},
+    }
+    runs = []
+    for keys in ({"step_size": 1e-4}, {"method": "cvode", "family": "adams", "rtol": 1e-8}):
+        solve = {"kind": "dynamic", "duration": 0.2, **keys}
+        run = refweb.run(refweb.Scene.from_dict({**given, "solve": solve}))
+        assert run.solver["momentum_drift"] < 1e-6
+        runs.append(np.array([run.results[axis].value for axis in "xyz"]))
+    np.testing.assert_allclose(*runs, rtol=0, atol=2e-5)
+    state = run.state
+    mass = state.system.at(state.time, state.x).net.mass[1]
+    length = np.linalg.norm(state.position[1] - state.position[0]) / (1.0 + 30.0 / 1e4)
+    built = np.linalg.norm([0.8, -0.1, 1.2])
+    assert mass == pytest.approx(MASS + 0.5 * DENSE * (length + 1.15 * built), rel=1e-6)
