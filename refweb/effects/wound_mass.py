@@ -28,7 +28,7 @@ import numpy as np
 from ..compiled.rows import matrix_of, record_at, width_of
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
-from .base import Balance, ForceTerm, Tangent, VelocityForce
+from .base import Balance, ForceTerm, Tangent, Timing, VelocityForce
 from .line_kernels import internal_number
 from .mass_flow import Passages
 from .thread_friction import LEAST, kernels
@@ -128,11 +128,12 @@ class WoundFlow(NamedTuple):
         ends = system.net.cells[self.lines]
         supported = system.supported.all(axis=1)
         at = supported[ends] if self.drums is None else np.isin(ends, self.drums)
-        for line, count in zip(self.lines[at.sum(axis=1) != 1], at.sum(axis=1)[at.sum(axis=1) != 1], strict=True):
+        counts = at.sum(axis=1)
+        for n in np.flatnonzero(counts != 1)[:1]:
             why = "supported, moved or on a body" if self.drums is None else "of drum"
             raise InputError(
-                f'mass = "follows": {count} ends of line {line} are {why}, must be one: name the node at the drum of '
-                "each line, drum = ..."
+                f'mass = "follows": {counts[n]} ends of line {self.lines[n]} are {why}, must be one: name the node at '
+                "the drum of each line, drum = ..."
             )
         return ends[np.arange(len(ends)), at.argmax(axis=1)]
 
@@ -167,7 +168,12 @@ class WoundFlow(NamedTuple):
             return WoundTerm(force=force, tangent=Tangent(stiffness, bound, symmetric=False), balance=balance, **given)
         velocity = VelocityForce(damping, damping_bound)
         return WoundTerm(
-            force=coriolis, tangent=Tangent(symmetric=False), velocity=velocity, balance=Balance("work"), **given
+            force=coriolis,
+            tangent=Tangent(symmetric=False),
+            velocity=velocity,
+            timing=Timing(at_rest=False),
+            balance=Balance("work"),
+            **given,
         )
 
 
