@@ -164,7 +164,8 @@ MIRRORS = {
     "dynamics/schedule": "dynamics/test_one_row.py dynamics/test_default_rows.py dynamics/test_dynamics.py",
     "dynamics/simulation": "test_faults.py dynamics/test_dynamics.py dynamics/test_starts.py",
     "dynamics/integrators/central_difference": "dynamics/test_dynamics.py",
-    "dynamics/integrators/explicit_loop": "dynamics/test_dynamics.py dynamics/test_impact.py",
+    "dynamics/integrators/explicit_loop": "dynamics/integrators/test_nearby.py dynamics/test_dynamics.py "
+    "dynamics/test_impact.py",
     "dynamics/integrators/energy_balance": "test_readme.py dynamics/test_impact.py effects/test_moved_bodies.py",
     "dynamics/integrators/ida": "dynamics/integrators/test_ida.py",
     "dynamics/integrators/yielding": "effects/test_plastic.py",
@@ -481,6 +482,7 @@ MUTANTS = [
     Mutant("effects/thread_slips", "if pull == low or pull == high:", "if high - low < 1e-3 * ea:"),
     Mutant("effects/thread_slips", "total += (high - low) * (first + slope * middle)", "total += (high - low) * first"),
     Mutant("effects/thread_slips", "w[SLIP, r] = w[BEFORE, r] + math.copysign(reach, moved)", "w[SLIP, r] += 0.0"),
+    Mutant("dynamics/integrators/explicit_loop", "covered(reach, running.x", "covered(0.5 * reach, running.x"),
     Mutant("effects/wound_mass", "signs[-1] = -1.0 if thread.at_last else 1.0", "signs[-1] = 1.0"),
     Mutant("effects/wound_mass", "rate = b[r, size] * given", "rate = 0.0"),
     Mutant("effects/wound_lines", "np.array([SLIP, TAKEN])", "np.array([SLIP, TAKEN + 1])"),

@@ -233,7 +233,7 @@ def steps_until(end, changing, scheme, model, running):
         fastest = min(fastest, spread_of(v[: model.inertia.linear]) + interval * math.sqrt(push))
     reach = 2.0 * interval * fastest
     reach_all(reach, running.x, model.nearby, model.terms)
-    if not model.nearby.at.shape[0] or covered(0.5 * reach, running.x, model.nearby, model.terms):
+    if not model.nearby.at.shape[0] or covered(reach, running.x, model.nearby, model.terms):
         return interval / (scheme.safety * safe_step(time, end, changing, reach, fastest, running.x, f, model))
     bound = step_by_elements(time, end, changing, reach, fastest, model, running)
     return interval / (scheme.safety * bound)
