@@ -46,14 +46,15 @@ class Winch(Table):
 
     ``speed``, ``tension`` or ``power`` says how. Energy that the winch takes from the web is ``winch_energy``: heat of
     a brake is positive, work of a motor negative. For lines whose natural lengths change in proportion see
-    ``[[reel]]``. A ``slip`` of the thread whose ``ring`` is the node of the
-    drum is the length that has gone over it. Explicit steps are of order 1 where a winch with ``tension`` at its
-    ``speed_limit`` turns round, and of order 2 else.
+    ``[[reel]]``. A ``slip`` of the thread whose ``ring`` is the node of the drum is the length that has gone over it.
+    Explicit steps are of order 1 where a winch with ``tension`` at its ``speed_limit`` turns round, and of order 2
+    else.
 
-    Each line of ``lines`` has a winch of these numbers at one of its ends, which of them makes no difference. It stays
-    a line, with its tension, strain, drag and contact with bodies. Lines on brakes take up the energy of what the web
-    catches. A line on a winch is one element, has a law that does not push or yield, does not break, and its natural
-    length changes by the winch alone. Explicit steps are shorter by up to a factor of √2 where it is the stiffest.
+    Each line of ``lines`` has a winch of these numbers at one of its ends; which of them makes a difference to
+    ``mass = "follows"`` alone. It stays a line, with its tension, strain, drag and contact with bodies. Lines on
+    brakes take up the energy of what the web catches. A line on a winch is one element, has a law that does not
+    push or yield, does not break, and its natural length changes by the winch alone. Explicit steps are shorter by
+    up to a factor of √2 where it is the stiffest.
 
     A closed thread, such as a drawstring, is tied to the drum and wound on it from one side. Its segments and rings
     count from the drum: the first segment leaves it, and the last ring is the drum again. With friction the tension
