@@ -355,3 +355,28 @@ def test_beside_a_reel_and_on_a_body():
     length = np.linalg.norm(state.position[1] - state.position[0]) / (1.0 + 30.0 / 1e4)
     built = np.linalg.norm([0.8, -0.1, 1.2])
     assert mass == pytest.approx(MASS + 0.5 * DENSE * (length + 1.15 * built), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_drawstring_of_a_free_net():
+    """A closed thread that rubs at its rings and slips on a winch at one of them: methods agree, balances close."""
+    corners = [[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, -0.1]]
+    lines = {"law": "tension-only", "modulus": 1e8, "area": 1e-5}
+    given = {
+        "web": {"kind": "inline", "points": [*corners, [0.5, 0.5, 0.6]], "lines": [[n, 4] for n in range(4)]},
+        "supports": {"nodes": []},
+        "cable": {**lines, "density": 1e4},
+        "thread": [{"name": "string", "nodes": [0, 1, 2, 3], "closed": True, "friction": 0.2, **lines, "density": 5e4}],
+        "winch": [{"thread": "string", "speed": [[0.0, 0.0], [0.1, 2.0]], "limit": 20.0, "mass": "follows"}],
+        "point_mass": [{"node": [0, 1, 2, 3], "mass": 0.2}],
+        "velocity": [{"node": 4, "value": [0.3, -0.2, 0.5]}],
+        "accuracy": {"error": "none"},
+    }
+    ends = []
+    for keys in ({"step_size": 1e-4}, {"method": "cvode", "family": "adams", "rtol": 1e-8}):
+        run = refweb.run(refweb.Scene.from_dict({**given, "solve": {"kind": "dynamic", "duration": 0.3, **keys}}))
+        state = run.state
+        assert run.solver["momentum_drift"] < 1e-6
+        ends.append(np.column_stack([state.position[:5], state.system.at(state.time, state.x).net.mass[:5]]))
+    np.testing.assert_allclose(*ends, rtol=0, atol=1e-5)
+    assert (ends[0][:4, 3] < 0.2 + 0.5 + 0.5 * 0.1 * np.sqrt(0.75)).all()  # half a kilogram of string has gone in
