@@ -84,7 +84,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
             if net.quasi_static or solve.start == "equilibrium":
                 refuse_broken(system.net)
     if system.net.flows:
-        with refused_at("[[reel]]"):
+        with refused_at("[[winch]]" if all(flow.wound for flow in system.net.flows) else "[[reel]]"):
             _ = system.material_flow
     _check_bare(system)
     _check_carried(system, supported, solve)

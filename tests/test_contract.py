@@ -102,6 +102,9 @@ EXAMPLES = {
         dict(thread="rope", at=4, power=-0.3, speed_limit=0.02),
         dict(lines=[1, "tie"], tension=10.0, speed_limit=0.02),
         dict(lines="all", speed=[(0.0, 0.1), (1.0, 0.05)], limit=4.0),
+        dict(lines=[1, "tie"], power=0.2, speed_limit=0.05),
+        dict(thread="rope", end="last", tension=10.0, mass="follows"),
+        dict(lines="all", speed=0.1, mass="follows", drum=0),
     ],
     "Reel": [
         dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
@@ -385,7 +388,7 @@ def test_extension(name, i):
     assert (longer.mass[:rows] >= net.mass).all() and len(longer.mass) == len(longer.points) >= rows
     assert longer.web is net.web and longer.cells is net.cells
     np.testing.assert_array_equal(longer.line_data.matrix[:, : net.line_data.matrix.shape[1]], net.line_data.matrix)
-    added = 0.0 if name == "Reel" else getattr(effect, "mass", 0.0) or 0.0
+    added = 0.0 if name in ("Reel", "Winch") else getattr(effect, "mass", 0.0) or 0.0
     times = len(effect.node) if added and hasattr(effect, "node") else 1
     np.testing.assert_allclose(longer.mass.sum() - net.mass.sum(), times * added, rtol=1e-14)
 

@@ -169,6 +169,8 @@ EFFECTS = {
                 "tension": ANY,
                 "power": SIGNED,
                 "speed_limit": ANY,
+                "mass": st.sampled_from(["stays", "follows"]),
+                "drum": NODE,
             },
         ),
         min_size=1,

@@ -294,9 +294,10 @@ class InternalVariables(NamedTuple):
     follower: Any = None
 
     def joined(self, others: InternalVariables) -> InternalVariables:
-        """These and others that stand behind them, as unknowns of one system."""
-        names = "components", "elements", "resistance"
-        return self._replace(**{name: np.append(getattr(self, name), getattr(others, name)) for name in names})
+        """These and others as unknowns of one system, in the order of their components."""
+        both = {n: np.append(getattr(self, n), getattr(others, n)) for n in ("components", "elements", "resistance")}
+        order = np.argsort(both["components"])
+        return self._replace(**{name: values[order] for name, values in both.items()})
 
 
 def with_rows(net: Net, count: int) -> Net:
@@ -426,9 +427,10 @@ def refuse_found(terms: Iterable[ForceTerm], what: str) -> None:
 
 
 def refuse_flows(net: Net, name: str) -> None:
-    """Refuse ``name``, which has masses that stay, beside masses that follow a reel; `InputError`."""
+    """Refuse ``name``, which has masses that stay, beside masses that follow a reel or a winch; `InputError`."""
     if net.flows:
-        raise InputError(f'{name} takes masses that stay: leave it out, or [[reel]] mass = "follows"')
+        follows = "[[winch]]" if net.flows[0].wound else "[[reel]]"
+        raise InputError(f'{name} takes masses that stay: leave it out, or {follows} mass = "follows"')
 
 
 def without(columns: int | slice) -> Callable[[NDArray[np.float64]], None]:

@@ -61,7 +61,7 @@ class Gravity(Table):
     acceleration: Several = vector(unit="m/s²")
 
     def on(self, net: Net) -> ForceTerm | list[ForceTerm]:
-        """Terms of all rows with mass, and of what reels add to it; the energy is zero in the web's position."""
+        """Terms of all rows with mass, and of what reels and winches add; the energy is zero in the web's position."""
         heavy = net.heavy
         steady = ForceTerm(
             name="gravity",
@@ -71,12 +71,4 @@ class Gravity(Table):
             energy=energy,
             balance=Balance("potential_energy", impulse=impulse, moment_free=True),
         )
-        return [steady, *(self._of_flow(net, flow) for flow in net.flows)] if net.flows else steady
-
-    def _of_flow(self, net, flow):
-        """The term of the mass that a reel adds to that of its factor 1."""
-        from .outer_load import nodal_load
-
-        moves = ~np.isin(flow.rows, [node for body in net.bodies for node in body.carried])
-        data, added = np.outer(flow.mass[moves], self.acceleration), [(t, factor - 1.0) for t, factor in flow.table]
-        return nodal_load(net, "gravity", flow.rows[moves], data, added)
+        return [steady, *(flow.weight(net, self.acceleration) for flow in net.flows)] if net.flows else steady

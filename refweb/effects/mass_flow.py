@@ -19,11 +19,23 @@ The explicit loop uses `FollowedMass`, other methods `system.material_flow`: bot
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..kernels import INDICES, VECTOR, Arrays, IndexTable, Integers, Matrix, Record, Vector, VectorTable, kernel
+from ..kernels import (
+    INDICES,
+    VECTOR,
+    Arrays,
+    IndexTable,
+    IntegerMatrix,
+    Integers,
+    Matrix,
+    Record,
+    Vector,
+    VectorTable,
+    kernel,
+)
 from .time_tables import flattened, interpolate
 
 if TYPE_CHECKING:
@@ -58,10 +70,46 @@ class MassFlow(NamedTuple):
     mass: np.ndarray
     table: tuple
     drums: np.ndarray | None
+    wound = False
+
+    def weight(self, net: Net, acceleration: Any) -> Any:
+        """The `ForceTerm` of a uniform acceleration [m/s²] on what the reel adds to the mass of its factor 1."""
+        from .outer_load import nodal_load
+
+        moves = self.off_bodies(net)
+        data, added = np.outer(self.mass[moves], acceleration), [(t, factor - 1.0) for t, factor in self.table]
+        return nodal_load(net, "gravity", self.rows[moves], data, added)
+
+    def turning(self, net: Net, frame: Any, pull: Any, name: str) -> list[Any]:
+        """The two terms of rotating axes on it, see `refweb.effects.turning_axes.force_terms`."""
+        from .turning_flows import force_terms
+
+        return force_terms(net, self, frame, pull, name)
 
     def off_bodies(self, net: Net) -> NDArray[np.bool_]:
         """True for each of the nodes that no body carries: the share of a line's end on a body stays."""
         return ~np.isin(self.rows, [node for body in net.bodies for node in body.carried])
+
+
+class Passages(NamedTuple):
+    """Passages of material over rings and drums.
+
+    Attributes
+    ----------
+    drums : ndarray of int, shape (passages,)
+        Row of each ring or drum.
+    slips : ndarray of int, shape (passages,)
+        Component 3 row + axis of the length that has gone over it.
+    rows : ndarray of int, shape (passages, 2)
+        Rows whose mass changes.
+    shares : ndarray, shape (passages, 2)
+        Change of the mass of each by that length [kg/m].
+    """
+
+    drums: np.ndarray
+    slips: np.ndarray
+    rows: np.ndarray
+    shares: np.ndarray
 
 
 class FollowedMass(Record):
@@ -82,6 +130,13 @@ class FollowedMass(Record):
         Ω of the axes [rad/s].
     points : ndarray, shape (rows, 3)
         Reference positions [m].
+    passages : ndarray of int, shape (passages, 4)
+        Passages of material to winches and over rings: row of the drum or ring, component of the slip, and two rows
+        whose mass changes, see `Passages`.
+    by_slip : ndarray, shape (passages, 2)
+        Change of the mass of these by the slip [kg/m].
+    slips : ndarray, shape (passages,)
+        Slips that masses are those of [m].
     """
 
     rows: Integers
@@ -93,19 +148,25 @@ class FollowedMass(Record):
     inverse: Matrix
     speed: Vector
     points: Matrix
+    passages: IntegerMatrix
+    by_slip: Matrix
+    slips: Vector
 
     @classmethod
     def none(cls) -> FollowedMass:
         """Make the record of masses that stay."""
         no_tables = Arrays(INDICES, []), Arrays(VECTOR, []), Arrays(VECTOR, [])
         nothing = np.zeros(0), np.zeros((0, 3)), np.zeros(3), np.zeros((0, 3))
-        return cls(np.zeros(0, dtype=np.int64), np.zeros(0), *no_tables, *nothing)
+        no_passages = np.zeros((0, 4), dtype=np.int64), np.zeros((0, 2)), np.zeros(0)
+        return cls(np.zeros(0, dtype=np.int64), np.zeros(0), *no_tables, *nothing, *no_passages)
 
     @classmethod
     def of(cls, system: System, mass: NDArray[np.float64], inverse: NDArray[np.float64]) -> FollowedMass:
         """Make the record of a system with flows, that writes to ``mass`` and ``inverse``."""
-        flows = system.material_flow.flows
-        rows = np.unique(np.concatenate([flow.rows for flow in flows])).astype(np.int64)
+        flows, passages = system.material_flow.flows, system.material_flow.passages
+        by_slip = passages.shares
+        rows = [*(flow.rows for flow in flows), passages.rows[by_slip != 0.0]]
+        rows = np.unique(np.concatenate(rows)).astype(np.int64)
         cells = [np.column_stack([f.rows, np.searchsorted(rows, f.rows), f.drums]).astype(np.int32) for f in flows]
         return cls(
             rows=rows,
@@ -117,6 +178,9 @@ class FollowedMass(Record):
             inverse=inverse,
             speed=system.material_flow.speed,
             points=np.array(system.net.points, order="C"),
+            passages=np.column_stack([passages.drums, passages.slips, passages.rows]).astype(np.int64),
+            by_slip=np.array(by_slip, order="C"),
+            slips=np.zeros(len(by_slip)),
         )
 
 
@@ -134,11 +198,23 @@ def set_masses(t: float, followed: FollowedMass) -> None:
         )
         for c in range(cells.shape[0]):
             mass[cells[c, 0]] += shares[c] * change
+    for p in range(followed.slips.size):
+        for e in range(2):
+            mass[followed.passages[p, 2 + e]] += followed.by_slip[p, e] * followed.slips[p]
     for n in range(rows.size):
         r = rows[n]
         for k in range(3):
             if inverse[r, k] > 0.0:
                 inverse[r, k] = 1.0 / mass[r]
+
+
+@kernel(apart=("follows",))
+def set_masses_by_slips(t: float, x: Matrix, followed: FollowedMass) -> None:
+    """Write masses at time t and the slips of x, and their inverses."""
+    for p in range(followed.slips.size):
+        slip = followed.passages[p, 1]
+        followed.slips[p] = x[slip // 3, slip % 3]
+    set_masses(t, followed)
 
 
 @kernel()
@@ -182,3 +258,32 @@ def exchange_masses(
                 pushed[k] += brought[n, k]
                 v[r, k] = speed
                 x[r, k] += 0.5 * h * (speed - old)
+
+
+@kernel(apart=("follows",))
+def exchange_by_slips(
+    t: float, h: float, x: Matrix, v: Matrix, followed: FollowedMass, work: Vector, pushed: Vector
+) -> None:
+    """Bring the material that has gone over rings and drums in a step, as `exchange_masses` does by tables.
+
+    One half goes over one after the other, and one half in the inverse order: the step stays of order 2.
+    """
+    mass, inverse, velocity, count = followed.mass, followed.inverse, np.empty(3), followed.slips.size
+    for n in range(2 * count):
+        p = n if n < count else 2 * count - 1 - n
+        drum, slip = followed.passages[p, 0], followed.passages[p, 1]
+        moved = 0.5 * (x[slip // 3, slip % 3] - followed.slips[p])
+        for e in range(2):
+            r, brought = followed.passages[p, 2 + e], followed.by_slip[p, e] * moved
+            if brought == 0.0:
+                continue
+            incoming(0.5 * h, x, v, r, drum, followed, velocity)
+            before, mass[r] = mass[r], mass[r] + brought
+            for k in range(3):
+                if inverse[r, k] > 0.0:
+                    old = v[r, k]
+                    v[r, k] = (before * old + brought * velocity[k]) / mass[r]
+                    work[work.size - 1] += 0.5 * (mass[r] * v[r, k] ** 2 - before * old * old)
+                    pushed[k] += brought * velocity[k]
+                    x[r, k] += 0.5 * h * (v[r, k] - old)
+    set_masses_by_slips(t, x, followed)

@@ -176,11 +176,12 @@ class Thread(Table):
     equilibrium there, where the thread has no direction.
 
     Its mass is shared by its nodes, half of each segment to either end as it lies in the web's position, and stays
-    there: material that slides through a ring brings no mass along. Where masses of a thread count beside those of its
-    nodes, use lines. Explicit steps are as short as with lines of the same material from node to node; in matrices a
-    thread of n nodes is a dense block of 9 n² numbers. In statics bounds of errors are proven as with lines alone, if
-    threads have the law of tension alone and run over no body. Reels, heat, material damping and ``[rupture]`` are of
-    lines alone: to pull a thread in, move its end, or take a ``[[winch]]``.
+    there: material that slides through a ring brings no mass along. With a ``[[winch]]`` whose ``mass`` is
+    "follows" it does. Where the mass of a segment counts between its nodes, use lines. Explicit steps are as short
+    as with lines of the same material from node to node; in matrices a thread of n nodes is a dense block of 9 n²
+    numbers. In statics bounds of errors are proven as with lines alone, if threads have the law of tension alone
+    and run over no body. Reels, heat, material damping and ``[rupture]`` are of lines alone: to pull a thread in,
+    move its end, or take a ``[[winch]]``.
 
     Parameters
     ----------

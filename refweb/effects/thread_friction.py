@@ -79,8 +79,8 @@ class FrictionKernels(NamedTuple):
     ----------
     force, kept, stiffness, bound, gone, relax, taken : kernel
         Force, strain energy, stiffness, bound, energy lost, relaxation, and the energy that a winch has taken.
-    pulled_over, tension_slopes : kernel
-        Configurational force at a winch, and slopes of tensions.
+    pulled_over, tension_slopes, slip_slopes : kernel
+        Configurational force at a winch, and slopes of tensions and of slips.
     """
 
     force: Callable[..., Any]
@@ -92,6 +92,7 @@ class FrictionKernels(NamedTuple):
     taken: Callable[..., Any]
     pulled_over: Callable[..., Any]
     tension_slopes: Callable[..., Any]
+    slip_slopes: Callable[..., Any]
 
 
 @functools.cache
@@ -232,13 +233,13 @@ def kernels(law, record, width):
 
     @kernel()
     def slip_slopes(x, cells, data, c, w, rings, a, b):
-        """Write ∂δ/∂x of each ring to b, and in its last column ∂δ/∂δ of a last ring that sticks."""
+        """Write ∂δ/∂x of each ring to b, and in its last column ∂δ/∂δ of a last ring whose slip is given."""
         choose(w, rings, True)
         matrix(w, rings, a)
         for r in range(rings):
             for m in range(b.shape[1]):
                 b[r, m] = 0.0
-            if r == rings - 1 and w[MODE, r] == 0.0:
+            if r == rings - 1 and abs(w[MODE, r]) != 1.0:
                 b[r, b.shape[1] - 1] = 1.0
             if abs(w[MODE, r]) != 1.0:
                 continue
@@ -317,7 +318,7 @@ def kernels(law, record, width):
                 rates[cells[c, s]] += total
                 rates[cells[c, s + 1]] += total
 
-    return FrictionKernels(force, kept, stiffness, bound, gone, relax, taken, pulled_over, tension_slopes)
+    return FrictionKernels(force, kept, stiffness, bound, gone, relax, taken, pulled_over, tension_slopes, slip_slopes)
 
 
 def with_slips(net: Net, name: str) -> Net:
@@ -328,12 +329,17 @@ def with_slips(net: Net, name: str) -> Net:
     return replace(with_rows(net, thread.rows_of_slips), threads=threads)
 
 
+def numbers_of(thread: ThreadLine) -> NDArray[np.float64]:
+    """Numbers of the cell of a thread with friction, see `refweb.effects.thread_slips`, shape (1, columns)."""
+    friction = np.array([thread.first, thread.ends, *thread.friction, *thread.winch], dtype=float)
+    return np.append(thread.numbers, friction)[None, :]
+
+
 def terms(thread: ThreadLine) -> list[ForceTerm]:
     """Terms of the tensions, of the energy that is stored and of that which is lost."""
-    line, numbers = thread.line, thread.numbers
+    line = thread.line
     acting = kernels(line.law, line.law_record, line.line_data.matrix.shape[1])
-    friction = np.array([thread.first, thread.ends, *thread.friction, *thread.winch], dtype=float)
-    of_thread = {"name": "thread", "cells": thread.rows[None, :], "data": np.append(numbers, friction)[None, :]}
+    of_thread = {"name": "thread", "cells": thread.rows[None, :], "data": numbers_of(thread)}
     tension = ForceTerm(
         **of_thread,
         force=acting.force,

@@ -180,10 +180,8 @@ def force_terms(net, frame, pull, **arguments):
         from . import turning_bodies
 
         terms += turning_bodies.force_terms(net, frame.angular_velocity, pull, arguments)
-    if net.flows:
-        from . import turning_flows
-
-        terms += turning_flows.force_terms(net, frame, pull, arguments["name"])
+    for flow in net.flows:
+        terms += flow.turning(net, frame, pull, arguments["name"])
     return terms
 
 

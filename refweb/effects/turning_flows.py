@@ -110,27 +110,24 @@ def damping_bound(reach, speed, x, mass, rates, cells, data):
         rates[cells[c, 0]] += 2.0 * flow.largest * math.sqrt(2.0 * (w[0] ** 2 + w[1] ** 2 + w[2] ** 2))
 
 
-def force_terms(net, frame, pull, name):
-    """The two terms of each flow of a net, see `refweb.effects.turning_axes.force_terms`."""
-    terms = []
-    for flow in net.flows:
-        moves = flow.off_bodies(net)
-        rows, data = flow.rows[moves], np.zeros(np.count_nonzero(moves), FLOW)
-        added = [(t, factor - 1.0) for t, factor in flow.table]
-        data["pull"], data["speed"], data["mass"] = pull, frame.angular_velocity, flow.mass[moves]
-        data["largest"] = flow.mass[moves] * max(abs(change) for _, change in added)
-        data["point"] = net.points[rows]
-        numbers = np.hstack([matrix_of(data), np.tile(flattened(added), (len(rows), 1))])
-        shared: dict[str, Any] = dict(name=name, cells=column(rows), data=numbers, frame=frame)
-        times = tuple(t for t, _ in added)
-        terms += [
-            ForceTerm(
-                force=force, energy=energy, tangent=Tangent(stiffness, bound), timing=Timing(times),
-                balance=Balance("work", power=0), **shared,
-            ),
-            ForceTerm(
-                force=coriolis, tangent=Tangent(symmetric=False), velocity=VelocityForce(damping, damping_bound),
-                timing=Timing(times, at_rest=False), balance=Balance("work"), **shared,
-            ),
-        ]  # fmt: skip
-    return terms
+def force_terms(net, flow, frame, pull, name):
+    """The two terms of a flow of a net, see `refweb.effects.turning_axes.force_terms`."""
+    moves = flow.off_bodies(net)
+    rows, data = flow.rows[moves], np.zeros(np.count_nonzero(moves), FLOW)
+    added = [(t, factor - 1.0) for t, factor in flow.table]
+    data["pull"], data["speed"], data["mass"] = pull, frame.angular_velocity, flow.mass[moves]
+    data["largest"] = flow.mass[moves] * max(abs(change) for _, change in added)
+    data["point"] = net.points[rows]
+    numbers = np.hstack([matrix_of(data), np.tile(flattened(added), (len(rows), 1))])
+    shared: dict[str, Any] = dict(name=name, cells=column(rows), data=numbers, frame=frame)
+    times = tuple(t for t, _ in added)
+    return [
+        ForceTerm(
+            force=force, energy=energy, tangent=Tangent(stiffness, bound), timing=Timing(times),
+            balance=Balance("work", power=0), **shared,
+        ),
+        ForceTerm(
+            force=coriolis, tangent=Tangent(symmetric=False), velocity=VelocityForce(damping, damping_bound),
+            timing=Timing(times, at_rest=False), balance=Balance("work"), **shared,
+        ),
+    ]  # fmt: skip

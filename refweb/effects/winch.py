@@ -45,15 +45,16 @@ class Winch(Table):
     """A winch at an end of a thread or line, or at a node of a closed thread: it hauls material in and pays it out.
 
     ``speed``, ``tension`` or ``power`` says how. Energy that the winch takes from the web is ``winch_energy``: heat of
-    a brake is positive, work of a motor negative. Mass stays at the nodes; for lines whose mass follows, or whose
-    natural lengths change in proportion, see ``[[reel]]``. A ``slip`` of the thread whose ``ring`` is the node of the
-    drum is the length that has gone over it. Explicit steps are of order 1 where a winch with ``tension`` at its
-    ``speed_limit`` turns round, and of order 2 else.
+    a brake is positive, work of a motor negative. For lines whose natural lengths change in proportion see
+    ``[[reel]]``. A ``slip`` of the thread whose ``ring`` is the node of the drum is the length that has gone over it.
+    Explicit steps are of order 1 where a winch with ``tension`` at its ``speed_limit`` turns round, and of order 2
+    else.
 
-    Each line of ``lines`` has a winch of these numbers at one of its ends, which of them makes no difference. It stays
-    a line, with its tension, strain, drag and contact with bodies. Lines on brakes take up the energy of what the web
-    catches. A line on a winch is one element, has a law that does not push or yield, does not break, and its natural
-    length changes by the winch alone. Explicit steps are shorter by up to a factor of √2 where it is the stiffest.
+    Each line of ``lines`` has a winch of these numbers at one of its ends; which of them makes a difference to
+    ``mass = "follows"`` alone. It stays a line, with its tension, strain, drag and contact with bodies. Lines on
+    brakes take up the energy of what the web catches. A line on a winch is one element, has a law that does not
+    push or yield, does not break, and its natural length changes by the winch alone. Explicit steps are shorter by
+    up to a factor of √2 where it is the stiffest.
 
     A closed thread, such as a drawstring, is tied to the drum and wound on it from one side. Its segments and rings
     count from the drum: the first segment leaves it, and the last ring is the drum again. With friction the tension
@@ -88,18 +89,27 @@ class Winch(Table):
         limit. In statics, and with ``start = "equilibrium"``, the winch stays as it is.
     speed_limit : float, optional
         Largest speed with ``tension`` or ``power`` [m/s], in and out; by default none. With ``tension`` the tension is
-        lower or higher at it. ``power`` needs one, since a slack thread has no tension, and is of threads alone.
+        lower or higher at it. ``power`` needs one, since a slack thread has no tension.
+    mass : {"stays", "follows"}
+        "stays": nodes keep their mass. "follows": each segment, or line, has the mass of its natural length. Material
+        leaves and comes through the drum, at the velocity of the drum's node, with its momentum and its energy, which
+        counts as ``work``; over each ring of a thread it goes at the velocity of the ring. Point masses and bodies keep
+        theirs, a body with the share of nodes on it. Forces of the size ρA (dL/dt)², of material that slides along the
+        thread, are left out.
+    drum : int, str or list, optional
+        Nodes at the drums of ``lines``, with ``mass = "follows"``: one end of each. By default the one that is
+        supported, moved or on a body.
 
     Raises
     ------
     InputError
         For none or both of ``thread`` and ``lines``, none or several of ``speed``, ``tension`` and ``power``, a
-        ``limit`` without ``speed``, a ``speed_limit`` with it, ``power`` without one, and ``end``, ``at`` or ``power``
-        of lines.
+        ``limit`` without ``speed``, a ``speed_limit`` with it, ``power`` without one, ``end`` or ``at`` of lines, and a
+        ``drum`` of a thread or without ``mass = "follows"``.
         From ``extend``, for a thread that the scene does not have, that is open and has no ``end``, or has ``at``, that
         does not run through ``at``, and for a thread or line that has a winch already, a law that pushes, nodes in one
-        point or no more material for a speed; for a line of several elements, that is broken, or yields. From ``on``,
-        for a line whose natural length changes otherwise.
+        point or no more material for a speed; for a line of several elements, that is broken, or yields; for a
+        consistent mass that is to follow. From ``on``, for a line whose natural length changes otherwise.
 
     Examples
     --------
@@ -115,8 +125,11 @@ class Winch(Table):
 
     several = True
     either = (
-        *((kind, key) for kind in ("thread", "lines") for key in ("speed", "tension")),
-        ("thread", "power", "speed_limit"),
+        *(
+            (kind, *keys)
+            for kind in ("thread", "lines")
+            for keys in (("speed",), ("tension",), ("power", "speed_limit"))
+        ),
     )
 
     thread: str | None = text(default=None, limit=80)
@@ -128,15 +141,20 @@ class Winch(Table):
     tension: float | None = real(default=None, at_least=0.0, unit="N")
     power: float | None = real(default=None, unit="W")
     speed_limit: float | None = real(default=None, above=0.0, unit="m/s")
+    mass: str = choice("stays", "follows", default="stays")
+    drum: Several = nodes(default=None)
 
     def check(self) -> None:
         """Refuse none or several ways to wind, and keys that have no meaning or are missing."""
         if (self.thread is None) == (self.lines is None):
             both = f"thread = {quote(self.thread)} and lines = {quote(self.lines)} exclude each other: give a winch for"
             raise InputError(f"{both} each" if self.thread else "thread and lines are missing: give one of them")
-        for key in ("end", "at", "power") if self.lines is not None else ():
+        for key in ("end", "at") if self.lines is not None else ():
             if (value := getattr(self, key)) is not None:
                 raise InputError(f"{key} = {quote(value)} is of threads, and this winch has lines: leave it out")
+        if self.drum is not None and (self.lines is None or self.mass == "stays"):
+            why = "where the winch has a thread" if self.lines is None else 'where mass = "stays"'
+            raise InputError(f"drum = {quote(self.drum)} has no meaning {why}: leave it out")
         given = [name for name in ("speed", "tension", "power") if getattr(self, name) is not None]
         if len(given) != 1:
             raise InputError(
@@ -155,8 +173,20 @@ class Winch(Table):
 
     def extend(self, net: Net) -> Net:
         """The net whose thread or lines have the winch."""
-        if self.lines is not None:
-            return self._on_lines(net)
+        changed = self._on_thread(net) if self.lines is None else self._on_lines(net)
+        if self.mass == "stays":
+            return changed
+        from .wound_mass import WoundFlow
+
+        if net.consistent_minus_lumped is not None:
+            raise InputError('mass = "follows" needs [solve] mass = "lumped", not "consistent": leave that out')
+        lines = np.zeros(0, dtype=np.int64) if self.lines is None else net.web.find_lines(self.lines)
+        drums = None if self.drum is None else net.web.find(self.drum, "drum")
+        powered = self.power is not None and not net.quasi_static
+        return replace(changed, flows=(*changed.flows, WoundFlow(self.thread, lines, drums, powered)))
+
+    def _on_thread(self, net):
+        """The net whose thread has the winch."""
         names = [thread.name for thread in net.threads]
         if self.thread not in names:
             hint = nearest(self.thread, names) if names else "the scene has no [[thread]]"
@@ -288,8 +318,13 @@ class Winch(Table):
 
     def writes(self, system: System) -> list[Any]:
         """(Array, numbers) of the thread or lines in a system, with the numbers of this winch."""
-        net = system.net
-        if self.lines is not None:
+        net, numbers = system.net, self.numbers(system.net.quasi_static)
+        lines, others = None if self.lines is None else net.web.find_lines(self.lines), []
+        if self.mass == "follows":
+            from .wound_mass import write_numbers as write_to_mass
+
+            others = write_to_mass(system, self.thread, lines, numbers)
+        if lines is not None:
             from .wound_lines import write_numbers
 
             if net.factors or system.weakness is not None:
@@ -297,10 +332,10 @@ class Winch(Table):
                     "a winch on lines has its numbers from the scene alone beside [[reel]], [temperature] and lines "
                     "that break: take a [[thread]] of two nodes"
                 )
-            return write_numbers(net, net.web.find_lines(self.lines), self.numbers(net.quasi_static))
+            return [*write_numbers(net, lines, numbers), *others]
         number = next(number for number, thread in system.threads.items() if thread.name == self.thread)
-        array, numbers = system.terms[number].data, self.numbers(net.quasi_static)
-        return [(array, np.append(array[:, : -len(numbers)], [numbers], axis=1))]
+        array = system.terms[number].data
+        return [(array, np.append(array[:, : -len(numbers)], [numbers], axis=1)), *others]
 
     def settled(self, net: Net, x: Any) -> Any:
         """Displacement of all rows as a run begins from, None as it is given, with what lines have wound."""

@@ -18,15 +18,16 @@ with Y before and Y' behind it: of order 2, and stable for any step where the wi
 step is P h.
 
 Numbers of such a winch are those of one that stands still, see `refweb.effects.winch`, and behind them its power [W],
-positive to haul in, and v [m/s].
+positive to haul in, and v [m/s]. Lines on such winches are in `refweb.effects.wound_lines`.
 """
 
 from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -49,15 +50,9 @@ ROUNDING = 1e-15
 
 
 @functools.cache
-def power_kernels(law, record, width):
-    """Force, stiffness, bound and relaxation kernels, of the parameters of `refweb.effects.thread.kernels`.
-
-    Cells of the first three have, behind the nodes of the thread, the rows of the slip of the winch and of its energy.
-    """
-    acting, segment = kernels(law, record, width), segment_kernel(width)
-    find_slips, (first_of, rings_of, _) = return_mapping(law, record, width), layout_kernels(width)
-    force_of, stiffness_of, bound_of = acting.force, acting.stiffness, acting.bound
-    pulled_over, tension_slopes = acting.pulled_over, acting.tension_slopes
+def rate_kernel(width):
+    """The kernel of the rate of a winch, where ``width`` columns stand ahead of 1/A."""
+    first_of, rings_of, _ = layout_kernels(width)
 
     @kernel()
     def rate_at(pull, cells, data, c):
@@ -68,6 +63,37 @@ def power_kernels(law, record, width):
             return math.copysign(largest, power) if power != 0.0 else 0.0, 0.0
         return power / pull, -power / pull**2
 
+    return rate_at
+
+
+class PowerKernels(NamedTuple):
+    """Kernels of winches of constant power.
+
+    Attributes
+    ----------
+    force, stiffness, bound, relax : kernel
+        Those of a thread, whose cells have, behind its nodes, the rows of the slip of the winch and of its energy; not
+        of the last, which has those of the nodes alone.
+    add_rates, add_slopes : kernel
+        Rates of both in a cell, and their slopes.
+    """
+
+    force: Callable[..., Any]
+    stiffness: Callable[..., Any]
+    bound: Callable[..., Any]
+    relax: Callable[..., Any]
+    add_rates: Callable[..., Any]
+    add_slopes: Callable[..., Any]
+
+
+@functools.cache
+def power_kernels(law, record, width):
+    """The `PowerKernels` of the parameters of `refweb.effects.thread.kernels`."""
+    acting, segment = kernels(law, record, width), segment_kernel(width)
+    find_slips, (first_of, rings_of, _) = return_mapping(law, record, width), layout_kernels(width)
+    force_of, stiffness_of, bound_of = acting.force, acting.stiffness, acting.bound
+    pulled_over, tension_slopes, rate_at = acting.pulled_over, acting.tension_slopes, rate_kernel(width)
+
     @kernel()
     def unknowns_of(cells, data, c):
         """Row and component of the slip of the winch, and of its energy."""
@@ -75,39 +101,50 @@ def power_kernels(law, record, width):
         slip, energy = rings - 1, 2 * rings + 2
         return row + slip // 3, slip % 3, row + energy // 3, energy % 3
 
+    @kernel()
+    def add_rates(t, x, f, nodes, data, c, w):
+        """Add the rates of slip and energy of a cell by its ``nodes`` to f; w is space."""
+        find_slips(t, x, nodes, data, c, w)
+        pull, (r, k, q, m) = pulled_over(data, c, w), unknowns_of(nodes, data, c)
+        rate = rate_at(pull, nodes, data, c)[0]
+        f[r, k] += rate * (w[TAIL, 0] - w[HEAD, 0])
+        f[q, m] -= rate * pull / line_at(data, c).ea
+
+    @kernel()
+    def add_slopes(t, x, blocks, nodes, data, c, w, slopes):
+        """Add the slopes of these rates, and of the force on nodes by the slip; w and ``slopes`` are space."""
+        count, rings = nodes.shape[1] - 1, find_slips(t, x, nodes, data, c, w)
+        size = 3 * (count + 1)
+        tension_slopes(x, nodes, data, c, w, rings, False, slopes)
+        pull, (_, k, _, m), sign = pulled_over(data, c, w), unknowns_of(nodes, data, c), w[TAIL, 0] - w[HEAD, 0]
+        (rate, slope), slip, energy = rate_at(pull, nodes, data, c), size + k, size + 3 + m
+        for s in range(count):
+            p0, p1, p2, inverse, _, _ = segment(x, nodes, data, c, s)
+            p = (p0 * inverse, p1 * inverse, p2 * inverse)
+            for i in range(3):
+                blocks[c, 3 * s + i, slip] -= p[i] * slopes[s, size]
+                blocks[c, 3 * s + 3 + i, slip] += p[i] * slopes[s, size]
+        s = 0 if sign < 0.0 else count - 1
+        for j in range(size + 1):
+            change, at = (1.0 + strain_of(w, s)) * slopes[s, j], j if j < size else slip
+            blocks[c, slip, at] -= sign * slope * change
+            blocks[c, energy, at] += (rate + pull * slope) * change / line_at(data, c).ea
+
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         nodes, w = cells[:, : cells.shape[1] - 2].copy(), np.empty((ROWS, cells.shape[1] - 3))
         force_of(t, x, v, f, nodes, data, out)
         for c in range(cells.shape[0]):
-            find_slips(t, x, nodes, data, c, w)
-            pull, (r, k, q, m) = pulled_over(data, c, w), unknowns_of(nodes, data, c)
-            rate = rate_at(pull, nodes, data, c)[0]
-            f[r, k] += rate * (w[TAIL, 0] - w[HEAD, 0])
-            f[q, m] -= rate * pull / line_at(data, c).ea
+            add_rates(t, x, f, nodes, data, c, w)
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         nodes, count = cells[:, : cells.shape[1] - 2].copy(), cells.shape[1] - 3
-        size, w, slopes = 3 * (count + 1), np.empty((ROWS, count)), np.empty((count, 3 * (count + 1) + 1))
+        w, slopes = np.empty((ROWS, count)), np.empty((count, 3 * (count + 1) + 1))
         blocks[:] = 0.0
         stiffness_of(t, x, v, blocks, nodes, data, definite)
         for c in range(0 if definite else cells.shape[0]):
-            rings = find_slips(t, x, nodes, data, c, w)
-            tension_slopes(x, nodes, data, c, w, rings, False, slopes)
-            pull, (_, k, _, m), sign = pulled_over(data, c, w), unknowns_of(nodes, data, c), w[TAIL, 0] - w[HEAD, 0]
-            (rate, slope), slip, energy = rate_at(pull, nodes, data, c), size + k, size + 3 + m
-            for s in range(count):
-                p0, p1, p2, inverse, _, _ = segment(x, nodes, data, c, s)
-                p = (p0 * inverse, p1 * inverse, p2 * inverse)
-                for i in range(3):
-                    blocks[c, 3 * s + i, slip] -= p[i] * slopes[s, size]
-                    blocks[c, 3 * s + 3 + i, slip] += p[i] * slopes[s, size]
-            s = 0 if sign < 0.0 else count - 1
-            for j in range(size + 1):
-                change, at = (1.0 + strain_of(w, s)) * slopes[s, j], j if j < size else slip
-                blocks[c, slip, at] -= sign * slope * change
-                blocks[c, energy, at] += (rate + pull * slope) * change / line_at(data, c).ea
+            add_slopes(t, x, blocks, nodes, data, c, w, slopes)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
@@ -148,7 +185,7 @@ def power_kernels(law, record, width):
                 moved, before_that, off_before = after, moved, off
             x[q, m] -= mean * moved / ea
 
-    return force, stiffness, bound, relax
+    return PowerKernels(force, stiffness, bound, relax, add_rates, add_slopes)
 
 
 def with_power(thread: ThreadLine, terms: list[ForceTerm]) -> list[ForceTerm]:
@@ -158,14 +195,14 @@ def with_power(thread: ThreadLine, terms: list[ForceTerm]) -> list[ForceTerm]:
     them over explicit steps.
     """
     line, unknowns = thread.line, thread.unknowns
-    force, stiffness, bound, relax = power_kernels(line.law, line.law_record, line.line_data.matrix.shape[1])
+    powered = power_kernels(line.law, line.law_record, line.line_data.matrix.shape[1])
     tension, stored, *others = terms
     across = np.pad(thread.across, ((0, 0), (0, 6), (0, 6)))
     tension = replace(
         tension,
         cells=np.append(tension.cells, (unknowns // 3).astype(np.int32)[None], axis=1),
-        force=force,
-        tangent=Tangent(stiffness, bound, symmetric=False, across=across),
+        force=powered.force,
+        tangent=Tangent(powered.stiffness, powered.bound, symmetric=False, across=across),
     )
     none = np.full(2, -1, dtype=np.int64)
     length = ForceTerm(
@@ -175,6 +212,6 @@ def with_power(thread: ThreadLine, terms: list[ForceTerm]) -> list[ForceTerm]:
         force=no_force,
         balance=Balance("winch_energy", internal=True),
         timing=Timing(at_rest=False),
-        internal=InternalVariables(unknowns, none, np.ones(2), relax, 0, "[[winch]] power"),
+        internal=InternalVariables(unknowns, none, np.ones(2), powered.relax, 0, "[[winch]] power"),
     )
     return [tension, stored, length, *others]

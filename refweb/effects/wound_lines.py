@@ -10,7 +10,8 @@ natural length as built, and the term here adds what the winch makes of it:
 
 Numbers of an element stand in rows behind all places, see `refweb.effects.base.InternalVariables`, in the order of a
 thread with one ring: δ; Y over EA; 0, as no ring rubs; the time until which it has wound; what the winch has taken over
-EA. They are no unknowns: each step ends with those that follow from positions there.
+EA. They are no unknowns: each step ends with those that follow from positions there. Of a winch of constant power the
+first and the last are unknowns, see `refweb.effects.winch_power`.
 
 `Net.wound` has the lines; `System` calls `with_wound`, and with `yielding` `WoundLines` as the ``follower``.
 """
@@ -18,6 +19,7 @@ EA. They are no unknowns: each step ends with those that follow from positions t
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +31,7 @@ from ..net.threads import COLUMNS
 from . import elasticity, thread_friction
 from .base import LINE_OUT, Balance, ForceTerm, InternalVariables, Tangent, Timing, no_force, with_rows
 from .line_kernels import add_stiffness, pull_together, strain
+from .thread_slips import ROWS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,6 +48,10 @@ ROWS_OF_ONE = 2
 """Rows of the numbers of an element."""
 SLIP, UNTIL = 0, 3
 """Places among these of what is wound and of the time until which it is."""
+TAKEN = 4
+"""Place of what a winch has taken."""
+POWERED = "winch_powered"
+"""Column of line data that is 1 for elements on a winch of constant power; there is none where none is."""
 SPEED_LIMIT = 2
 """Place of its largest speed among the numbers of a winch."""
 
@@ -141,6 +148,52 @@ def kernels(law, record, first, gradients, weights):
     return force, kept, stiffness, bound, taken, relax
 
 
+@functools.cache
+def power_kernels(law, record, first, powered, gradients, weights):
+    """Force, stiffness, bound and relaxation kernels where some lines are on winches of constant power.
+
+    Cells are the nodes and both rows of numbers of each element, but nodes alone of the last. Parameters are those of
+    `kernels`, and the number of the column `POWERED`.
+    """
+    from .winch_power import power_kernels as of_threads
+
+    force_of, _, stiffness_of, bound_of, *_ = kernels(law, record, first, gradients, weights)
+    acting = of_threads(law, record, first)
+    add_rates, add_slopes, relax_of = acting.add_rates, acting.add_slopes, acting.relax
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        nodes, w = cells[:, :2].copy(), np.empty((ROWS, 1))
+        force_of(t, x, v, f, nodes, data, out)
+        for c in range(cells.shape[0]):
+            if data[c, powered] > 0.0:
+                add_rates(t, x, f, nodes, data, c, w)
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        nodes, w, slopes = cells[:, :2].copy(), np.empty((ROWS, 1)), np.empty((1, 7))
+        of_nodes = np.empty((cells.shape[0], 6, 6))
+        stiffness_of(t, x, v, of_nodes, nodes, data, definite)
+        blocks[:] = 0.0
+        blocks[:, :6, :6] = of_nodes
+        for c in range(0 if definite else cells.shape[0]):
+            if data[c, powered] > 0.0:
+                add_slopes(t, x, blocks, nodes, data, c, w, slopes)
+
+    @kernel(BOUND)
+    def bound(reach, speed, x, mass, rates, cells, data):
+        bound_of(reach, speed, x, mass, rates, cells[:, :2].copy(), data)
+
+    @kernel(RELAX)
+    def relax(h, x, cells, data, before, lost):
+        for c in range(cells.shape[0]):
+            lost[c] = 0.0
+            if data[c, powered] > 0.0:
+                relax_of(h, x, cells[c : c + 1], data[c : c + 1], before, lost[c : c + 1])
+
+    return force, stiffness, bound, relax
+
+
 def of(net: Net) -> Any:
     """The kernels for the laws and the element of a net."""
     return kernels(net.law, net.law_record, net.line_data.column(FIRST), *net.quadrature)
@@ -160,6 +213,11 @@ def with_wound(net: Net) -> Net:
         columns[elements, NUMBERS : NUMBERS + len(numbers)] = numbers
     for i, values in enumerate(columns.T):
         net = net.with_column(f"winch_{i}", values)
+    powered = np.zeros(count)
+    for elements, winch in net.wound:
+        powered[elements] = winch.power is not None and not net.quasi_static
+    if powered.any():
+        net = net.with_column(POWERED, powered)
     return with_rows(net, ROWS_OF_ONE * count)
 
 
@@ -232,7 +290,35 @@ def terms(net: Net) -> list[ForceTerm]:
         balance=Balance("winch_energy", internal=True),
         internal=InternalVariables(none, none, np.zeros(0), relax, 0, "[[winch]]", WoundLines(relax, column)),
     )
-    return [tension, stored, wound]
+    return [*_with_power(net, tension), stored, wound]
+
+
+def _with_power(net, tension):
+    """The term of the tension, and of what winches of constant power wind; where there are any, it has their rates."""
+    if POWERED not in (net.line_data.dtype.names or ()):
+        return [tension]
+    first, powered = net.line_data.column(FIRST), net.line_data.column(POWERED)
+    force, stiffness, bound, relax = power_kernels(net.law, net.law_record, first, powered, *net.quadrature)
+    rows = net.line_data.matrix[:, first + 5].astype(np.int32)
+    elements = np.flatnonzero(net.line_data.matrix[:, powered])
+    unknowns = (3 * rows[elements, None] + np.array([SLIP, TAKEN])).astype(np.int64).ravel()
+    none, ones = np.full(len(unknowns), -1, dtype=np.int64), np.ones(len(unknowns))
+    with_rates = replace(
+        tension,
+        cells=np.column_stack([net.cells, rows, rows + 1]),
+        force=force,
+        tangent=Tangent(stiffness, bound, symmetric=False),
+    )
+    length = ForceTerm(
+        name="winch",
+        cells=net.cells,
+        data=None,
+        force=no_force,
+        balance=Balance("winch_energy", internal=True),
+        timing=Timing(at_rest=False),
+        internal=InternalVariables(unknowns, none, ones, relax, 0, "[[winch]] power"),
+    )
+    return [with_rates, length]
 
 
 def numbers_in(net: Net, x: NDArray[np.float64]) -> NDArray[np.float64]:

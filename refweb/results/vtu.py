@@ -114,7 +114,7 @@ def frame_data(state, shape=None):
 
     The ``shape`` of a mode (nodes, 3) is point data as well, and is added to points and displacement.
     """
-    net = state.system.at(state.time).net
+    net = state.system.at(state.time, state.x).net
     fields = (state.position, *(getattr(state, name) for name in ("x", "v", "reaction")), net.mass)
     points, *point_data = (values[: net.nodes].copy() for values in fields)
     curved = [points, *point_data[:2]]

@@ -1,4 +1,4 @@
-"""Mass that follows reels, for methods that ask a system for it; the explicit loop has kernels of its own.
+"""Mass that follows reels and winches, for methods that ask a system for it; the explicit loop has kernels of its own.
 
 `effects.mass_flow` has the same equations for explicit steps; `simpson_balance` counts on the order of `brought`.
 """
@@ -23,7 +23,11 @@ class MaterialFlow:
     Attributes
     ----------
     flows : list of refweb.effects.mass_flow.MassFlow
-        Flows without rows on bodies, with the drum of each row.
+        Flows of reels without rows on bodies, with the drum of each row.
+    passages : refweb.effects.mass_flow.Passages
+        Passages of material to winches and over rings.
+    by_table : int
+        Number of the cells of ``flows``, which stand ahead of two of each passage.
     speed : ndarray, shape (3,)
         Ω of rotating axes [rad/s].
 
@@ -34,41 +38,65 @@ class MaterialFlow:
     """
 
     def __init__(self, system):
-        self._net = net = system.net
-        self.flows = []
+        self._net, self._system = system.net, system
+        net = system.net
+        self.flows, self._wound = [], [flow for flow in net.flows if flow.wound]
         for flow in net.flows:
-            drums, moves = _drums(system, flow), flow.off_bodies(net)
-            self.flows.append(flow._replace(rows=flow.rows[moves], mass=flow.mass[moves], drums=drums[moves]))
+            if not flow.wound:
+                drums, moves = _drums(system, flow), flow.off_bodies(net)
+                self.flows.append(flow._replace(rows=flow.rows[moves], mass=flow.mass[moves], drums=drums[moves]))
         frames = [term.frame.angular_velocity for term in system.rotating]
         self.speed = np.array(frames[0] if frames else (0.0, 0.0, 0.0), dtype=float)
-        self._rows = np.concatenate([flow.rows for flow in self.flows])
-        self._drums = np.concatenate([flow.drums for flow in self.flows])
+        self.passages = _joined([flow.passages(system) for flow in self._wound])
+        self.by_table = sum(len(flow.rows) for flow in self.flows)
+        self._rows = np.concatenate([*(flow.rows for flow in self.flows), self.passages.rows.ravel()]).astype(int)
+        drums = np.repeat(self.passages.drums, 2)
+        self._drums = np.concatenate([*(flow.drums for flow in self.flows), drums]).astype(int)
         self._free = ~system.supported[self._rows]
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)])
         self._driven = np.isin(self._rows, driven)
 
     def shares(self, t):
-        """Mass of each row of each flow at time t [kg], shape (cells,)."""
-        return np.concatenate([flow.mass * np.interp(t, *np.transpose(flow.table)) for flow in self.flows])
+        """Mass of each row of each flow of a reel at time t [kg], shape (cells,)."""
+        return np.concatenate([[], *(flow.mass * np.interp(t, *np.transpose(flow.table)) for flow in self.flows)])
 
-    def masses(self, t):
-        """Mass of each row of the system at time t [kg], shape (rows,)."""
+    def masses(self, t, x=None):
+        """Mass of each row of the system at time t and displacement x [kg], shape (rows,).
+
+        Without x winches have wound nothing.
+        """
         mass = self._net.mass.copy()
-        np.add.at(mass, self._rows, self.shares(t) - np.concatenate([flow.mass for flow in self.flows]))
+        gained = self.shares(t) - np.concatenate([[], *(flow.mass for flow in self.flows)])
+        slips = np.zeros(len(self.passages.slips)) if x is None else self._slips(t, x, np.zeros_like(x))[0]
+        np.add.at(mass, self._rows, np.append(gained, (self.passages.shares * slips[:, None]).ravel()))
         return mass
 
-    def _rates(self, t):
+    def _slips(self, t, x, v):
+        """Slip over each ring and drum [m], and its rate [m/s], shape (2, passages)."""
+        both = [np.zeros((2, 0))]
+        for flow in self._wound:
+            (kernel, cells, rings), data = flow.passing(self._net), flow.data_in(self._system)
+            out = np.empty((len(cells), 2 * rings))
+            kernel(t, x, v, x, cells, data, out)
+            both.append(np.vstack([out[:, :rings].ravel(), out[:, rings:].ravel()]))
+        return np.hstack(both)
+
+    def slip_rates(self, t, x, v):
+        """Rate of the mass of both rows of each passage [kg/s], shape (2 passages,)."""
+        return (self.passages.shares * self._slips(t, x, v)[1][:, None]).ravel()
+
+    def _rates(self, t, x, v):
         rates = []
         for flow in self.flows:
             times, factors = np.transpose(flow.table)
             n = int(np.searchsorted(times, t, side="right"))
             slope = (factors[n] - factors[n - 1]) / (times[n] - times[n - 1]) if 0 < n < len(times) else 0.0
             rates.append(slope * flow.mass)
-        return np.concatenate(rates)
+        return np.concatenate([*rates, self.slip_rates(t, x, v)])
 
-    def rates(self, t):
+    def rates(self, t, x, v):
         """Rate of the mass of each row [kg/s], behind a corner of its table; shape (rows,)."""
-        return np.bincount(self._rows, self._rates(t), len(self._net.mass))
+        return np.bincount(self._rows, self._rates(t, x, v), len(self._net.mass))
 
     def _incoming(self, x, v):
         """Velocity of material that comes to each row of each flow [m/s], shape (cells, 3)."""
@@ -78,7 +106,7 @@ class MaterialFlow:
     def force(self, t, x, v):
         """Force on each row [N], m' (v_d − v), shape (rows, 3)."""
         force = np.zeros_like(v)
-        np.add.at(force, self._rows, self._rates(t)[:, None] * (self._incoming(x, v) - v[self._rows]))
+        np.add.at(force, self._rows, self._rates(t, x, v)[:, None] * (self._incoming(x, v) - v[self._rows]))
         return force
 
     def brought(self, x, v):
@@ -90,6 +118,14 @@ class MaterialFlow:
         energy = np.where(self._free, incoming * speed - 0.5 * speed**2, 0.0).sum(axis=1)
         energy[self._driven] = 0.5 * (speed[self._driven] ** 2).sum(axis=1)
         return np.vstack([energy, np.where(self._free, incoming, 0.0).T])
+
+
+def _joined(parts):
+    """`Passages` of several winches as those of one."""
+    from ..effects.mass_flow import Passages
+
+    none = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 2), dtype=int), np.zeros((0, 2))
+    return Passages(*(np.concatenate(arrays) for arrays in zip(none, *parts, strict=True)))
 
 
 def _drums(system, flow):

@@ -365,7 +365,7 @@ class System:
 
     @cached_property
     def material_flow(self) -> Any:
-        """The `refweb.system.material_flow.MaterialFlow` of masses that follow reels."""
+        """The `refweb.system.material_flow.MaterialFlow` of masses that follow reels and winches."""
         from .material_flow import MaterialFlow
 
         return MaterialFlow(self)
@@ -391,14 +391,17 @@ class System:
         """Natural length of each element at time t [m], shape (elements,)."""
         return self.line_data(t).natural_length
 
-    def at(self, t: float) -> System:
-        """The system as it stands at time t: its natural lengths and masses are those of that time, and stay."""
-        if not self.net.factors:
+    def at(self, t: float, x: NDArray[np.float64] | None = None) -> System:
+        """The system as it stands at time t: its natural lengths and masses are those of that time, and stay.
+
+        Masses that follow winches are those of displacement x, by default those as built.
+        """
+        if not self.net.factors and (x is None or not self.net.flows):
             return self
         view = self.with_line_data(self.line_data(t))
         view.net = replace(view.net, factors=())
         if self.net.flows:
-            view.net = replace(view.net, flows=(), mass=self.material_flow.masses(t))
+            view.net = replace(view.net, flows=(), mass=self.material_flow.masses(t, x))
             view.__dict__.pop("mass", None)
         return view
 

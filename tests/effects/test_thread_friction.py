@@ -347,15 +347,16 @@ def randomly(seed, solve, **tables):
     return scene(points.tolist(), fixed, rope, {"kind": "dynamic", "duration": 0.15, **solve}, masses, **given | tables)
 
 
-def test_random_scenes():
-    """± holds what a tighter run gives, in all but one of ten, and what is lost only grows."""
+@pytest.mark.parametrize("count, least", [(10, 9), pytest.param(100, 97, marks=pytest.mark.slow)])
+def test_random_scenes(count, least):
+    """± holds what a tighter run gives, in nearly all, and what is lost only grows."""
     holds = 0
-    for seed in range(10):
+    for seed in range(count):
         run = refweb.run(randomly(seed, {}, accuracy={}))
         exact = refweb.run(randomly(seed, {"method": "cvode", "family": "adams", "rtol": 1e-10})).results["z"].value
-        holds += abs(run.results["z"].value - exact) <= run.results["z"].error + 1e-12
+        holds += abs(run.results["z"].value - exact) <= run.results["z"].error + 1e-10  # that of its rtol
         assert (np.diff(run.history["dissipated_energy"]) >= 0.0).all()
-    assert holds >= 9
+    assert holds >= least, holds
 
 
 # Return mapping

@@ -64,14 +64,16 @@ def closed(history, size):
     np.testing.assert_allclose(history["total_energy"], history["total_energy"][0], atol=size)
 
 
+POWER = {"power": 30.0, "speed_limit": 20.0}
 HAULED, SLIPPED, TURNED = (TENSION, 0.0, 30.0), (BRAKE, -1.5, 0.0), (SPEEDS, 0.0, MASS * G)
+LIFTED = (POWER, 0.0, MASS * G)
 
 
-@pytest.mark.ordinary("central-difference-winch1-*", "ida-*")
+@pytest.mark.ordinary("central-difference-winch1-*", "central-difference-winch3-*", "ida-winch*")
 @pytest.mark.parametrize(
     "method, winch, start, pull",
     [
-        *(("central-difference", *case) for case in (HAULED, SLIPPED, TURNED)),
+        *(("central-difference", *case) for case in (HAULED, SLIPPED, TURNED, LIFTED)),
         ("bdf", *HAULED),
         ("ida", *SLIPPED),
         ("adams", *TURNED),
@@ -87,6 +89,52 @@ def test_a_line_is_a_thread_of_two_nodes(method, winch, start, pull):
         np.testing.assert_allclose(line[name], thread[name], atol=size * (1e-9 if exact else 1e-3), err_msg=name)
     np.testing.assert_allclose(line["pull"], thread["pull"], atol=1e-6 if exact else 0.05 * thread["pull"].max())
     closed(line, 5e-3)
+
+
+@pytest.mark.ordinary("central-difference", "adams")
+@pytest.mark.parametrize("method", METHODS)
+def test_a_lift_at_a_power(method):
+    """The load gets P t in all; as fast as the weight allows, P/(m g), it is at t(v) in closed form.
+
+    Of a line that does not stretch m v' = P/v − m g; the line here differs by its stretch.
+    """
+    power, weight = POWER["power"], MASS * G
+    history = refweb.run(hanging(POWER, METHODS[method], pull=weight)).history
+    last = power / weight
+    speeds = np.linspace(0.0, (1.0 - 1e-9) * last, 100_001)
+    times = -speeds / G - last / G * np.log1p(-speeds / last)
+    ways = np.append(0.0, np.cumsum(0.5 * np.diff(times) * (speeds[1:] + speeds[:-1])))
+    rise = np.interp(history["time"], times, ways)
+    np.testing.assert_allclose(history["z"][3:], rise[3:], atol=2.0 * weight * 3.0 / EA)
+    np.testing.assert_allclose(history["winch_energy"], -power * history["time"], rtol=1e-9, atol=1e-9)
+    closed(history, 1e-4)
+
+
+def test_powers_of_several_lines_beside_a_thread():
+    """Loads apart from each other move as each would alone, on unknowns of lines and of a thread."""
+    x = np.arange(3.0)
+    points = [[at, 0.0, z] for at in x for z in (0.0, -3.0)]
+    lines = [[0, 1], [2, 3]]
+    tables = {
+        "cable": {**CABLE, "prestrain": MASS * G / EA},
+        "gravity": {"acceleration": [0.0, 0.0, -G]},
+        "point_mass": [{"node": [1, 3, 5], "mass": MASS}],
+        "thread": [{"name": "rope", "nodes": [4, 5], **CABLE, "prestrain": MASS * G / EA}],
+        "observe": [{"name": f"z{n}", "quantity": "displacement", "node": n, "component": "z"} for n in (1, 3, 5)],
+        "output": {"interval": 0.01},
+    }
+    winches = [
+        {"thread": "rope", "end": "first", **POWER},
+        {"lines": [1], "power": 10.0, "speed_limit": 1.0},
+        {"lines": [0], **POWER},
+    ]
+    solve = {"duration": 0.05, **METHODS["adams"]}
+    together = refweb.run(scene(points, lines, [0, 2, 4], winches, {"kind": "dynamic", **solve}, **tables)).history
+    alone = {"duration": 0.05, **METHODS["central-difference"]}
+    for name, winch in (("z1", POWER), ("z3", {"power": 10.0, "speed_limit": 1.0})):
+        one = refweb.run(hanging(winch, alone, pull=MASS * G, output={"interval": 0.01})).history["z"]
+        np.testing.assert_allclose(together[name], one, atol=1e-6)
+    np.testing.assert_allclose(together["z1"], together["z5"], atol=1e-9)
 
 
 @pytest.mark.parametrize("method", ["central-difference", "ida"])
@@ -356,7 +404,7 @@ def test_commands_beside_a_reel():
         ({"lines": None}, {}, r"thread and lines are missing: give one of them"),
         ({"end": "first"}, {}, r'end = "first" is of threads, and this winch has lines: leave it out'),
         ({"at": 1}, {}, r"at = 1 is of threads"),
-        ({"speed": None, "power": 1.0, "speed_limit": 1.0}, {}, r"power = 1.0 is of threads"),
+        ({"speed": None, "power": 1.0}, {}, r"speed_limit is missing: with power = 1 a slack thread would be wound"),
         ({"lines": "rim"}, {}, r'lines = "rim"'),
         ({"lines": [3]}, {}, r"lines\[0\] = 3"),
         ({"speed": 4.0}, {}, r"hauls in 4 m until t = 1 s, must be below the natural length of line 0, 3 m"),

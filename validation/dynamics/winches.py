@@ -1,4 +1,4 @@
-"""Winches: a drum that winds up a rope, a lever on an axle, and lines that are reeled in with their mass.
+"""Winches: a drum that winds up a rope, a lever on an axle, and lines that are reeled or wound with their mass.
 
 A drum of radius R that turns by θ winds up R θ of a rope, which hangs from its side with a mass. Without friction the
 moment on it is R times all weight that hangs. Elements of length h lie on it as chords, which stand out by (h/R)²/8 of
@@ -11,6 +11,12 @@ A mass m on a line of ρA is whirled about a pin while the line is reeled in or 
 of the line's mass is at its end, and material leaves and comes through the pin, where it has no velocity:
 
     (m + ½ ρA L) v' = F − ½ ρA L' v,        so that the angular momentum about the pin stays.
+
+A load M hangs on a line that a winch pays out at a speed, or hauls in at a tension or a power, while its mass follows:
+
+    (M + ½ρA L) v' = T − (M + ½ρA L) g − ½ρA L' v,      T = EA (l/L − 1),
+
+with L' by the speed; L = l/(1 + T/EA) at a tension; or L' = −P/Y, Y = EA (ε + ½ε²), at a power.
 
 The independent methods are DOP853 on these equations and a minimisation of the energy by Brent's method.
 """
@@ -29,6 +35,14 @@ G = 9.81
 REELED = ((0.0, 1.0), (0.4, 1.3), (1.0, 0.8))
 DENSE, MASS, AXIAL, FAST = 0.5, 0.3, 1e3, 3.0
 """ρA [kg/m], m [kg], EA [N] and the speed across at the start [m/s]."""
+LOAD, ROPE, HUNG = 2.0, 0.8, 1e4
+"""M [kg], ρA [kg/m] and EA [N] of a load on a line of 3 m."""
+WINCHES = {
+    "lowered": {"speed": [[0.0, 0.0], [0.2, -0.6]]},
+    "raised at a tension": {"tension": 40.0},
+    "raised at a power": {"power": 40.0, "speed_limit": 20.0},
+}
+"""Winches of the line; none lets it go slack."""
 METHODS = {
     "central-difference": dict(safety=0.1),
     "cvode": dict(method="cvode", rtol=1e-4),
@@ -77,6 +91,39 @@ def path(times):
         found += [run.sol(t) for t in inside]
         y = run.y[:, -1]
     return np.array(found).T
+
+
+def hauled(winch, keys):
+    """(Way of the load by refweb, by DOP853) until 0.5 s, which begins with the tension of its weight."""
+    stretch = 1.0 + (LOAD + 1.5 * ROPE) * G / HUNG
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [0, 0, -3]], lines=[[0, 1]], natural_length=[3.0 / stretch], supports=[0]),
+        cable=refweb.Cable(law="tension-only", modulus=HUNG / 1e-5, area=1e-5, density=ROPE / 1e-5),
+        effects=[
+            refweb.PointMass(node=1, mass=LOAD),
+            refweb.Gravity(acceleration=(0.0, 0.0, -G)),
+            refweb.Winch(lines=0, mass="follows", **winch),
+        ],
+        solve=refweb.Dynamic(duration=0.5, **keys),
+        observe=[refweb.Observe(name="way", quantity="displacement", node=1, component="z")],
+    )
+
+    def rate(t, y):
+        length = 3.0 - y[0]
+        if "tension" in winch:
+            natural, growth = length / (1.0 + winch["tension"] / HUNG), -y[1] / (1.0 + winch["tension"] / HUNG)
+        else:
+            natural = y[2]
+        strain = length / natural - 1.0
+        if "power" in winch:
+            growth = -winch["power"] / (HUNG * (strain + 0.5 * strain**2))
+        elif "speed" in winch:
+            growth = -np.interp(t, *np.transpose(winch["speed"]))
+        mass = LOAD + 0.5 * ROPE * natural
+        return [y[1], (HUNG * strain - mass * G - 0.5 * ROPE * growth * y[1]) / mass, growth]
+
+    exact = solve_ivp(rate, (0.0, 0.5), [0.0, 0.0, 3.0 / stretch], "DOP853", rtol=1e-11, atol=1e-13, max_step=1e-3)
+    return refweb.run(scene).results["way"], exact.y[0, -1]
 
 
 def lever(torque):
@@ -128,6 +175,12 @@ def case(quick):
     exact = 0.05 * moments[0] / moments[1] * 80.0
     rows.append(Row("tether, speed of its end", spun.value, exact, "angular momentum", 4e-3, reason, "m/s", spun.error))
     runs = {name: whirled(keys) for name, keys in METHODS.items() if not quick or name != "ida"}
+    for name, winch in WINCHES.items():
+        for method in METHODS if not quick else ["central-difference"]:
+            found, exact = hauled(winch, METHODS[method])
+            given = dict(unit="m", error=found.error, covered=True)
+            label = f"load {name}, way by {method}"
+            rows.append(Row(label, found.value, exact, "DOP853", 2e-2, "± of the method covers it", **given))
     end = path(np.array([1.0]))[:, 0]
     exact = {"x": end[0], "y": end[1], "speed": np.hypot(*end[2:])}
     reason = "± of the method covers it, at these tolerances"

@@ -156,7 +156,7 @@ def case(quick):
             )
         )
         table.append([
-            f"{1e-9 * margin * stress:.2f}",
+            f"{1e-9 * margin * stress:.3f}",
             str(len(breaks)),
             f"{breaks[0]['time']:.2f}" if breaks else "none breaks",
             *("yes" if found[name]["drawn"] else "no" for name in ("inside", "closed")),

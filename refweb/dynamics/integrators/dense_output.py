@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numba import types
 
+from ...effects.mass_flow import set_masses_by_slips
 from ...effects.natural_lengths import set_lengths
 from ...kernels import (
     MATRIX,
@@ -155,6 +156,8 @@ def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: M
         motions.kernels[i](t, x, v, f, motions.cells[i], motions.data[i], motions.outs[i])
     if model.lengths.elements.size:
         set_lengths(t, model.lengths, data[0])
+    if model.lengths.masses.slips.size:
+        set_masses_by_slips(t, x, model.lengths.masses)
     f[:] = 0.0
     forces[0](t, x, v, f, cells[0], data[0], lines)
     for some in (terms.still, terms.viscous):
@@ -231,6 +234,8 @@ def show_again(now: float, inside: Inside, model: Model, observed: Observed, run
     terms = model.terms
     if model.lengths.elements.size:
         set_lengths(now, model.lengths, terms.data[0])
+    if model.lengths.masses.slips.size:
+        set_masses_by_slips(now, running.x, model.lengths.masses)
     for i in observed.terms:
         if not among(model.implicit_contacts.terms, i):
             terms.forces[i](

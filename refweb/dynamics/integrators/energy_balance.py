@@ -14,7 +14,7 @@ import numpy as np
 
 from ...compiled.rows import record_at
 from ...effects.line_kernels import LINE
-from ...effects.mass_flow import exchange_masses
+from ...effects.mass_flow import exchange_by_slips, exchange_masses
 from ...effects.natural_lengths import NaturalLengths, set_growth, set_lengths
 from ...errors import EnergyDriftError
 from ...kernels import (
@@ -249,11 +249,14 @@ def change_lengths(t: float, h: float, model: Model, was: Vector, running: Runni
 
 @kernel(forceinline=True)
 def change_lines(changing, t, h, model, was, running):
-    """Set natural lengths and internal variables at time t, a step h later, where the lines have any that change."""
+    """Set natural lengths, internal variables and masses by slips at time t, a step h later, where any change."""
     if changing:
         change_lengths(t, h, model, was, running)
     elif model.relaxing.terms.size:
         relax(h, running.x, model, running.work)
+    masses = model.lengths.masses
+    if masses.slips.size:
+        exchange_by_slips(t, h, running.x, running.v, masses, running.work, running.ledger.pushed)
 
 
 @kernel(leaf=True)

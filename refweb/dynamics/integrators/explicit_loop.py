@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...effects.mass_flow import set_masses_by_slips
 from ...effects.natural_lengths import set_lengths
 from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import add_forces_to_bodies
@@ -232,7 +233,7 @@ def steps_until(end, changing, scheme, model, running):
         fastest = min(fastest, spread_of(v[: model.inertia.linear]) + interval * math.sqrt(push))
     reach = 2.0 * interval * fastest
     reach_all(reach, running.x, model.nearby, model.terms)
-    if not model.nearby.at.shape[0] or covered(0.5 * reach, running.x, model.nearby, model.terms):
+    if not model.nearby.at.shape[0] or covered(reach, running.x, model.nearby, model.terms):
         return interval / (scheme.safety * safe_step(time, end, changing, reach, fastest, running.x, f, model))
     bound = step_by_elements(time, end, changing, reach, fastest, model, running)
     return interval / (scheme.safety * bound)
@@ -299,6 +300,8 @@ def advance_rows(
     for n in range(times.size):
         if lengths.elements.size and not clock.begun:
             set_lengths(clock.time, lengths, model.terms.data[0])
+        if lengths.masses.slips.size and not clock.begun:
+            set_masses_by_slips(clock.time, running.x, lengths.masses)
         while clock.time < times[n] and not stopped:
             end, begun = end_of_steps(model.corners, clock.time, times[n]), clock.begun
             changing = lengths.corners.size > 2 and lengths.corners[0] < end and lengths.corners[-3] > clock.time
@@ -358,6 +361,8 @@ def begin(
     terms = model.terms
     if model.lengths.elements.size:
         set_lengths(0.0, model.lengths, terms.data[0])
+    if model.lengths.masses.slips.size:
+        set_masses_by_slips(0.0, x, model.lengths.masses)
     for i in range(len(terms.forces)):
         terms.forces[i](0.0, x, v, f, terms.cells[i], terms.data[i], terms.outs[i])
     add_forces_to_bodies(x, f, model.inertia.turns)

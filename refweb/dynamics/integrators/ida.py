@@ -295,7 +295,7 @@ class Ida(Sundials):
     def _initial(self, t, x, v):
         heavy, rest = self._heavy, np.zeros(self._count)
         rows = self._rows(t, np.concatenate([x, v[heavy]]), np.concatenate([v, v[heavy]]))
-        system = self.system.at(t) if self.system.net.flows else self.system
+        system = self.system.at(t, rows[0]) if self.system.net.flows else self.system
         force = self.system.force(t, *rows)
         if system is not self.system:
             force += self.system.material_flow.force(t, *rows)

@@ -322,7 +322,7 @@ def reach_all(reach, x, nearby, terms):
 
 @kernel(leaf=True, apart=("pairs",))
 def covered(path: float, x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> bool:
-    """Tell if the listed pairs are all that can touch after an approach of ``path`` [m].
+    """Tell if the listed pairs, and lines near bodies, are all that can touch after an approach of ``path`` [m].
 
     They are found anew at displacement x where a list as deep would then be all: its turn comes soon. Where it is not,
     bounds look at the elements themselves, see

@@ -70,7 +70,7 @@ class Rates(NamedTuple):
         Power of each term and of motion [W]; the force of the supports, and of what acts from outside without a
         formula of its impulse [N].
     lengths, length_force : ndarray or None
-        Natural lengths [m], and ∂E/∂L of each [N]; none where nothing changes them. Masses that follow them are among
+        Natural lengths [m], and ∂E/∂L of each [N]; none where nothing changes them. Masses that follow reels are among
         them, and then four rows have the energy and the momentum that come with each.
     """
 
@@ -180,13 +180,17 @@ class SimpsonBalance:
         for term in self._pushing:
             rows = system.force_of(term, sample.time, sample.x, sample.v)
             flow[-3:] += rows[: self._linear].sum(axis=0)
+        brought = None
+        if system.net.flows:
+            material, count = system.material_flow, system.material_flow.by_table
+            brought = material.brought(sample.x, sample.v)
+            flow[[-7, -3, -2, -1]] += brought[:, count:] @ material.slip_rates(sample.time, sample.x, sample.v)
         if not system.net.factors:
             return Rates(flow)
         lengths, force = system.natural_length(sample.time), system.length_force(sample.time, sample.x)
-        if system.net.flows:
-            material = system.material_flow
+        if brought is not None and count:
             lengths = np.append(lengths, material.shares(sample.time))
-            force = np.hstack([np.vstack([force, np.zeros((3, force.size))]), material.brought(sample.x, sample.v)])
+            force = np.hstack([np.vstack([force, np.zeros((3, force.size))]), brought[:, :count]])
         return Rates(flow, lengths, force)
 
     def piece(self, course, end, at):
@@ -210,7 +214,7 @@ class SimpsonBalance:
             last, end = (Sample(self.system, end.time, end.x, v) for v in (before, after))
             jump = np.zeros(len(course.work) + 6)
             jump[-7] = self.kinetic(end.time, end.x, after) - self.kinetic(end.time, end.x, before)
-            jump[-6:-3] = self.momentum(end.time, after) - self.momentum(end.time, before)
+            jump[-6:-3] = self.momentum(end.time, end.x, after) - self.momentum(end.time, end.x, before)
         start, rates = course.sample, (self.rates(middle), self.rates(last))
         rates = start.rates or self.rates(start), *rates
         end.rates = rates[-1] if last is end else None
@@ -225,22 +229,22 @@ class SimpsonBalance:
         done = np.abs(piece.booked(end.time)[:-6]).sum()
         return (apart > self._uneven * max(course.largest, done, self.kinetic(end.time, end.x, end.v))).any()
 
-    def _mass(self, t):
-        """The `refweb.system.mass.Mass` at time t."""
-        return self.system.at(t).mass if self.system.net.flows else self.system.mass
+    def _mass(self, t, x):
+        """The `refweb.system.mass.Mass` at time t and displacement x."""
+        return self.system.at(t, x).mass if self.system.net.flows else self.system.mass
 
     def kinetic(self, t, x, v):
         """Kinetic energy [J]."""
-        energy = 0.5 * (v * self._mass(t).momentum(v)).sum()
+        energy = 0.5 * (v * self._mass(t, x).momentum(v)).sum()
         return energy + more_kinetic(x, v, self._turns) if len(self._turns.moment) else energy
 
-    def momentum(self, t, v):
+    def momentum(self, t, x, v):
         """Momentum of what is free [N s], shape (3,)."""
-        return self._momenta(t, v)[: self._linear].sum(axis=0)
+        return self._momenta(t, x, v)[: self._linear].sum(axis=0)
 
-    def _momenta(self, t, v):
+    def _momenta(self, t, x, v):
         """M v of what is free, by row [N s]."""
-        return self._mass(t).momentum(np.where(self._supported, 0.0, v))
+        return self._mass(t, x).momentum(np.where(self._supported, 0.0, v))
 
     def energies(self, sample, work, step):
         """Energy of each term, kinetic energy, work [J] and step size [s], for the work of each term."""
@@ -258,13 +262,13 @@ class SimpsonBalance:
 
     def open(self, course, energies):
         """Note the energy and the momentum at the start of a course."""
-        open_balance(course.x, self._momenta(course.time, course.v), self._outside, course.ledger)
+        open_balance(course.x, self._momenta(course.time, course.x, course.v), self._outside, course.ledger)
         course.energy, stored = own_energies(energies, self.system)
         course.largest = max(stored, self.least_energy)
 
     def impulses(self, course, row):
         """Write momentum, impulse of the supports and of all else from outside [N s], held against each other."""
-        momenta = self._momenta(course.time, course.v)
+        momenta = self._momenta(course.time, course.x, course.v)
         note_momentum(course.time, course.x, momenta, course.impulse, self._outside, course.ledger, self._still, row)
 
     def note_largest(self, course, energies):

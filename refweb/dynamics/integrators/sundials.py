@@ -81,7 +81,7 @@ class Sundials(StepObserver):
         force = super().force_at(t, x, v)
         if self.system.net.flows:
             flow, free = self.system.material_flow, self.system.free
-            self._set_masses(np.repeat(flow.masses(t), 3)[free])
+            self._set_masses(np.repeat(flow.masses(t, x), 3)[free])
             force = force + flow.force(t, x, v).ravel()[free]
         return force
 
@@ -93,7 +93,8 @@ class Sundials(StepObserver):
         K, C = super().tangents(t, x, v)
         if self.system.net.flows:
             C = np.zeros_like(K) if C is None else C
-            C[self.system.pattern.diagonal] += np.repeat(self.system.material_flow.rates(t), 3)[self.system.free]
+            rates = self.system.material_flow.rates(t, x, v)
+            C[self.system.pattern.diagonal] += np.repeat(rates, 3)[self.system.free]
         if len(self._inner):
             C = np.zeros_like(K) if C is None else C
             C[self.system.pattern.diagonal[self._inner]] += self.system.resistance(t)

@@ -81,6 +81,21 @@ def test_lists_change_no_bit(scene):
             np.testing.assert_array_equal(array, course.arrays()[name], err_msg=name)
 
 
+def test_a_thrown_net_is_the_same_row_by_row():
+    """Pairs of lines are found as they come near, and a body is within reach of a row but not yet of the list."""
+    keys = {"web.layers": 8, "web.cell_area": 0.6, "accuracy.error": "none"}
+    system, times = refweb.Scene.load("capture-stage", keys).build(), np.linspace(0.02, 0.2, 10)
+    assert any(term.contact.finder is not None for term in system.terms)
+    courses = []
+    for rows in (times[None, :], times[:, None]):
+        solver = CentralDifference(system)
+        courses.append(solver.start())
+        for some in rows:
+            solver.advance(courses[-1], some)
+    assert courses[0].nsteps == courses[1].nsteps
+    np.testing.assert_array_equal(courses[0].x, courses[1].x)
+
+
 def distances(net, body, x):
     """From the sphere around a body to each line, as segments between its nodes, or more: from their box to its box."""
     a, b = ((net.points + x)[net.cells[:, k]] - (net.points + x)[body.row] for k in (0, 1))
