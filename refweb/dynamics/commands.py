@@ -76,6 +76,11 @@ class Command(NamedTuple):
     value: Any
 
 
+def not_negative(path: str) -> bool:
+    """True for the path of a tension of a winch, of which a value below 0 counts as 0."""
+    return path.startswith("winch.") and path.endswith(".tension")
+
+
 def widened(scene: Scene) -> Scene:
     """The scene with tables of reels and motions of two rows or more, which begin at 0: values are the same."""
     end, effects = scene.solve.duration, []

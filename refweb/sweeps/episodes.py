@@ -122,7 +122,8 @@ class Gym(Table):
     ------
     InputError
         For bounds that are not low < high, and a range with a count. From `Scene`, in statics. From `Scene.build`, for
-        names that the scene does not have, what cannot be set, and a period that is no multiple.
+        names that the scene does not have, bounds that cannot be set, such as a tension below 0 of a winch, and a
+        period that is no multiple.
 
     Examples
     --------
@@ -220,13 +221,16 @@ class Gym(Table):
 
     def check_in(self, scene: Scene, system: System) -> None:
         """Refuse what does not fit a scene; `InputError`."""
-        from ..dynamics.commands import Command, Inputs, row_at
+        from ..dynamics.commands import Command, Inputs, not_negative, row_at
         from ..dynamics.schedule import row_times
 
         names, inputs = [o.name for o in scene.observables], Inputs(system)
-        for path, (low, _) in self.bounds.items():
+        for path, bounds in self.bounds.items():
             with refused_at("inputs:"):
-                inputs.checked(Command(0.0, path, low.tolist() if len(low) > 1 else float(low[0])))
+                if not_negative(path) and bounds[0, 0] < 0.0:
+                    raise InputError(f"{short(path)} = {quote(bounds.ravel().tolist())} must be ≥ 0 [N]: a winch pulls")
+                for value in bounds.tolist():
+                    inputs.checked(Command(0.0, path, value if len(value) > 1 else value[0]))
                 inputs.refuse_factor(path)
                 if taken := [control.name for control in scene.control if control.sets == path]:
                     raise InputError(f"{short(path)} is set by [[control]] {quote(taken[0])}: leave out one of them")

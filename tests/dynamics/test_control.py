@@ -380,6 +380,20 @@ def test_fuel_that_is_none_is_refused(keys, words):
         refweb.Scene.from_dict(given).build()
 
 
+def test_fuel_of_nodes_that_nothing_flies_is_refused():
+    """A supported node and one on a rail differ; Δv of a node that a body carries would be that of its point mass."""
+    both = [{"node": [0, 1], "force": [0.0, 0.0, 0.0]}]
+    with pytest.raises(InputError, match=r"node 0 is supported .* leave it out of node = \[0, 1\]"):
+        scene(observe=SPENT, load=both).build()
+    rail = [{"nodes": [0], "components": ["y", "z"]}]
+    scene(observe=SPENT, load=both, web={**nets.SLACK_LINE["web"], "supports": []}, support=rail).build()
+    ship = {"name": "ship", "shape": "box", "size": [1, 1, 1], "mass": 8.0, "position": [0.5, 0, 0]}
+    carried = dict(body=[ship], attach=[{"body": "ship", "node": 1}], point_mass=[{"node": 1, "mass": 1.0}])
+    with pytest.raises(InputError, match='"delta_v" has no meaning for node = 1, which a body carries'):
+        scene(observe=SPENT, **carried).build()
+    scene(observe=SPENT[:3], **carried).build()
+
+
 def test_fuel_of_what_is_no_force_is_refused():
     with pytest.raises(InputError, match="sets gravity.acceleration, which is no force"):
         fuel = [*SPENT[:2], {"name": "fuel", "quantity": "fuel", "control": "hover"}]

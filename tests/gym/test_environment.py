@@ -468,6 +468,23 @@ def test_wrong_scenes():
         SceneEnv(scene(), render_mode="human")
 
 
+ROPE = {
+    "thread": [{"name": "rope", "nodes": [0, 1], "modulus": 1e6, "area": 1e-4, "density": 1.0}],
+    "winch": [{"thread": "rope", "end": "first", "tension": 1.0}],
+}
+
+
+def test_bounds_are_what_an_input_may_have():
+    """Both of them: a winch does not push, and a brake has a limit above 0."""
+    task = {"reward": "x", "inputs": {"winch.0.tension": [-5.0, 10.0]}}
+    with pytest.raises(InputError, match=r"inputs: winch.0.tension = \[-5.0, 10.0\] must be ≥ 0 \[N\]: a winch pulls"):
+        scene(task, **ROPE).build()
+    scene({**task, "inputs": {"winch.0.tension": [0.0, 10.0]}}, **ROPE).build()
+    brake = {**ROPE, "winch": [{"thread": "rope", "end": "first", "speed": 0.0, "limit": 1.0}]}
+    with pytest.raises(InputError, match=r"inputs: winch.0.limit = 0.0: limit = 0.0 must be > 0"):
+        scene({**task, "inputs": {"winch.0.limit": [0.0, 10.0]}}, **brake).build()
+
+
 def test_a_scene_without_it_loads_nothing_of_it_and_one_with_it_runs_without_gymnasium():
     code = """
 import sys
