@@ -169,7 +169,7 @@ def case(quick):
         (depth, deep), (largest, more) = entry["depth"], max(entry["spent"])
         mean = np.mean([value for value, _ in entry["spent"]])
         table.append([name, law, spins[spin], said(entry), f"{depth:.2f} ± {deep:.2f}", f"{entry['area']:.0f}",
-                      f"{mean:.1f}", f"{largest:.1f} ± {more:.1f}"])  # fmt: skip
+                      f"{mean:.1f}", f"{largest:.1f} ± {max(more, 0.1):.1f}"])  # fmt: skip
     by_law = {law: [entry for task, entry in zip(still, found, strict=False) if task[0] == law] for law in LAWS}
     areas = {law: np.mean([entry["area"] for entry in entries]) for law, entries in by_law.items()}
     costs = {law: np.nanmean([[v for v, _ in e["spent"]] for e in entries]) for law, entries in by_law.items()}
