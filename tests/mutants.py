@@ -124,7 +124,7 @@ MIRRORS = {
     "system/system": "system/test_system.py test_contract.py dynamics/integrators/test_cvode.py effects/test_thread.py "
     "effects/test_axles.py",
     "statics/body_penetration": "effects/test_overlap.py",
-    "statics/sharp_edges": "statics/test_sharp_edges.py",
+    "effects/contact/sharp_edges": "statics/test_sharp_edges.py",
     "statics/contact_kinks": "statics/test_contact_kinks.py",
     "statics/shared_push": "statics/test_contact_kinks.py",
     "system/contact_shares": "statics/test_contact_kinks.py",
@@ -423,7 +423,7 @@ MUTANTS = [
     Mutant("dynamics/stepped_run", "self._inputs.take_on(changes or [])", "pass"),
     Mutant("dynamics/stepped_run", "replace(scene.solve, duration=end)", "scene.solve"),
     Mutant("dynamics/commands", "self._first.clear()", "pass"),
-    Mutant("gym/environment", "0.5 + 0.5 * np.clip(action, -1.0, 1.0)", "0.5 + 0.5 * action"),
+    Mutant("gym/environment", "0.5 + 0.5 * np.minimum(np.maximum(action, -1.0), 1.0)", "0.5 + 0.5 * action"),
     Mutant("gym/environment", "truncated = not terminated and (", "truncated = (not terminated or ended) and ("),
     Mutant(
         "gym/environment",
@@ -595,8 +595,8 @@ MUTANTS = [
     Mutant("system/contact_shares", "*= shares", "*= 1.0"),
     Mutant("statics/body_penetration", "if element is not None and len(path):", "if element is not None and False:"),
     Mutant("statics/body_penetration", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),
-    Mutant("statics/sharp_edges", "0.25 * self.angle * max", "0.125 * self.angle * max"),
-    Mutant("statics/sharp_edges", "bend = -float(", "bend = float("),
+    Mutant("effects/contact/sharp_edges", "0.25 * self.angle * max", "0.125 * self.angle * max"),
+    Mutant("effects/contact/sharp_edges", "bend = -float(", "bend = float("),
     Mutant("effects/contact_solver", "1.0 / (1.0 - math.exp(-z)) - 1.0 / z", "1.0 / (1.0 - math.exp(-z))"),
     Mutant("effects/contact_solver", "p, normal, change = 0.0, contact", "p, normal, change = 0.0, 2.0 * contact"),
     Mutant("net/rotation", "share = h / (m + 1.0)", "share = h / (m + 2.0)"),

@@ -197,10 +197,10 @@ def _refuse_other_variables(system, given, name):
     same = [given["bodies"][i] for i in of_lines] == names
     title = str(given.get("internal", "" if not same else system.internal_of_lines))
     if given["displacements"][[first + i for i in of_lines]].any() and not (same and title == system.internal_of_lines):
-        here = f"those of {system.internal_of_lines}" if names else "none"
+        present = f"those of {system.internal_of_lines}" if names else "none"
         raise InputError(
             f"{name} its lines have internal variables{f' of {title}' if title else ''}, such as plastic strains, and "
-            f"lines of this scene have {here}: without them natural lengths would be wrong; take the same law"
+            f"lines of this scene have {present}: without them natural lengths would be wrong; take the same law"
         )
 
 
@@ -215,8 +215,8 @@ def unused_velocities(system, start):
              + np.cross(omega, body.rotation(start.x) @ arm)),
             ("angular_velocity", np.array(body.angular_velocity), omega),
         )  # fmt: skip
-        for key, own, now in moves:
-            if own.any() and not np.allclose(own, now, rtol=SAME, atol=SAME * np.abs(own).max()):
+        for key, given, now in moves:
+            if given.any() and not np.allclose(given, now, rtol=SAME, atol=SAME * np.abs(given).max()):
                 text = f'{key} of body "{body.name}" has no effect: the folder that the run starts from has its motion'
                 yield Finding("left-out", text, "body", NOTE)
 

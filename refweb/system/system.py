@@ -470,10 +470,16 @@ class System:
         return Forces(f, per_cell)
 
     def force_of(
-        self, term: ForceTerm, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None
+        self,
+        term: ForceTerm,
+        t: float,
+        x: NDArray[np.float64],
+        v: NDArray[np.float64] | None = None,
+        f: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
-        """Force on every row of one term [N]."""
-        f, out = np.zeros((self.rows, 3)), np.zeros((len(term.cells), max(term.columns, 2)))
+        """Force on every row of one term [N], added to ``f`` where that is given."""
+        f = np.zeros((self.rows, 3)) if f is None else f
+        out = np.zeros((len(term.cells), max(term.columns, 2)))
         term.force(t, x, self._zero if v is None else v, f, term.cells, self.data_of(term, t), out)
         return f
 
