@@ -230,7 +230,7 @@ class SceneEnv(gymnasium.Env):
         """Set values by path, go ahead by a period, and take the numbers of reward and ends."""
         for path, value in given.items():
             run.set(path, value)
-        run.advance(self.gym.period)
+        run.advance(self.gym.period, self.gym.budget)
         before, self._observed = self._observed, run.observed
         self._numbers = dict(zip(self._before, before.values(), strict=True))
         self._numbers |= {**self._values, **given, TIME: run.time, **self._observed}

@@ -91,9 +91,9 @@ class Gym(Table):
     paths of inputs and draws, such as ``load.0.force[2]``. A comparison within a sum counts as 1 or 0. An episode is
     truncated at the end of the duration, and terminated where an event stops the run.
 
-    A run that fails, since the solver refuses to go on, energy drifts, or the reward is not finite or an end compares
-    what has no value, terminates the episode with the last observation, the reward ``failure_reward`` and the message
-    as ``failure`` of the info.
+    A run that fails, since the solver refuses to go on, takes too long, energy drifts, or the reward is not finite or
+    an end compares what has no value, terminates the episode with the last observation, the reward ``failure_reward``
+    and the message as ``failure`` of the info.
 
     Parameters
     ----------
@@ -114,6 +114,8 @@ class Gym(Table):
         True to raise the error of a run that fails, in place of an end of the episode.
     failure_reward : float
         Reward of a period in which the run fails.
+    budget : float, optional
+        CPU time that a period may take [s]; a run that needs more fails. By default it may take any.
     draw : dict
         Values that are drawn for each episode, by path: as ``parameters`` of a study, ranges, distributions, or lists,
         whose entries are equally likely.
@@ -145,6 +147,7 @@ class Gym(Table):
     truncated: str | None = text(default=None)
     raise_failure: bool = boolean(default=False)
     failure_reward: float = real(default=0.0)
+    budget: float | None = real(default=None, above=0, unit="s")
     draw: dict[str, Any] = field(_draws, default_factory=dict)
 
     def check(self) -> None:
