@@ -23,7 +23,6 @@ OFF = 1e-9
 JUMP = 1e-6
 """The same of a body that tables move: a larger one would throw the web at the start."""
 
-
 SAME = 1e-9
 """Difference of two velocities of a body, over their size, within which both are the same."""
 
@@ -192,7 +191,7 @@ def stored(system, folder):
 def _refuse_other_variables(system, given, name):
     """Refuse a folder whose lines have internal variables, such as plastic strains, that this scene has not."""
     names = system.net.internal_names[: system.net.rows_of_elements]
-    of_lines = [i for i, row in enumerate(given["bodies"].tolist()) if re.fullmatch(r"\.\d+\.\d+", row)]
+    of_lines = [i for i, row in enumerate(given["bodies"].tolist()) if re.fullmatch(r"\.\d+\.\d+", str(row))]
     first = len(given["displacements"]) - len(given["bodies"])
     same = [given["bodies"][i] for i in of_lines] == names
     title = str(given.get("internal", "" if not same else system.internal_of_lines))
@@ -210,11 +209,10 @@ def unused_velocities(system, start):
         if body.fixed or body.moved:
             continue
         omega, arm = body.turning(start.x, start.v), body.offset @ body.axes
-        moves = (
-            ("velocity", body.velocity + np.cross(body.angular_velocity, arm), start.v[body.row]
-             + np.cross(omega, body.rotation(start.x) @ arm)),
-            ("angular_velocity", np.array(body.angular_velocity), omega),
-        )  # fmt: skip
+        given_speed = body.velocity + np.cross(body.angular_velocity, arm)
+        speed = start.v[body.row] + np.cross(omega, body.rotation(start.x) @ arm)
+        turns = ("angular_velocity", np.array(body.angular_velocity), omega)
+        moves = (("velocity", given_speed, speed), turns)
         for key, given, now in moves:
             if given.any() and not np.allclose(given, now, rtol=SAME, atol=SAME * np.abs(given).max()):
                 text = f'{key} of body "{body.name}" has no effect: the folder that the run starts from has its motion'
