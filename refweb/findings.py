@@ -57,7 +57,7 @@ CODES = {
     "starts-around": "The web begins around a body.",
     "starts-in-body": "A body that starts inside of the web, or the web in a body.",
     "starts-open": "A net whose mouth is open at the start of a throw.",
-    "surface": "Repairs of the surface of a body.",
+    "surface": "Repairs of the surface of a body, or an error of it that ± does not contain.",
     "switch-in-doubt": "A control that switches may switch otherwise within ±.",
     "tables": "Breakpoints of tables shorten the steps.",
     "two-equilibria": "Two starts lead to two equilibria.",

@@ -168,8 +168,10 @@ class Dynamic(Table):
         Of CVODE, IDA and a start at an equilibrium: library that factorizes the tangent, as of `Static`.
     start : {"web", "equilibrium"} or path
         State at t = 0: the web as it is, its equilibrium under what acts at t = 0, or the last state in a result
-        folder. A free body takes part in the equilibrium where it has no velocity, and carries nodes or touches a line
-        where its table has it; others are held there meanwhile and feel nothing.
+        folder. Bodies of that folder go on with its velocities, those of statics with the velocities of their tables; a
+        ``[[velocity]]`` comes in place of that of its nodes. Lines that have yielded, have Maxwell arms or are on
+        winches need the same law. A free body takes part in the equilibrium where it has no velocity, and carries nodes
+        or touches a line where its table has it; others are held there meanwhile and feel nothing.
 
     Raises
     ------

@@ -10,7 +10,6 @@ Plug-ins use these readers; ``accepts`` must say what a reader checks, since `re
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import functools
 import math
@@ -422,7 +421,8 @@ class Table:
 
     def with_value(self, key: str, value: Any) -> Self:
         """A copy with another value of one field, which alone is read; it costs less than `dataclasses.replace`."""
-        changed = copy.copy(self)
+        changed = object.__new__(type(self))
+        changed.__dict__.update(self.__dict__)
         object.__setattr__(changed, key, checked(key, value, self.__dataclass_fields__[key]))
         changed.check()
         return changed

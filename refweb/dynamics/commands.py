@@ -76,6 +76,11 @@ class Command(NamedTuple):
     value: Any
 
 
+def not_negative(path: str) -> bool:
+    """True for the path of a tension of a winch, of which a value below 0 counts as 0."""
+    return path.startswith("winch.") and path.endswith(".tension")
+
+
 def widened(scene: Scene) -> Scene:
     """The scene with tables of reels and motions of two rows or more, which begin at 0: values are the same."""
     end, effects = scene.solve.duration, []
@@ -231,7 +236,7 @@ class Inputs:
         """Force of some terms on every row [N]."""
         force = np.zeros_like(x)
         for term in terms:
-            force += self._system.force_of(term, t, x, v)
+            self._system.force_of(term, t, x, v, force)
         if self._system.carriers:
             self._system.carriers.add_forces_to_bodies(x, force)
         return force
@@ -282,6 +287,8 @@ class Inputs:
 
     @staticmethod
     def _number(name, word, effects):
+        if word.isdecimal() and int(word) < len(effects) and not hasattr(effects[0], "name"):
+            return int(word)
         named = {getattr(effect, "name", None): i for i, effect in enumerate(effects)}
         if word in named:
             return named[word]
@@ -338,6 +345,8 @@ class Inputs:
             at = next(i for i, (_, table) in enumerate(system.net.factors) if table is given.factor)
             return [(system.lengths.tables[at], np.array(flattened(effect.factor)))]
         old = next(parts for acting, parts in system.acting if getattr(acting, "effect", None) is given)
+        if name == "load" and effect.body is None:
+            return [(part.data, effect.numbers(part.data)) for part in old]
         new = effect.on(system.net)
         writes = []
         for part, changed in zip(old, new if isinstance(new, list) else [new], strict=True):

@@ -17,7 +17,7 @@ from ..errors import InputError, SolverError, refused_at
 from ..messages import nearest, one_line, quote, short
 from ..net.quaternions import interpolated, of_vector, product, rotation_between
 from ..registry import EFFECTS, name_of
-from .commands import INPUTS, NEAR, RATES, Command, Commands, Inputs
+from .commands import INPUTS, NEAR, RATES, Command, Commands, Inputs, not_negative
 from .control_laws import LAWS, Measurement
 from .schedule import row_times
 
@@ -102,7 +102,7 @@ class Controller:
         if name not in known:
             raise InputError(f"sets = {quote(control.sets)}: {quote(name)} has nothing to set, {nearest(name, known)}")
         self.vector = name in VECTORS
-        self._not_negative = name == "winch" and control.sets.endswith(".tension")
+        self._not_negative = not_negative(control.sets)
         if self.vector and len(control.measures) == 1 and control.direction is None:
             raise InputError(f"direction is missing: {control.sets} is a vector, and measures has one name")
         if not self.vector and (len(control.measures) > 1 or control.direction is not None):

@@ -6,12 +6,13 @@ writes, so that a renamed one breaks folders of users.
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
-from ..findings import Finding
+from ..findings import NOTE, Finding
 from ..messages import short
 from ..net.rigid_body import matrix_of, row_names
 from ..net.rotation import quaternion_of
@@ -21,6 +22,9 @@ OFF = 1e-9
 
 JUMP = 1e-6
 """The same of a body that tables move: a larger one would throw the web at the start."""
+
+SAME = 1e-9
+"""Difference of two velocities of a body, over their size, within which both are the same."""
 
 
 class Start(NamedTuple):
@@ -143,12 +147,14 @@ def stored(system, folder):
     """The `Start` of the checkpoint in a result folder, and that of its step refinement (None if there was none).
 
     Nodes are matched by number, bodies by name; a body that is not in the folder starts as in its table. Orientations
-    and rotations of bodies are those of the checkpoint, for any axes in their tables.
+    and rotations of bodies are those of the checkpoint, for any axes in their tables. Where nothing moves in it, as in
+    statics, velocities are those of the scene.
 
     Raises
     ------
     InputError
-        Where there is no checkpoint, or it is that of another net, or bodies that tables move are elsewhere in it.
+        Where there is no checkpoint, or it is that of another net or of lines with other internal variables, or bodies
+        that tables move are elsewhere in it.
     """
     path = str(folder)
     net, name = system.net, f'[solve] start = "{path if len(path) <= 60 else "..." + path[-57:]}":'
@@ -168,15 +174,49 @@ def stored(system, folder):
         )
     if "lines" in given and not np.array_equal(given["lines"], net.web.lines):
         raise InputError(f"{name} holds other lines between its nodes than this scene: it must be the same web")
+    _refuse_other_variables(system, given, name)
     broken = given.get("broken", np.zeros(0, dtype=np.int64))
     bearings = _bearings(system, given, bodies, name)
     start = _start_at(system, positions, displacements, velocities, bodies, bearings)
     start = start._replace(broken=broken if len(broken) else None, contact_shares=given.get("contact_shares"))
     _refuse_jumps(system, start.x, name)
+    if not velocities.any():  # statics has no steps
+        return start, start
     x, v = (given.get(f"twin_{key}") for key in ("displacements", "velocities"))
     if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):
         return start, None
     return start, _start_at(system, positions - displacements + x, x, v, bodies, bearings)
+
+
+def _refuse_other_variables(system, given, name):
+    """Refuse a folder whose lines have internal variables, such as plastic strains, that this scene has not."""
+    names = system.net.internal_names[: system.net.rows_of_elements]
+    of_lines = [i for i, row in enumerate(given["bodies"].tolist()) if re.fullmatch(r"\.\d+\.\d+", str(row))]
+    first = len(given["displacements"]) - len(given["bodies"])
+    same = [given["bodies"][i] for i in of_lines] == names
+    title = str(given.get("internal", "" if not same else system.internal_of_lines))
+    if given["displacements"][[first + i for i in of_lines]].any() and not (same and title == system.internal_of_lines):
+        present = f"those of {system.internal_of_lines}" if names else "none"
+        raise InputError(
+            f"{name} its lines have internal variables{f' of {title}' if title else ''}, such as plastic strains, and "
+            f"lines of this scene have {present}: without them natural lengths would be wrong; take the same law"
+        )
+
+
+def unused_velocities(system, start):
+    """Findings on bodies that a `Start` of a folder gives another velocity than their tables."""
+    for body in system.net.bodies:
+        if body.fixed or body.moved:
+            continue
+        omega, arm = body.turning(start.x, start.v), body.offset @ body.axes
+        given_speed = body.velocity + np.cross(body.angular_velocity, arm)
+        speed = start.v[body.row] + np.cross(omega, body.rotation(start.x) @ arm)
+        turns = ("angular_velocity", np.array(body.angular_velocity), omega)
+        moves = (("velocity", given_speed, speed), turns)
+        for key, given, now in moves:
+            if given.any() and not np.allclose(given, now, rtol=SAME, atol=SAME * np.abs(given).max()):
+                text = f'{key} of body "{body.name}" has no effect: the folder that the run starts from has its motion'
+                yield Finding("left-out", text, "body", NOTE)
 
 
 def _refuse_jumps(system, x, name):
@@ -238,6 +278,16 @@ def _turn(body, bearing, rows, x, v):
     v[body.row] += np.cross(omega, shift)
 
 
+def _start_turning(body, x, v):
+    """Write the rotation of the table of a body that may stand turned in a start at x."""
+    omega, built = np.array(body.angular_velocity), body.offset @ body.axes
+    v[body.spin] = omega
+    if body.turn is not None:
+        now = body.axes @ body.rotation(x).T
+        v[body.turn], v[body.spin] = 0.0, now.T @ (body.inertia @ (now @ omega)) / body.moment
+        v[body.row] += np.cross(omega, built - body.offset @ now)
+
+
 def _start_at(system, positions, displacements, velocities, bodies, bearings):
     """The `Start` of a system from the nodes of a checkpoint and, after them, from the bodies with their names."""
     net, nodes = system.net, len(positions) - len(bodies)
@@ -253,8 +303,9 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
         reference[rows_there], net.points[row_here], rtol=0, atol=1e-15 * np.abs(positions).max(initial=0.0)
     )
     x[row_here] = np.where(same, displacements[rows_there], positions[rows_there] - net.points[row_here])
-    own_velocity = v.copy()
-    v[row_here] = velocities[rows_there]
+    own_velocity, moving = v.copy(), bool(velocities.any())
+    if moving:
+        v[row_here] = velocities[rows_there]
     given_velocity = own_velocity.any(axis=1) & (np.arange(len(v)) < nodes)  # a [[velocity]] of this scene
     v[given_velocity] = own_velocity[given_velocity]
     for body in net.bodies:
@@ -268,6 +319,8 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
         )
         if (len(rows_there) == 2) != (body.turn is not None) or not all(alike):
             _turn(body, bearings[body.name], rows_there, x, v)
+        if not moving:
+            _start_turning(body, x, v)
     for thread in net.threads:
         thread.rewind(x)
     if net.wound:

@@ -136,6 +136,8 @@ class Block(NamedTuple):
 def times_of(schedule, time, first, stop):
     """Times to which an integrator goes for the rows from ``first`` to ``stop`` − 1 from a time on [s]."""
     rows = schedule.times[first:stop]
+    if not len(schedule.between):
+        return rows
     between = schedule.between[(schedule.between > time) & (schedule.between < rows[-1])]
     return np.sort(np.concatenate([rows, between]))
 

@@ -20,7 +20,7 @@ from ..results.strength import strength_remark
 from .accuracy_loop import CLIMBS, AccuracyState, reach_digits, run_within_drift
 from .budget import Budget, check_budget
 from .history import Watch
-from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored
+from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored, unused_velocities
 from .integrators.crossings import APART, BESIDE, THROUGH
 from .integrators.integrator import MAX_STEPS_PER_ROW, IntegratorState
 from .schedule import FEW_CORNERS, Schedule, blocks, time_of
@@ -29,6 +29,10 @@ NO_TWIN = (
     "the run that it starts from had no step-refinement run: ± holds the error that this run adds, not that of "
     "the state it starts from"
 )
+
+
+LOOKS = 8
+"""Number of frames in which edges are sought that are sharp for the elements, the last among them."""
 
 
 class RunResult(NamedTuple):
@@ -97,6 +101,7 @@ class Simulation:
                 self.begin_of_twin = Start(kept["twin_begin_x"], kept["twin_begin_v"])
         elif scene.start_folder is not None:
             self.begin, self.begin_of_twin = stored(system, scene.start_folder)
+            solution.findings += unused_velocities(system, self.begin)
             if self.begin_of_twin is None and self.begin.v is not None and self.begin.v.any():
                 solution.findings.append(Finding("no-error", NO_TWIN, "accuracy"))
         system = self.begin.torn(system)
@@ -112,6 +117,8 @@ class Simulation:
         self._lines, self._through = None, _through_of(system)
         self._tables, self._compared, self._share_rows, self._kept = [], [], [], kept
         self._jumps, self._coincident = None, False
+        frames = self.schedule.frames[::-1]
+        self._looks = set(frames[:: -(-len(frames) // LOOKS)].tolist())
         _check_step(scene)
         self._stand(kept)
         self.integrator = self.integrator_at(self.standing.knob)
@@ -308,6 +315,8 @@ class Simulation:
         self._share_rows = [self._kept["share_rows"]] if "share_rows" in self._kept else []
         if self._silent is not None:
             self._silent.restore(self._kept.get("silent", np.zeros((0, 3))))
+        if "edges" in self._kept:
+            self.overlaps.restore_edges(self._kept["edges"])
         self._resume_controls(course, row, folder.last_row())
         self._kept, self._tables = None, [np.array([folder.last_row()])]
         times, frames = self.schedule.times, self.schedule.frames
@@ -401,6 +410,9 @@ class Simulation:
             if self._coincident:
                 text += f", or expect short steps (at t = {state.time:.6g} s)"
                 self.solution.findings.append(Finding("coincident-nodes", text, "thread"))
+        if self.overlaps is not None and (number in self._looks or course.stopped):
+            for body in self.overlaps.bodies:
+                self.overlaps.note_edge(body, state, state.overlap(body))
         if folder is None:
             self.solution.frames.append((number, state))
             return
@@ -412,6 +424,7 @@ class Simulation:
             kept["controls"] = np.array(self.schedule.commands.save())
         kept |= {"row": number} | self.standing.arrays() | ({} if self._ways is None else self._ways.arrays())
         kept |= {} if self._silent is None else {"silent": self._silent.kept()}
+        kept |= {"edges": self.overlaps.kept_edges()} if self.overlaps is not None and self.overlaps.edges else {}
         kept |= {"share_rows": self.share_rows} if self._share_rows and self._share_rows[0].size else {}
         folder.frame(number, state, run=kept | ({"compared": np.array(self._compared)} if self._compared else {}))
 

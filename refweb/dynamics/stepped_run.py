@@ -6,12 +6,13 @@ has its bits. `SteppedRun` is public; `refweb.dynamics.commands` has what may be
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, SolverError
 from ..messages import nearest, quote
 from ..registry import load
 from ..results.provenance import versions, web_of
@@ -220,7 +221,7 @@ class SteppedRun:
         self._pending += self._inputs.checked(command)
         self.commands.append(command)
 
-    def advance(self, dt: float | None = None) -> float:
+    def advance(self, dt: float | None = None, budget: float | None = None) -> float:
         """Go ahead by a time, to a history row.
 
         Parameters
@@ -228,6 +229,8 @@ class SteppedRun:
         dt : float, optional
             Time [s], a multiple of ``[output] interval``; by default the time to the next row. Where the duration ends
             before, the run goes to its end.
+        budget : float, optional
+            CPU time that it may take [s], looked at some times a second; by default any.
 
         Returns
         -------
@@ -239,7 +242,7 @@ class SteppedRun:
         InputError
             For a time that does not end at a row, and for a run that has ended.
         SolverError
-            As `refweb.run`.
+            As `refweb.run`, and for a time that takes more than the budget: the run has to be ended then.
         """
         times = self._schedule.times
         if self.stopped:
@@ -253,8 +256,28 @@ class SteppedRun:
             past = end > times[-1] * (1.0 - NEAR)
             stop = len(times) if past else row_at(times, end) + 1
         self._apply_pending()
-        self._go_to_row(stop)
+        if budget is None:
+            self._go_to_row(stop)
+        else:
+            self._go_in_time(stop, budget)
         return self.time
+
+    def _go_in_time(self, stop, budget):
+        """Go on to the row before ``stop`` within a CPU time [s]."""
+        integrator, began, since = self._simulation.integrator, time.process_time(), self.time
+
+        def check(t):
+            if time.process_time() - began > budget:
+                raise SolverError(
+                    f"the time from t = {since:.6g} s on takes more than budget = {budget:g} s of CPU time, in which "
+                    f'it came to t = {t:.6g} s; use method = "central-difference", a larger rtol or a softer contact'
+                )
+
+        integrator.on_progress = check
+        try:
+            self._go_to_row(stop)
+        finally:
+            del integrator.on_progress
 
     def _apply_pending(self):
         """Give the run what has been set."""

@@ -16,6 +16,8 @@ from ..tables import Several, Table, choice, nodes, rows, table, text, vector
 from .outer_load import nodal_load
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..net.net import Net
     from ..net.rigid_body import RigidBody
     from .base import ForceTerm
@@ -112,6 +114,12 @@ class Load(Table):
             raise InputError(f"body = {quote(self.body)} turns about an axle: give axle.torque of the body")
         if self.torque is not None and body.shape.planar:
             raise InputError(f"torque = {quote(self.torque)} has no meaning for a ring, which keeps its plane")
+
+    def numbers(self, data: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Numbers of the term of loaded nodes with this force, from those with another one."""
+        changed = data.copy()
+        changed[:, : len(self.force)] = self.force
+        return changed
 
     def on(self, net: Net) -> ForceTerm | list[ForceTerm]:
         """The term of the loaded nodes, whose energy is −(force)·(displacement), or those of a body.

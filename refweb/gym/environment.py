@@ -107,6 +107,7 @@ class SceneEnv(gymnasium.Env):
         self._low, self._high, self._varies = low, high, low < high
         ends = np.cumsum([bounds.shape[1] for bounds in self.gym.bounds.values()])
         self._parts = list(zip(self.gym.bounds, [0, *ends[:-1]], ends, strict=True))
+        self._before = [f"{o.name}{BEFORE}" for o in scene.observables]
         formulas: Any = self.gym.formulas([o.name for o in scene.observables])
         self._reward, self._terminated, self._truncated = formulas
         bounds = np.array(list(self.gym.observations.values()), dtype=float).T
@@ -165,7 +166,7 @@ class SceneEnv(gymnasium.Env):
     def _observation(self):
         """The observations within their bounds, shape (observations,)."""
         values = np.array([self._observed[name] for name in self.gym.observations])
-        return np.clip(values, self.observation_space.low, self.observation_space.high)
+        return np.minimum(np.maximum(values, self.observation_space.low), self.observation_space.high)
 
     def step(self, action: NDArray[np.floating[Any]]) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
         """Set the inputs, and go ahead by a period.
@@ -221,7 +222,7 @@ class SceneEnv(gymnasium.Env):
         if action.shape != self.action_space.shape or not np.isfinite(action).all():
             raise InputError(f"action = {quote(action.tolist())} must be {self.action_space.shape[0]} finite numbers")
         share = np.zeros(len(self._low))
-        share[self._varies] = 0.5 + 0.5 * np.clip(action, -1.0, 1.0)
+        share[self._varies] = 0.5 + 0.5 * np.minimum(np.maximum(action, -1.0), 1.0)
         values = (self._low + share * (self._high - self._low)).tolist()
         return {path: values[first:end] if end - first > 1 else values[first] for path, first, end in self._parts}
 
@@ -229,9 +230,9 @@ class SceneEnv(gymnasium.Env):
         """Set values by path, go ahead by a period, and take the numbers of reward and ends."""
         for path, value in given.items():
             run.set(path, value)
-        run.advance(self.gym.period)
+        run.advance(self.gym.period, self.gym.budget)
         before, self._observed = self._observed, run.observed
-        self._numbers = {f"{name}{BEFORE}": value for name, value in before.items()}
+        self._numbers = dict(zip(self._before, before.values(), strict=True))
         self._numbers |= {**self._values, **given, TIME: run.time, **self._observed}
 
     def _value(self, key, formula):

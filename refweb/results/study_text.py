@@ -83,11 +83,7 @@ def on_spread(entry):
     for name, of_result in entry["results"].items():
         spread = of_result.get("deviation", of_result["largest"] - of_result["least"])
         rounding = 1e-14 * max(abs(of_result["largest"]), abs(of_result["least"]))
-        if (
-            of_result["error"] is not None
-            and of_result["count"] > 1
-            and of_result["error"] > max(0.5 * spread, rounding)
-        ):
+        if of_result["error"] is not None and of_result["count"] > 1 and of_result["error"] > 0.5 * spread > rounding:
             text = readable(of_result["error"], None, of_result["unit"])
             more = "exceeds" if of_result["error"] > spread else "is not small beside"
             spread = readable(spread, None, of_result["unit"])

@@ -17,11 +17,10 @@ import math
 import numpy as np
 
 from ..effects.base import pairs_of
-from ..effects.contact.overlap import CORE, TOLD, Overlaps
+from ..effects.contact.overlap import CORE, Overlaps
 from ..errors import SolverError
 from ..results.state import State
 from ..system.static_system import waiting
-from .sharp_edges import sharpest_edge
 
 PARTS = 8
 """Number of positions that are checked on a path as long as a body is thick."""
@@ -74,8 +73,7 @@ class Passage:
                 at = int(deep.argmax())
                 self.overlaps.record(i, float(deep[at]), state.time, int(net.line[at]))
                 self._look_back(body, deep, state, path)
-                edge = sharpest_edge(state, body, deep, TOLD)
-                self.overlaps.edges |= {} if edge is None else {body.name: edge}
+                self.overlaps.note_edge(body, state, deep)
         if (pairs := self.overlaps.pairs) is not None:
             for i, depth in enumerate(state.pair_overlaps):
                 if not {body.row for body in pairs.deepest[i].bodies} & {*self._waiting}:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-10
 """Residual at which an iteration stops; `LIMIT` is what it may end at when rounding allows no further step."""
 LIMIT = 1e-9
+UNBALANCED = 0.5
+"""Share of a torque that is left where an iteration has ended from which on the web cannot balance it."""
 WITH_A_WAY_AROUND = 25
 """Largest number of factorizations of Newton's method where an interior point can take over."""
 
@@ -142,10 +144,30 @@ def check_supported(system, t):
         check_speed(system, t)
 
 
+def _torque_on(body, t):
+    """Torque about the axle of a body at a load step [N m]."""
+    return float(np.interp(t, *np.transpose(body.axle.torque))) if body.axle and body.axle.torque else 0.0
+
+
+def turned_on(system, t, x):
+    """Text on a body whose torque the web does not balance at x, None without one."""
+    force = system.forces(t, x).force
+    for body in system.resting:
+        torque = _torque_on(body, t)
+        left = float(body.axle.direction @ force[body.spin]) if torque else 0.0
+        if left * torque > UNBALANCED * torque**2:
+            return (
+                f'body "{body.name}" turns on about its axle by its torque of {torque:.4g} N m, of which the web '
+                f"balances {100.0 * max(1.0 - left / torque, 0.0):.2g} % where it has come to: lower the torque, or "
+                "tie the body to more of the web or farther from its axle by [[attach]]"
+            )
+    return None
+
+
 def _check_torques(system, t):
     """Refuse a torque on a body that nothing else turns about its axle."""
     for body in system.resting:
-        torque = np.interp(t, *np.transpose(body.axle.torque)) if body.axle and body.axle.torque else 0.0
+        torque = _torque_on(body, t)
         if torque and not (body.carried or body.pivot is not None or system.contact):
             raise SolverError(
                 f'no equilibrium: body "{body.name}" is turned by its torque of {torque:.4g} N m at step {t:g}, and '
@@ -197,6 +219,8 @@ def with_reason(system, t, error, remedy="", tangents=True):
             return NotFound(f"no equilibrium found at step {t:g}: {reason}", error.stats)
     if system.contact and error.x is not None and (kink := kink_remark(system, error.x, remedy)) is not None:
         return NotFound(f"no equilibrium found at step {t:g}: {kink}", error.stats)
+    if error.x is not None and (turned := turned_on(system, t, error.x)) is not None:
+        return NotFound(f"no equilibrium found at step {t:g}: {turned}", error.stats)
     if error.x is not None and (body := gone(system, error.x)) is not None:
         return NotFound(
             f'no equilibrium found at step {t:g}: body "{body.name}" leaves the web, through a mesh or over its rim, '

@@ -91,9 +91,9 @@ class Gym(Table):
     paths of inputs and draws, such as ``load.0.force[2]``. A comparison within a sum counts as 1 or 0. An episode is
     truncated at the end of the duration, and terminated where an event stops the run.
 
-    A run that fails, since the solver refuses to go on, energy drifts, or the reward is not finite or an end compares
-    what has no value, terminates the episode with the last observation, the reward ``failure_reward`` and the message
-    as ``failure`` of the info.
+    A run that fails, since the solver refuses to go on, takes too long, energy drifts, or the reward is not finite or
+    an end compares what has no value, terminates the episode with the last observation, the reward ``failure_reward``
+    and the message as ``failure`` of the info.
 
     Parameters
     ----------
@@ -114,6 +114,8 @@ class Gym(Table):
         True to raise the error of a run that fails, in place of an end of the episode.
     failure_reward : float
         Reward of a period in which the run fails.
+    budget : float, optional
+        CPU time that a period may take [s]; a run that needs more fails. By default it may take any.
     draw : dict
         Values that are drawn for each episode, by path: as ``parameters`` of a study, ranges, distributions, or lists,
         whose entries are equally likely.
@@ -122,7 +124,8 @@ class Gym(Table):
     ------
     InputError
         For bounds that are not low < high, and a range with a count. From `Scene`, in statics. From `Scene.build`, for
-        names that the scene does not have, what cannot be set, and a period that is no multiple.
+        names that the scene does not have, bounds that cannot be set, such as a tension below 0 of a winch, and a
+        period that is no multiple.
 
     Examples
     --------
@@ -144,6 +147,7 @@ class Gym(Table):
     truncated: str | None = text(default=None)
     raise_failure: bool = boolean(default=False)
     failure_reward: float = real(default=0.0)
+    budget: float | None = real(default=None, above=0, unit="s")
     draw: dict[str, Any] = field(_draws, default_factory=dict)
 
     def check(self) -> None:
@@ -220,13 +224,16 @@ class Gym(Table):
 
     def check_in(self, scene: Scene, system: System) -> None:
         """Refuse what does not fit a scene; `InputError`."""
-        from ..dynamics.commands import Command, Inputs, row_at
+        from ..dynamics.commands import Command, Inputs, not_negative, row_at
         from ..dynamics.schedule import row_times
 
         names, inputs = [o.name for o in scene.observables], Inputs(system)
-        for path, (low, _) in self.bounds.items():
+        for path, bounds in self.bounds.items():
             with refused_at("inputs:"):
-                inputs.checked(Command(0.0, path, low.tolist() if len(low) > 1 else float(low[0])))
+                if not_negative(path) and bounds[0, 0] < 0.0:
+                    raise InputError(f"{short(path)} = {quote(bounds.ravel().tolist())} must be ≥ 0 [N]: a winch pulls")
+                for value in bounds.tolist():
+                    inputs.checked(Command(0.0, path, value if len(value) > 1 else value[0]))
                 inputs.refuse_factor(path)
                 if taken := [control.name for control in scene.control if control.sets == path]:
                     raise InputError(f"{short(path)} is set by [[control]] {quote(taken[0])}: leave out one of them")

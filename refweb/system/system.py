@@ -180,6 +180,12 @@ class System:
         remarks = self.library.remarks if "library" in self.__dict__ else []
         return [Finding("slow-library", text, "solve") for text in remarks]
 
+    @property
+    def internal_of_lines(self) -> str:
+        """Table or key that gives lines internal variables; empty without any."""
+        known = (term for term in self.terms if term.internal and np.array_equal(term.cells, self.net.cells))
+        return next((term.internal.title for term in known), "") if self.net.rows_of_elements else ""
+
     def resistance(self, t: float) -> NDArray[np.float64]:
         """c of each internal variable at time t, in the order of their components, see `InternalVariables`."""
         return self.internal.resistance * np.append(self.natural_length(t), 1.0)[self.internal.elements]
@@ -467,10 +473,16 @@ class System:
         return Forces(f, per_cell)
 
     def force_of(
-        self, term: ForceTerm, t: float, x: NDArray[np.float64], v: NDArray[np.float64] | None = None
+        self,
+        term: ForceTerm,
+        t: float,
+        x: NDArray[np.float64],
+        v: NDArray[np.float64] | None = None,
+        f: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
-        """Force on every row of one term [N]."""
-        f, out = np.zeros((self.rows, 3)), np.zeros((len(term.cells), max(term.columns, 2)))
+        """Force on every row of one term [N], added to ``f`` where that is given."""
+        f = np.zeros((self.rows, 3)) if f is None else f
+        out = np.zeros((len(term.cells), max(term.columns, 2)))
         term.force(t, x, self._zero if v is None else v, f, term.cells, self.data_of(term, t), out)
         return f
 

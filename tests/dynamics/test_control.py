@@ -72,6 +72,30 @@ def test_proportional_and_derivative(method):
     assert np.abs(energy).max() < 1e-4 * np.abs(run.history["total_energy"]).max()
 
 
+@pytest.mark.parametrize("order, fewest", [(2, 8), (4, 2), (6, 1)])
+def test_orders_are_kept_across_periods(order, fewest):
+    """Of a mass on a spring under a force that is held: a circle about F/k in each period."""
+    keys = {} if order == 2 else {"method": "explicit", "order": order}
+    tables = {
+        "web": {**nets.SLACK_LINE["web"], "natural_length": [0.5]},
+        "cable": {**nets.SLACK_LINE["cable"], "law": "linear"},
+        "accuracy": {"error": "none"},
+    }
+    stiffness, mass = 1e6 * 1e-4 / 0.5, 1.0 + 0.5 * 100.0 * 1e-4 * 0.5
+    rate, x, v = np.sqrt(stiffness / mass), 0.0, 0.0
+    cosine, sine = np.cos(0.05 * rate), np.sin(0.05 * rate)
+    for _ in range(20):
+        middle = (40.0 * (0.3 - x) - 6.0 * v) / stiffness
+        x, v = middle + (x - middle) * cosine + v / rate * sine, v * cosine - rate * (x - middle) * sine
+    errors = []
+    for steps in (fewest, 2 * fewest, 4 * fewest):
+        solve = {"kind": "dynamic", "duration": 1.0, "step_size": 0.05 / steps, **keys}
+        history = refweb.run(scene(solve=solve, **tables)).history
+        errors.append(np.hypot(history["x"][-1] - x, (history["vx"][-1] - v) / rate))
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert np.abs(orders - order).max() < 0.3 and errors[0] < 0.01
+
+
 def test_rows_between_periods_change_nothing():
     """Steps of the same size, with rows five times as often."""
     one, other = refweb.run(scene()), refweb.run(scene(interval=0.01))
@@ -129,6 +153,10 @@ def test_sliding_mode_reaches_its_surface_in_the_time_of_its_strength():
     later = run.history["time"] > 0.5
     decay = -np.polyfit(run.history["time"][later], np.log(begin - run.history["x"][later]), 1)[0]
     assert abs(decay - slope) < 0.02 and np.abs(surface[later]).max() < 0.02
+    # U in the approach, then m λ² e, of which the integral is m λ e; the layer of 0.02 is a fifth of s₀.
+    error = begin - 0.5 * rate * reached**2
+    spent = strength * reached + MASS * slope * error * (1.0 - np.exp(-slope * (2.0 - reached)))
+    assert run.controls[0]["spent"] == pytest.approx(spent, rel=0.05)
 
 
 def drum(law, duration, **control):
@@ -165,6 +193,14 @@ def test_attitude_of_a_hub():
     law = {"law": "pid", "parameters": {"proportional": 0.8, "derivative": 0.1}}
     run = drum(law, 4.0, measures=["turn"], rates=["speed"], target=[[0.0, 0.0], [1.0, 1.5], [2.0, 1.5]])
     np.testing.assert_allclose(run.history["turn"][-1], 1.5, atol=1e-4)
+    inertia, turn, speed, before, moments = 0.4 * 2.0 * 0.01, 0.0, 0.0, 0.0, []
+    for n in range(400):
+        target = np.interp(0.01 * n, [0.0, 1.0, 2.0], [0.0, 1.5, 1.5])
+        moments.append(0.8 * (target - turn) + 0.1 * ((target - before) / 0.01 - speed))
+        rate, before = moments[-1] / inertia, target
+        turn, speed = turn + 0.01 * speed + 0.5 * 0.01**2 * rate, speed + 0.01 * rate
+    np.testing.assert_allclose(run.history["turn"][-1], turn, atol=1e-11)
+    np.testing.assert_allclose(run.controls[0]["spent"], 0.01 * np.abs(moments).sum(), rtol=1e-9)
 
 
 def test_station_keeping_leaves_a_dead_band():
@@ -378,6 +414,20 @@ def test_fuel_that_is_none_is_refused(keys, words):
     given["observe"] = [*SPENT[:2], {"name": "fuel", "quantity": "fuel", **keys}]
     with pytest.raises(InputError, match=re.escape(words)):
         refweb.Scene.from_dict(given).build()
+
+
+def test_fuel_of_nodes_that_nothing_flies_is_refused():
+    """A supported node and one on a rail differ; Δv of a node that a body carries would be that of its point mass."""
+    both = [{"node": [0, 1], "force": [0.0, 0.0, 0.0]}]
+    with pytest.raises(InputError, match=r"node 0 is supported .* leave it out of node = \[0, 1\]"):
+        scene(observe=SPENT, load=both).build()
+    rail = [{"nodes": [0], "components": ["y", "z"]}]
+    scene(observe=SPENT, load=both, web={**nets.SLACK_LINE["web"], "supports": []}, support=rail).build()
+    ship = {"name": "ship", "shape": "box", "size": [1, 1, 1], "mass": 8.0, "position": [0.5, 0, 0]}
+    carried = dict(body=[ship], attach=[{"body": "ship", "node": 1}], point_mass=[{"node": 1, "mass": 1.0}])
+    with pytest.raises(InputError, match='"delta_v" has no meaning for node = 1, which a body carries'):
+        scene(observe=SPENT, **carried).build()
+    scene(observe=SPENT[:3], **carried).build()
 
 
 def test_fuel_of_what_is_no_force_is_refused():

@@ -266,6 +266,61 @@ def test_bodies_are_matched_by_name(ended, tmp_path):
     assert not state.v[-1].any()
 
 
+def test_statics_leaves_velocities_to_the_scene(tmp_path):
+    """Of bodies as of nodes; ω of a box that has turned meanwhile is that of its table along x, y and z."""
+    box = dict(name="box", shape="box", size=(0.3, 0.2, 0.1), mass=1.0, position=(0.0, 0.0, 0.1))
+    attached = [refweb.Attach(body="box", node=node) for node in (9, 10, 15)]
+
+    def bodies(**motion):
+        return (refweb.Body(**box, **motion), *attached)
+
+    web = refweb.Window(mesh="square", rows=4, columns=4, side=0.2)
+    push = (GRAVITY, refweb.Load(node=11, force=PULL))
+    refweb.run(scene(effects=(*push, *bodies()), solve=refweb.Static(), web=web), out=tmp_path / "static")
+    motion = dict(velocity=(0.1, 0.2, 3.0), angular_velocity=(1.0, 5.0, -2.0))
+    output = refweb.Output(interval=1e-4, frames=1)
+    given = scene(tmp_path / "static", (*push, *bodies(**motion)), 1e-4, web=web, output=output)
+    solution = refweb.run(given)
+    state, (body,) = solution.frames[0][1], solution.state.system.net.bodies
+    R = body.rotation(state.x)
+    assert np.abs(R - np.eye(3)).max() > 1e-3
+    speed = state.v[body.row] + np.cross(motion["angular_velocity"], R @ (body.offset @ body.axes))
+    np.testing.assert_allclose(speed, motion["velocity"], rtol=1e-13)
+    np.testing.assert_allclose(body.turning(state.x, state.v), motion["angular_velocity"], rtol=1e-13)
+    assert "left-out" not in [finding.code for finding in solution.findings]
+
+
+def test_a_velocity_that_a_folder_replaces_is_told(ended):
+    """Not one that it has as well, and not that of a body that it does not have."""
+    folder, before = ended
+    own = tuple(before.state.v[before.state.system.net.bodies[0].row].tolist())
+    other = ball(name="other", position=(0.0, 0.0, -2.0), velocity=(1.0, 0.0, 0.0))
+    for velocity, texts in ((own, []), ((9.0, 0.0, 0.0), ['velocity of body "ball" has no effect'])):
+        solution = refweb.run(hit(folder, duration=1e-3, bodies=(ball(velocity=velocity), other)))
+        found = [finding.text for finding in solution.findings if finding.code == "left-out"]
+        assert [text[:37] for text in found] == texts
+
+
+def test_lines_that_have_yielded_keep_their_law(tmp_path):
+    """Without their plastic strains lines would be too short, and as strains of arms they would be wrong."""
+    law = dict(law="elastic-plastic", yield_stress=1e5)
+    chain = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0])
+    pull = [refweb.PointMass(node=1, mass=1.0), refweb.Load(node=1, force=(15.0, 0.0, 0.0))]
+
+    def pulled(start="web", **keys):
+        damping = [refweb.Damping(rate=10.0)] if start == "web" else []
+        return scene(start, [*pull, *damping], 0.05, web=chain, cable=cable(**keys))
+
+    refweb.run(pulled(**law), out=tmp_path / "yielded")
+    for keys in ({}, {"viscous": refweb.Viscous(arms=[(1e6, 1.0)])}):
+        with pytest.raises(refweb.InputError, match='internal variables of law = "elastic-plastic", .* same law'):
+            refweb.run(pulled(tmp_path / "yielded", **keys))
+    solution = refweb.run(pulled(tmp_path / "yielded", **law))
+    plastic = solution.frames[0][1].x[-1]
+    assert plastic.any()
+    np.testing.assert_array_equal(plastic, refweb.load(tmp_path / "yielded").state.x[-1])
+
+
 def test_a_velocity_of_the_scene_comes_instead(ended):
     """Of its nodes; the others go on as they did."""
     folder, before = ended

@@ -397,6 +397,35 @@ def test_a_torque_that_nothing_balances_is_refused():
         solved(None, "axle_angle", **tables, solve={"method": "relaxation"})
 
 
+def test_a_torque_above_what_the_web_can_balance_is_told():
+    """A rope from the rim of a wheel: its moment EA (l/L − 1) dl/dφ has a maximum over the angle φ."""
+    wheel = {
+        "name": "wheel", "shape": "cylinder", "radius": 0.1, "length": 0.4, "axis": [0, 0, 1], "mass": 1.0,
+        "position": [1, 0, 0],
+    }  # fmt: skip
+    angle = np.linspace(0.0, np.pi, 2001)
+    rim = np.array([1.0 + 0.1 * np.sin(angle), 0.1 * np.cos(angle)])
+    stretch = np.linalg.norm(rim, axis=0) / np.hypot(1.0, 0.1) - 1.0
+    most = (1e3 * np.maximum(stretch, 0.0) * np.abs(np.gradient(np.linalg.norm(rim, axis=0), angle))).max()
+
+    def run(torque):
+        return refweb.run(
+            refweb.Scene.from_dict(
+                {
+                    "web": {"kind": "inline", "points": [[0, 0, 0], [1, 0.1, 0]], "lines": [[0, 1]], "supports": [0]},
+                    "cable": {"law": "tension-only", "modulus": 1e8, "area": 1e-5, "density": 0.0},
+                    "body": [wheel | {"axle": {"direction": [0, 0, 1], "torque": -torque}}],
+                    "attach": [{"body": "wheel", "node": 1}],
+                    "solve": {"kind": "static"},
+                }
+            )
+        )
+
+    assert run(0.9 * most).tension[0] > 0.0
+    with pytest.raises(refweb.SolverError, match='"wheel" turns on about its axle by its torque .* lower the torque'):
+        run(3.0 * most)
+
+
 def test_modes_hold_a_body_on_an_axle_and_say_so():
     """A heavy rope beside it vibrates as it does alone."""
 

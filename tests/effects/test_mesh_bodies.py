@@ -207,6 +207,8 @@ def test_statics_on_a_mesh(files):
     told = one.bodies["it"]
     assert 0.0 < told["surface_error"] < 1e-3 and "surface_error" not in other.bodies["it"]
     assert np.abs(one.positions - other.positions).max() < 5.0 * told["surface_error"]
+    told_of = [finding.text for finding in one.findings if "no part of ±" in finding.text]
+    assert bool(told_of) == (told["surface_error"] > 0.1 * told["overlap"])
     assert values[0]["push"] == pytest.approx(values[1]["push"], rel=0.02)
 
 
@@ -346,3 +348,14 @@ def test_a_resumed_run_of_a_free_mesh_is_the_same(files, tmp_path):
     assert whole.history["contact_energy"].max() > 0.0
     np.testing.assert_array_equal(resumed.state.x, whole.state.x)
     np.testing.assert_array_equal(resumed.state.v, whole.state.v)
+
+
+@pytest.mark.parametrize("grid, stiffness, so", [(12, 3e4, True), (64, 30.0, False)])
+def test_an_error_of_the_surface_beside_the_overlap_is_told(files, grid, stiffness, so):
+    """With its share, in statics; ± of what is pushed by it is that of residual and rounding."""
+    given = hung(shape="mesh", file=files["box"], grid=grid) | {"contact": {"stiffness": stiffness}}
+    solution = refweb.run(refweb.Scene.from_dict(given))
+    told = solution.bodies["it"]
+    (text,) = [f.text for f in solution.findings if f.code == "surface" and "no part of ±" in f.text] or [""]
+    assert bool(text) == so == (told["surface_error"] > 0.1 * told["overlap"])
+    assert not so or f"within {told['surface_error']:.2g} m" in text and "grid" in text

@@ -222,6 +222,20 @@ def test_a_run_that_fails_ends_its_episode(task, tables, message):
             raising.step(action)
 
 
+@pytest.mark.parametrize("method", ["central-difference", "cvode"])
+def test_a_period_has_a_budget(method):
+    """A run that is too slow ends its episode with a reason, and the next one can begin; one in time is the same."""
+    slow = {"web": {**TAUT, "natural_length": [0.5]}, "solve": {"kind": "dynamic", "duration": 5.0, "method": method}}
+    slow["solve"] |= {"step_size": 1e-9} if method == "central-difference" else {"rtol": 1e-13}
+    env = SceneEnv(scene({"budget": 1e-3, "failure_reward": -7.0}, **slow))
+    for _ in range(2):
+        env.reset()
+        observation, reward, terminated, truncated, info = env.step(np.ones(1))
+        assert (reward, terminated, truncated) == (-7.0, True, False) and np.isfinite(observation).all()
+        assert re.search(r"from t = 0 s on takes more than budget = 0.001 s of CPU time", info["failure"])
+    assert_same(episode(SceneEnv(scene({"budget": 1e3})), seed=1), episode(SceneEnv(scene()), seed=1))
+
+
 def test_an_episode_has_results_with_errors():
     """`finish` repeats it with its commands; a reset forgets them."""
     env = SceneEnv(scene(DRAWN))
@@ -466,6 +480,23 @@ def test_wrong_scenes():
         SceneEnv("square-impact")
     with pytest.raises(InputError, match="render_mode"):
         SceneEnv(scene(), render_mode="human")
+
+
+ROPE = {
+    "thread": [{"name": "rope", "nodes": [0, 1], "modulus": 1e6, "area": 1e-4, "density": 1.0}],
+    "winch": [{"thread": "rope", "end": "first", "tension": 1.0}],
+}
+
+
+def test_bounds_are_what_an_input_may_have():
+    """Both of them: a winch does not push, and a brake has a limit above 0."""
+    task = {"reward": "x", "inputs": {"winch.0.tension": [-5.0, 10.0]}}
+    with pytest.raises(InputError, match=r"inputs: winch.0.tension = \[-5.0, 10.0\] must be ≥ 0 \[N\]: a winch pulls"):
+        scene(task, **ROPE).build()
+    scene({**task, "inputs": {"winch.0.tension": [0.0, 10.0]}}, **ROPE).build()
+    brake = {**ROPE, "winch": [{"thread": "rope", "end": "first", "speed": 0.0, "limit": 1.0}]}
+    with pytest.raises(InputError, match=r"inputs: winch.0.limit = 0.0: limit = 0.0 must be > 0"):
+        scene({**task, "inputs": {"winch.0.limit": [0.0, 10.0]}}, **brake).build()
 
 
 def test_a_scene_without_it_loads_nothing_of_it_and_one_with_it_runs_without_gymnasium():

@@ -13,8 +13,9 @@ place, to the same tables of targets and with the same limit of 120 N. Net, gain
 are compared and no numbers.
 
 Envisat counts as caught if, at the end, its centre is in the convex hull of the net, and the mouth between the
-satellites has at most a tenth of its largest area. The area at first touch is that of the convex hull of the net's
-nodes, seen along the approach, where a line first touches the body.
+satellites has at most a tenth of its largest area. Each run has a step refinement: both statements are true or false
+where their margins, a depth and an area, exceed ±, and else undecided. The area at first touch is that of the convex
+hull of the net's nodes, seen along the approach, where a line first touches the body.
 
 The controls are held against a program of their own: the satellites alone, without net and target, by
 
@@ -53,21 +54,22 @@ MASS, LIMIT, PERIOD, MOTION = 100.0, 120.0, 0.1, np.sqrt(3.986004418e14 / (63781
 """Mass [kg], largest thrust [N], period [s] and mean motion [rad/s] of the satellites."""
 
 
-def scene(law, attitude=ATTITUDES["array across"], spin=STILL, **keys):
-    """The shipped scene under a law, without a step-refinement run."""
+def scene(law, attitude=ATTITUDES["array across"], spin=STILL, error="none", **keys):
+    """The shipped scene under a law; with ``error="twin"`` it has a step-refinement run."""
     given = refweb.Scene.load("four-satellites")
     effects = [
         replace(effect, orientation=attitude, angular_velocity=spin) if isinstance(effect, refweb.Body) else effect
         for effect in given.effects
     ]
     control = [replace(control, law=law, parameters=LAWS[law]) for control in given.control]
-    return given.replace(effects=effects, control=control, accuracy=refweb.Accuracy(error="none"), **keys)
+    return given.replace(effects=effects, control=control, accuracy=refweb.Accuracy(error=error), **keys)
 
 
 def caught(task):
-    """(Caught, Δv of each satellite, covered share, area at first touch [m²]) of a (law, attitude, spin).
+    """Numbers of a (law, attitude, spin), a dict.
 
-    A run without an answer has not caught it, and has no numbers.
+    ``held`` is True, False or None, ``drawn`` what the run itself has; ``depth`` of the centre in the hull [m] and
+    ``spent``, Δv of each satellite [m/s], are pairs of a value and its ±. A run without an answer has not caught it.
     """
     law, attitude, spin = task
     given = scene(law, attitude, spin)
@@ -76,12 +78,30 @@ def caught(task):
     net = first.state.system.net
     area = ConvexHull(first.state.position[: net.nodes, :2]).volume if first.events[0]["time"] else np.nan
     try:
-        run = refweb.run(given, progress=None)
+        run = refweb.run(scene(law, attitude, spin, error="twin"), progress=None)
     except refweb.SolverError:
-        return False, [np.nan] * 4, np.nan, area
-    spent = [run.results[f"delta_v_{name}"].value for name in "abcd"]
-    held = run.throw["inside"]["drawn"] and run.throw["closed"]["drawn"]
-    return bool(held), spent, run.throw["covered"]["value"], area
+        return dict(held=False, drawn=False, depth=(np.nan, np.nan), spent=[(np.nan, np.nan)] * 4, area=area)
+    flags = [run.throw[name] for name in ("inside", "closed")]
+    values = [flag["value"] for flag in flags]
+    return dict(
+        held=False if False in values else None if None in values else True,
+        drawn=all(flag["drawn"] for flag in flags),
+        depth=(flags[0]["margin"], flags[0]["error"]),
+        spent=[run.results[f"delta_v_{name}"][:2] for name in "abcd"],
+        area=area,
+    )
+
+
+def said(entry):
+    """A statement in words."""
+    in_this_run = "yes" if entry["drawn"] else "no"
+    return {True: "yes", False: "no", None: f"undecided; {in_this_run} in this run"}[entry["held"]]
+
+
+def counted(entries):
+    """Number of entries by statement, in words."""
+    held = [entry["held"] for entry in entries]
+    return f"{held.count(True)} yes, {held.count(False)} no, {held.count(None)} undecided"
 
 
 def alone(law, duration):
@@ -144,25 +164,25 @@ def case(quick):
         run = refweb.run(scene("sliding-mode"), progress=None)
         found = list(asked)
     spins = {STILL: "none", ALONG: "along the approach", ACROSS: "across it"}
-    table = [
-        [name, law, spins[spin], "yes" if held else "no", f"{100.0 * covered:.0f} %", f"{area:.0f}",
-         f"{np.mean(spent):.1f}", f"{max(spent):.1f}"]
-        for (law, name, spin), (held, spent, covered, area) in zip(tasks, found, strict=True)
-    ]  # fmt: skip
+    table = []
+    for (law, name, spin), entry in zip(tasks, found, strict=True):
+        (depth, deep), (largest, more) = entry["depth"], max(entry["spent"])
+        mean = np.mean([value for value, _ in entry["spent"]])
+        table.append([name, law, spins[spin], said(entry), f"{depth:.2f} ± {deep:.2f}", f"{entry['area']:.0f}",
+                      f"{mean:.1f}", f"{largest:.1f} ± {max(more, 0.1):.1f}"])  # fmt: skip
     by_law = {law: [entry for task, entry in zip(still, found, strict=False) if task[0] == law] for law in LAWS}
-    held = {law: sum(entry[0] for entry in entries) for law, entries in by_law.items()}
-    areas = {law: np.mean([entry[3] for entry in entries]) for law, entries in by_law.items()}
-    costs = {law: np.nanmean([entry[1] for entry in entries]) for law, entries in by_law.items()}
-    turned = {spin: [e[0] for task, e in zip(tasks, found, strict=True) if task[2] == spin] for spin in (ALONG, ACROSS)}
-    words = {True: "caught", False: "not caught"}
-    count, ratio = len(ATTITUDES), areas["sliding-mode"] / areas["pid"]
+    areas = {law: np.mean([entry["area"] for entry in entries]) for law, entries in by_law.items()}
+    costs = {law: np.nanmean([[v for v, _ in e["spent"]] for e in entries]) for law, entries in by_law.items()}
+    turned = {task[2]: entry for task, entry in zip(tasks, found, strict=True) if task[2] != STILL}
+    missed = [name for (law, name, _), entry in zip(still, found, strict=False) if entry["held"] is False]
+    ratio = areas["sliding-mode"] / areas["pid"]
     verdicts = [
         Verdict(
             "With a sliding mode Envisat is caught in all attitudes at rest.",
             "does not hold",
-            f"it is in {held['sliding-mode']} of {count}, and in {held['pid']} by PID: an array that points to the net "
-            "stops it, and the satellites, which follow tables, do not go around it",
-            0 < held["sliding-mode"] < count,
+            f"caught: {counted(by_law['sliding-mode'])}, and {counted(by_law['pid'])} by PID: an array that points to "
+            "the net stops it, and the satellites, which follow tables, do not go around it",
+            set(missed) == {"array towards the net"},
         ),
         Verdict(
             "The area at first touch is larger with a sliding mode.",
@@ -173,14 +193,14 @@ def case(quick):
         ),
         Verdict(
             "Capture fails where Envisat tumbles about an axis across the approach.",
-            "does not hold",
-            f"by a sliding mode, at 0.05 rad/s from the array across: about an axis along the approach it is "
-            f"{words[turned[ALONG][0]]}, across it {words[turned[ACROSS][0]]}; faster tumbling was not tried",
-            turned[ALONG][0] and turned[ACROSS][0],
+            "cannot be decided" if turned[ACROSS]["held"] is None else "does not hold",
+            f"by a sliding mode, at 0.05 rad/s from the array across: caught about an axis along the approach: "
+            f"{said(turned[ALONG])}, across it: {said(turned[ACROSS])}; faster tumbling was not tried",
+            turned[ACROSS]["drawn"],
         ),
     ]
-    head = ["attitude", "law", "tumbling", "caught", "covered", "area at first touch [m²]", "mean Δv [m/s]"]
-    tables = [Table("Captures", [*head, "largest Δv [m/s]"], table)]
+    head = ["attitude", "law", "tumbling", "caught", "depth in the net [m]", "area at first touch [m²]"]
+    tables = [Table("Captures", [*head, "mean Δv [m/s]", "largest Δv [m/s]"], table)]
 
     def drawn():
         page, (left, right) = plots.axes(["t [s]", "t [s]"], ["Δv [m/s]", "mouth [m²]"], columns=2)

@@ -19,6 +19,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -114,6 +115,7 @@ class CentralDifference(Integrator):
         self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])
         self._events, self._least_energy = event_rows(events), least_energy(net)
         self._taken, self._prepared, self._kept = None, False, ()
+        self._history = History.empty(0, len(probes), system.terms)
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
@@ -234,7 +236,7 @@ class CentralDifference(Integrator):
         """Factor on the safety for errors that are ``share`` times what they may be."""
         return min(max(0.8 * share ** (-1.0 / self.order), 0.125), 0.5)
 
-    @property
+    @cached_property
     def _scheme(self):
         least_steps, step = 1.0 if self.step_size else 0.5 / self.safety, self.step_size or 0.0
         numbers = (self.safety * self.stretch, least_steps, step, self.finer)
@@ -251,10 +253,8 @@ class CentralDifference(Integrator):
             self._kept = written, running, Workspace.of(self.model, running)
         _, running, workspace = self._kept
         clock = running.clock
-        clock[...] = np.zeros(1, dtype=CLOCK)
-        for name in SHARED:
-            clock[name] = getattr(course, name)
-        clock["least_energy"] = self._least_energy
+        known = *(getattr(course, name) for name in SHARED), self._least_energy
+        clock[0] = *known, *(0,) * (len(clock.dtype) - len(known))
         running.length_force[...] = 0.0
         return running, workspace
 
@@ -265,7 +265,7 @@ class CentralDifference(Integrator):
         names node, line and time.
         """
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        history = History.empty(len(times), len(self.observed[0]), self.system.terms)
+        history = self._history.like(len(times))
         work = len(self.drifts) * sum(len(term.cells) for term in self.system.terms)
         done, breath = 0, max(BREATH // max(work, 1), 1)
         running, workspace = self._records(course)
@@ -301,8 +301,8 @@ class CentralDifference(Integrator):
             followed = len(nearby.terms) and len(self.drifts) == 1 and not self.system.carried.any()
             course.longest = max(course.longest, float(nearby.skin[0]["longest"]) if followed else math.inf)
             nearby.skin["longest"] = 0.0
-            for name in SHARED:
-                setattr(course, name, clock[name].item())
+            for name, value in zip(SHARED, clock[0].item(), strict=False):
+                setattr(course, name, value)
         if done and course.stopped and history.time[done - 1] == course.time:
             return history[:done]
         if done < len(times):

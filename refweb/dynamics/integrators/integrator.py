@@ -180,6 +180,10 @@ class History:
         names += components(VECTORS)
         return cls(tuple(names), np.zeros((rows, len(names))), probed)
 
+    def like(self, rows: int) -> History:
+        """Rows of zeros with the same columns."""
+        return History(self.names, np.zeros((rows, len(self.names))), self.probed)
+
     def __len__(self) -> int:
         return len(self.values)
 

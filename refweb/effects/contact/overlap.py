@@ -27,7 +27,7 @@ one for all lines at a node in place of their ends, with (1 − 2 ξ)²     0.00
 =====================================================================  ==================================
 
 A line that turns by an angle θ round an edge with r θ < 2 L is pushed along by θ/4 (1 − r θ/(2 L))² of the push on
-average, whatever the stiffness, see `refweb.statics.sharp_edges`, which statics asks.
+average, whatever the stiffness, see `refweb.effects.contact.sharp_edges`.
 
 Keys of `plain` stand in ``run.json``, `runner` reads the stiffness of `too_soft`, and `line_body_ccd` uses `CORE`.
 """
@@ -49,6 +49,8 @@ SHARE = 0.1
 """Allowed overlap, over the size of the body."""
 CORE = 0.5
 """Overlap at which a line is in the core, over the distance from the middle of the body to its surface."""
+ROUGH = 0.1
+"""Error of a surface over an overlap above which a finding reports it; below, soft contact moves results more."""
 AIM = 0.2
 """Overlap for which a stiffness is chosen, over the allowed overlap: this is 2 % of the size of the body.
 
@@ -302,8 +304,8 @@ class Overlaps:
 
     Attributes
     ----------
-    edges : dict of str to refweb.statics.sharp_edges.Edge
-        Edges of bodies by name that are sharp for the elements, in the last equilibrium.
+    edges : dict of str to refweb.effects.contact.sharp_edges.Edge
+        Edges of bodies by name that are sharp for the elements: in the last equilibrium, or in any frame.
     """
 
     def __init__(self, scene, system, moving, pairs=None):
@@ -340,6 +342,29 @@ class Overlaps:
         """Note the deepest overlap [m] of body ``i``, its time [s] and its line, if it is deeper than before."""
         if overlap > self.deepest[i].overlap:
             self.deepest[i] = self._deepest(i, overlap, time, line)
+
+    def note_edge(self, body, state, overlap):
+        """Note the edge of a body that is sharp for the elements in a state, where its share is the largest so far."""
+        if body.shape.once or not overlap.any():
+            return
+        from .sharp_edges import sharpest_edge
+
+        known = self.edges.get(body.name)
+        edge = sharpest_edge(state, body, overlap, known.share if known else TOLD)
+        if edge is not None:
+            self.edges[body.name] = edge
+
+    def kept_edges(self):
+        """Edges for a checkpoint, an array of shape (edges, 5): number of the body and the numbers of its `Edge`."""
+        numbers = {body.name: i for i, body in enumerate(self.bodies)}
+        return np.array([[numbers[name], *edge] for name, edge in self.edges.items()]).reshape(-1, 5)
+
+    def restore_edges(self, rows):
+        """Take the edges of a checkpoint."""
+        from .sharp_edges import Edge
+
+        for number, line, *edge in rows.tolist():
+            self.edges[self.bodies[int(number)].name] = Edge(int(line), *edge)
 
     def refuse(self):
         """Refuse what may not be, see `Deepest.refuse`."""
@@ -379,12 +404,26 @@ class Overlaps:
             if deepest.overlap > 0.0 or deepest.body.name not in elsewhere:
                 yield from deepest.remarks(what)
             yield from self._pushed_along(deepest)
+            yield from _off_surface(deepest)
         if self.pairs is not None:
             yield from self.pairs.remarks()
 
 
+def _off_surface(deepest):
+    """Finding on a surface that is not known to a small share of the overlap, which ± does not contain."""
+    error, overlap = deepest.body.shape.error or 0.0, deepest.overlap
+    if error > ROUGH * overlap > 0.0:
+        yield Finding(
+            "surface",
+            f'the surface of body "{deepest.body.name}" is that of its file within {error:.2g} m, '
+            f"{100.0 * error / overlap:.2g} % of its deepest overlap with lines: results may be off as if it were "
+            "shifted by that, which is no part of ±; a larger grid makes it less",
+            "body",
+        )
+
+
 def _at_an_edge(body, edge):
-    """Finding on a push along a line at a sharp edge, see `refweb.statics.sharp_edges`."""
+    """Finding on a push along a line at a sharp edge, see `refweb.effects.contact.sharp_edges`."""
     enough = edge.enough(TOLD)
     key = next((key for key in ("rounding", "radius") if hasattr(body.shape, key)), None)
     needed = rounded_up(enough * edge.length)

@@ -63,6 +63,11 @@ class DeltaV(Fuel):
         if load.node is None:
             return 1.0 / float(net.mass[next(body.row for body in net.bodies if body.name == load.body)])
         nodes = _nodes(load, system)
+        if system.carried[nodes].any():
+            raise InputError(
+                f'quantity = "delta_v" has no meaning for node = {quote(load.node)}, which a body carries: load the '
+                'body, or use "fuel"'
+            )
         mass = 0.0 if net.point_mass is None else float(net.point_mass[nodes].sum())
         if not mass > 0.0:
             raise InputError(
@@ -72,7 +77,15 @@ class DeltaV(Fuel):
 
 
 def _nodes(load, system):
-    return system.net.web.find(load.node)
+    """Nodes of a load; `InputError` for one that cannot move, which no fuel flies."""
+    nodes = system.net.web.find(load.node)
+    still = nodes[system.fixed[nodes].all(axis=1)]
+    if len(still):
+        raise InputError(
+            f"node {still[0]} is supported or moved by a table, so that no thrust flies it: leave it out of node = "
+            f"{quote(load.node)} of the load"
+        )
+    return nodes
 
 
 @kernel(PROBE)

@@ -24,10 +24,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..net.rotation import matrix_at
+from ...net.rotation import matrix_at
 
 PRESSED = 0.1
-"""Least overlap of an element whose push counts, over the largest."""
+"""Least overlap and tension of an element whose push counts, over the largest."""
 GOLDEN = 0.5 * (3.0 - 5.0**0.5)
 
 
@@ -64,10 +64,13 @@ class Edge(NamedTuple):
 def sharpest_edge(state, body, overlap, limit):
     """The `Edge` of the largest share of a body, None if no share is above the ``limit``.
 
+    Only elements count whose overlap and tension are not far below the largest: a slack line that lies about an edge is
+    not pushed along.
+
     Parameters
     ----------
     state : refweb.results.state.State
-        The equilibrium.
+        The state.
     body : refweb.net.rigid_body.RigidBody
         The body.
     overlap : ndarray, shape (cells,)
@@ -76,9 +79,10 @@ def sharpest_edge(state, body, overlap, limit):
         Share up to which it tells nothing.
     """
     net, position = state.system.net, state.position
-    if body.shape.once or net.cells.shape[1] > 2 or not overlap.any():
+    if net.cells.shape[1] > 2:
         return None
-    touched = np.flatnonzero(overlap > PRESSED * overlap.max())
+    tension = np.where(overlap > PRESSED * overlap.max(), state.element_tension, 0.0)
+    touched = np.flatnonzero(tension > PRESSED * tension.max())
     vectors = position[net.cells[:, 1]] - position[net.cells[:, 0]]
     length = np.linalg.norm(vectors, axis=1)
     ahead = vectors / length[:, None]
