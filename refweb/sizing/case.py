@@ -67,11 +67,12 @@ class Task(NamedTuple):
         sizes = sizes_of(scene.build()) if of_web else {}
         results |= {n: {"value": sizes[n], "error": 0.0, "unit": SIZES[n]} for n in of_web}
         results |= {n: _of_strength(n, summary) for n in self.names if n in STRENGTH}
-        if frequencies := [n for n in self.names if FREQUENCY.fullmatch(n)]:
-            results |= _frequencies(scene, frequencies)
-        return {**summary, "results": results, "more": self._slopes(scene, solution, summary)}
+        frequencies = [n for n in self.names if FREQUENCY.fullmatch(n)]
+        vibrations = _modes(scene, frequencies) if frequencies else None
+        results |= {n: _of_frequency(n, vibrations) for n in frequencies}
+        return {**summary, "results": results, "more": self._slopes(scene, solution, summary, vibrations)}
 
-    def _slopes(self, scene, solution, summary):
+    def _slopes(self, scene, solution, summary, vibrations):
         """Derivatives by column; one that no adjoint gives is left out."""
         if not self.numbers:
             return {}
@@ -94,8 +95,8 @@ class Task(NamedTuple):
             try:
                 if slope_of(name, path) in slopes:
                     continue
-                if name in observed:
-                    gradient = gradients.gradient(name, path)
+                if name in observed or FREQUENCY.fullmatch(name):
+                    gradient = (gradients if name in observed else vibrations).gradient(name, path)
                     if gradient.left is None:  # at a kink those by several paths have no sum
                         slopes[slope_of(name, path)] = float(gradient)
                 elif name in STRENGTH:
@@ -181,18 +182,25 @@ def _of_strength(name, summary):
     return {"value": margin["value"], "error": wide, "unit": "1", "interval": (lower, upper)}
 
 
-def _frequencies(scene, names):
-    """Entries of natural frequencies."""
+def _number(name):
+    """Number of the mode of a natural frequency."""
+    return int(FREQUENCY.fullmatch(name)[1])
+
+
+def _modes(scene, names):
+    """Modes of a scene up to one behind some natural frequencies, which tells if that is equal to the last."""
     from ..studies.modes import modes
 
-    numbers = [int(FREQUENCY.fullmatch(name)[1]) for name in names]
-    computed, entries = modes(scene, max(numbers), progress=False), {}
-    for name, number in zip(names, numbers, strict=True):
-        if number > len(computed.frequency):
-            raise InputError(f"{name}: the web has {len(computed.frequency)} modes")
-        value, error = float(computed.frequency[number - 1]), float(computed.error[number - 1])
-        entries[name] = {"value": value, "error": error, "unit": "Hz"}
-    return entries
+    return modes(scene, max(map(_number, names)) + 1, progress=False)
+
+
+def _of_frequency(name, vibrations):
+    """Entry of a natural frequency."""
+    number = _number(name)
+    if number > len(vibrations.frequency):
+        raise InputError(f"{name}: the web has {len(vibrations.frequency)} modes")
+    value, error = float(vibrations.frequency[number - 1]), float(vibrations.error[number - 1])
+    return {"value": value, "error": error, "unit": "Hz"}
 
 
 def _by_difference(scene, path, number):

@@ -7,7 +7,8 @@ bounds has multipliers λ ≥ 0 with
 
 (Karush, Kuhn and Tucker), where bounds have multipliers as well. `refweb.sizing.sqp` finds it.
 
-Derivatives are those of the adjoint. One that no adjoint gives, as that of a frequency, is a difference of runs.
+Derivatives are those of the adjoint. One that no adjoint gives, as that of a frequency that others are equal to and
+leave, is a difference of runs.
 
 A largest value has a kink where two lines share it. A condition that this value is below a limit is one for each line
 that is close to it, and each of these is smooth.
