@@ -9,6 +9,7 @@ equilibrium, by systems that are built with other values of the number: no equil
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -399,9 +400,25 @@ class Gradients:
 
     # By one number of the scene
 
+    def together(self, results, path):
+        """The `Gradient` of several results by one number, by the same systems, a dict; without those refused."""
+        solved = {}
+        for result in results:
+            with contextlib.suppress(InputError):
+                solved[result] = self.of(result)
+        if self._is_of_all_lines(path):
+            return {result: self.gradient(result, path) for result in solved}
+        pairs = iter(self._of_number([item for items in solved.values() for item in items], path) if solved else ())
+        values = {result: [next(pairs) for _ in items] for result, items in solved.items()}
+        return {result: self._assembled(result, path, "", ("",), values[result], "") for result in solved}
+
     def _by_number(self, result, path):
         """Pairs of derivative and ± by one number of the scene, one of each response, each of shape (1,)."""
-        solved, given = self.of(result), self._given
+        return self._of_number(self.of(result), path)
+
+    def _of_number(self, solved, path):
+        """Solve as `_by_number`, by the multipliers of responses of some results."""
+        given = self._given
         number = _number_at(given, path)
         if number is None:
             raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(given))}")

@@ -120,7 +120,7 @@ class Equal:
         weight = 4.0 * np.pi * np.sqrt(abs(squared)) * (shapes.conj() * (forms.M @ shapes)).sum(axis=0).real.min()
         if sizes[0] * sizes[-1] <= 0.0 or np.abs(sizes).min() < OPPOSED * weight:
             raise InputError("Coriolis forces let two frequencies meet there, which has no derivative")
-        self.sign, self.shapes = float(np.sign(sizes[0])), shapes @ mixed / np.sqrt(np.abs(sizes))
+        self.sign, self.shapes = float(np.sign(sizes[0])), shapes @ (mixed / np.sqrt(np.abs(sizes))) @ mixed.conj().T
         kind = complex if linear.system.rotating else float
         self._matrix, self._normal = forms.matrix(squared).astype(kind), forms.normal(squared) @ self.shapes
         count = self.shapes.shape[1]
@@ -334,9 +334,7 @@ def _explicit(mode, parts, linear):
             for node, body in system.carriers.turns.carried.tolist():
                 row, spin, _ = system.carriers.turns.rows[body]
                 arms[node] = np.cross(rows[spin], rows[node] - rows[row])  # by which it moves to second order
-            axial, length = linear.lines.work(arms)
-            total.axial[:] -= axial
-            total.length[:] -= length
+            total.axial[:] -= linear.lines.work(arms)[0]
     if len(parts) == 2 and system.rotating:
         speed, omega = np.array(system.rotating[0].frame.angular_velocity), np.sqrt(mode.squared)
         turned = np.cross(speed, parts[0])
