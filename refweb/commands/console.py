@@ -407,6 +407,10 @@ def print_gradients(solution, result, gradients, refused, limit):
         if (more := gradient.value.size - limit) > 0:
             rows.append(("", f"{more} more with smaller ones: --json prints all"))
     rows += [("left out", text) for text in refused]
+    equal = next((gradient.equal for gradient in gradients if gradient.equal), ())
+    if equal:
+        text = "they keep their order, so that one derivative holds where a number rises, and another where it falls"
+        rows.append(("note", f"{', '.join(equal)} are equal within ±: {text}"))
     _box(
         f"{solution.scene.title}: gradient of {result} = {readable(computed.value, computed.error, computed.unit)}",
         rows,

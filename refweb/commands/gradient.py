@@ -1,4 +1,4 @@
-"""Compute how results of statics change with the numbers of a scene: their gradients, by line as a picture."""
+"""Compute how results of statics and frequencies change with numbers of a scene: gradients, by line as a picture."""
 
 from ..errors import InputError
 from .arguments import add_json, add_scene, add_values, print_json, scene_of
@@ -11,7 +11,9 @@ def add_arguments(parser):
     """The scene, the result, and by what it is differentiated."""
     add_scene(parser)
     add_values(parser)
-    parser.add_argument("--of", metavar="RESULT", help="name of a result (default: the first of the scene)")
+    parser.add_argument(
+        "--of", metavar="RESULT", help="name of a result, or frequency_1 and so on (default: the first of the scene)"
+    )
     text = "a number of the scene, as cable.area or load.0.force.2, or force or position, of each node; repeatable "
     text += "(default: all, by line cable.area)"
     parser.add_argument("--path", dest="paths", action="append", metavar="PATH", help=text)
@@ -25,27 +27,31 @@ def add_arguments(parser):
 def run(arguments):
     """Solve the scene, and print or draw the gradients."""
     from ..results.progress import followed
-    from ..runner import run
     from ..statics.gradients import numbers_of
 
     scene = scene_of(arguments)
-    if scene.solve.kind != "static":
-        raise InputError(f'[solve] kind = "{scene.solve.kind}" must be "static": gradients are those of equilibria')
     names = [o.name for o in scene.observables]
     result = names[0] if arguments.of is None else arguments.of
+    number = _mode(result, names)
+    if scene.solve.kind != "static" and number is None:
+        raise InputError(
+            f'[solve] kind = "{scene.solve.kind}" must be "static": gradients are those of equilibria, or of '
+            "frequency_1 and so on"
+        )
     paths = arguments.paths or (["cable.area"] if arguments.by else numbers_of(scene.to_dict()))
     if arguments.picture:
         from ..pictures.pictures import target
 
         target(arguments.picture)
     with followed(not arguments.json) as tell:
-        solution = run(scene, progress=tell)
+        solution = _solved(scene, number, tell)
     gradients, refused = [], []
     for path in paths:
         try:
             gradients.append(solution.gradient(result, path, arguments.by))
         except InputError as error:
-            if arguments.paths or arguments.by or result not in names or str(error).startswith("gradient"):
+            known = result in names or number is not None
+            if arguments.paths or arguments.by or not known or str(error).startswith("gradient"):
                 raise
             if not str(error).startswith(f"{path} = 0 cannot be changed"):  # as what has no meaning in statics
                 refused.append(f"{path}: {error}")
@@ -59,6 +65,27 @@ def run(arguments):
     print_gradients(solution, result, gradients, refused, SHOWN)
     if arguments.picture:
         print(arguments.picture)
+
+
+def _mode(result, names):
+    """Number of the mode whose natural frequency a result is; None of another one."""
+    from ..studies.frequency_gradients import NAME
+
+    match = None if result in names else NAME.fullmatch(result)
+    return None if match is None else int(match[1])
+
+
+def _solved(scene, number, tell):
+    """The modes of a scene up to one behind a number, or its equilibrium where there is none."""
+    if number is None:
+        from ..runner import run
+
+        return run(scene, progress=tell)
+    from ..studies.modes import MAX_MODES, modes
+
+    if number >= MAX_MODES:
+        raise InputError(f"frequency_{number} must be at most frequency_{MAX_MODES - 1}")
+    return modes(scene, number + 1, progress=tell)
 
 
 def _draw(solution, result, path, out):
@@ -93,4 +120,5 @@ def _plain(gradient):
         "error": gradient.error.tolist(),
         "left": left,
         "unit": gradient.unit,
+        "equal": list(gradient.equal),
     }

@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import re
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,10 +23,8 @@ FREQUENCY = re.compile(r"frequency_([1-9]|10)")
 """Names of natural frequencies."""
 QUANTITIES = (*SIZES, *STRENGTH, *(f"frequency_{n}" for n in range(1, 11)))
 """Names that every scene has besides its results."""
-GOVERNING = "stress of the smallest margin"
-"""Name of the stress that margin and utilisation follow from."""
 NEAR, MOST = 0.3, 16
-"""Distance to the largest value, over it, within which lines have derivatives of their own, and their number."""
+"""Distance to the largest value, over it, within which lines and nodes have derivatives of their own; their number."""
 STEP = 1e-3
 """Step of a difference of a size over its number: sizes are polynomials of low degree, or close to them."""
 
@@ -35,9 +34,17 @@ def slope_of(name, path):
     return f"{name} by {path}"
 
 
-def of_line(name, line):
-    """Column of the value of a line, for a result that is the largest of lines."""
-    return f"{name} of line {line}"
+def part_of(name, kind, number):
+    """Column of the value of a line or node, for a result that is the largest or smallest of these."""
+    return f"{name} of {kind} {number}"
+
+
+class Part(NamedTuple):
+    """Value of a line or node of a result, its derivative by what is observed of it, and its `Observe`."""
+
+    value: float
+    factor: float
+    observe: Any
 
 
 class Task(NamedTuple):
@@ -67,83 +74,123 @@ class Task(NamedTuple):
         sizes = sizes_of(scene.build()) if of_web else {}
         results |= {n: {"value": sizes[n], "error": 0.0, "unit": SIZES[n]} for n in of_web}
         results |= {n: _of_strength(n, summary) for n in self.names if n in STRENGTH}
-        if frequencies := [n for n in self.names if FREQUENCY.fullmatch(n)]:
-            results |= _frequencies(scene, frequencies)
-        return {**summary, "results": results, "more": self._slopes(scene, solution, summary)}
+        frequencies = [n for n in self.names if FREQUENCY.fullmatch(n)]
+        vibrations = _modes(scene, frequencies) if frequencies else None
+        results |= {n: _of_frequency(n, vibrations) for n in frequencies}
+        return {**summary, "results": results, "more": self._slopes(scene, solution, vibrations)}
 
-    def _slopes(self, scene, solution, summary):
+    def _slopes(self, scene, solution, vibrations):
         """Derivatives by column; one that no adjoint gives is left out."""
         if not self.numbers:
             return {}
         from ..statics.gradients import Gradients
 
-        slopes, near = {}, _near_lines(scene, solution, self.results)
-        sizes, strength = ([n for n in self.results if n in known] for known in (SIZES, STRENGTH))
+        slopes, paths = {}, [path for path, _ in self.numbers]
+        sizes, near = [n for n in self.results if n in SIZES], _near(scene, solution, self.results, paths)
         for path, number in self.numbers if sizes else ():
             by_difference = _by_difference(scene, path, number)
             slopes |= {slope_of(n, path): by_difference[n] for n in sizes}
-        more = [observe for lines in near.values() for _, observe in lines]
-        more += [_governing(summary)] if strength else []
+        parts = [part.observe for of_name in near.values() for part in of_name]
+        names = [part.name for part in parts] + [o.name for o in scene.observables if o.name in self.results]
         try:
-            gradients = Gradients(replace(solution, scene=scene.replace(observe=(*scene.observables, *more))))
+            gradients = Gradients(replace(solution, scene=scene.replace(observe=(*scene.observables, *parts))))
         except InputError:
-            return slopes
-        slopes |= _of_lines(gradients, near, [path for path, _ in self.numbers])
-        observed = [o.name for o in scene.observables]
-        for name, (path, _) in itertools.product(self.results, self.numbers):
-            try:
-                if slope_of(name, path) in slopes:
-                    continue
-                if name in observed:
-                    gradient = gradients.gradient(name, path)
-                    if gradient.left is None:  # at a kink those by several paths have no sum
-                        slopes[slope_of(name, path)] = float(gradient)
-                elif name in STRENGTH:
-                    slopes[slope_of(name, path)] = _slope_of_strength(gradients, summary, name, path)
-            except (InputError, SolverError):
-                continue
-        return slopes
+            names = []
+        known = {}
+        for path in paths if names else ():
+            with contextlib.suppress(InputError, SolverError):
+                known |= {(name, path): gradient for name, gradient in gradients.together(names, path).items()}
+        for name, path in itertools.product(self.results, paths):
+            if FREQUENCY.fullmatch(name) and name not in names:
+                with contextlib.suppress(InputError, SolverError):
+                    known[name, path] = vibrations.gradient(name, path)
+        for (name, path), gradient in known.items():
+            if gradient.left is None:  # at a kink those by several paths have no sum
+                slopes[slope_of(name, path)] = float(gradient)
+        return slopes | _of_parts(slopes, near, paths)
 
 
-def _near_lines(scene, solution, names):
-    """(Value, `Observe`) of lines close to the largest, by the name of a result that is the largest value of lines."""
+def _near(scene, solution, names, paths):
+    """The `Part` of each line or node that is close to the largest, by the name of a result that is the largest."""
     from ..results.observables.line import Strain, Stress, Tension
-    from ..results.observables.observe import Observe
+    from ..results.observables.nodal import Place
+    from ..statics.gradients import LIMITS
 
-    near, net = {}, solution.state.system.net
+    near, net, state = {}, solution.state.system.net, solution.state
     for observe in scene.observables:
+        observable = observe.observable
         if observe.name not in names or observe.select not in (None, "max") or observe.part is not None:
             continue
-        if type(observe.observable) in (Strain, Stress, Tension):
-            elements = observe.observable.elements(net)
-            values = observe.observable.values(solution.state)[elements]
-            largest = np.full(len(net.web.lines), -np.inf)
-            np.maximum.at(largest, net.line[elements], values)
-            order = np.argsort(-largest, kind="stable")[:MOST]
-            lines = order[largest[order] >= largest.max() - NEAR * abs(largest.max())]
-            near[observe.name] = [
-                (float(largest[n]), Observe(name=of_line(observe.name, n), quantity=observe.quantity, line=int(n)))
-                for n in lines
-            ]
-    return near
+        if type(observable) in (Strain, Stress, Tension):
+            elements = observable.elements(net)
+            numbers, values = _by_line(net, elements, observable.values(state)[elements])
+            near[observe.name] = _parts_of(observe.name, "line", observe, numbers, values)
+        elif isinstance(observable, Place) and observe.body is None:
+            rows = observable.rows(state.system)
+            parts = _parts_of(observe.name, "node", observe, rows, observable.sizes(observable.vectors(state)[rows]))
+            if len(parts) > 1 and all(part.observe.node < len(net.web.points) for part in parts):
+                near[observe.name] = parts
+    if any(path.rpartition(".")[2] in LIMITS for path in paths):  # on which strength depends beside stress
+        return near
+    return near | {name: parts for name in names if name in STRENGTH and (parts := _of_lines(name, solution))}
 
 
-def _of_lines(gradients, near, paths):
-    """Values and derivatives of the lines close to the largest one, whose derivatives are those of the result."""
+def _by_line(net, elements, values):
+    """(Lines of some elements, largest value of each)."""
+    largest = np.full(len(net.web.lines), -np.inf)
+    np.maximum.at(largest, net.line[elements], values)
+    numbers = np.flatnonzero(np.isfinite(largest))
+    return numbers, largest[numbers]
+
+
+def _parts_of(name, kind, observe, numbers, values, factors=None):
+    """The `Part` of the largest values of lines or nodes, observed as they are but each alone."""
+    from ..results.observables.observe import Observe
+
+    order = np.argsort(-values, kind="stable")[:MOST]
+    order = order[values[order] >= values.max() - NEAR * abs(values.max())]
+    kept = {"quantity": observe.quantity, "component": observe.component}
+    return [
+        Part(
+            float(values[n]),
+            1.0 if factors is None else float(factors[n]),
+            Observe(name=part_of(name, kind, numbers[n]), **kept, **{kind: int(numbers[n])}),
+        )
+        for n in order
+    ]
+
+
+def _of_lines(name, solution):
+    """The `Part` of lines close to the smallest margin or the largest utilisation, if that is of the last load step."""
+    from ..results.observables.observe import Observe
+
+    net, margin = solution.state.system.net, solution.margin
+    if margin is None or margin["value"] is None or margin["time"] != solution.state.time:
+        return []
+    limits = net.allowed if name == "margin" else net.strength
+    elements = np.flatnonzero(np.isfinite(limits))
+    numbers, values = _by_line(net, elements, solution.state.stress[net.line[elements]] / limits[elements])
+    stress = Observe(name=name, quantity="stress")
+    factors = values / np.maximum(solution.state.stress[numbers], np.finfo(float).tiny)
+    parts = _parts_of(name, "line", stress, numbers, values, factors)
+    if name == "utilisation":
+        return parts
+    return [part._replace(value=1.0 / part.value - 1.0, factor=-part.factor / part.value**2) for part in parts]
+
+
+def _of_parts(slopes, near, paths):
+    """Values and derivatives of lines and nodes close to the largest one, whose derivatives are those of the result."""
     cells = {}
-    for name, lines in near.items():
-        try:
-            of_name = {}
-            for value, observe in lines:
-                slopes = {path: gradients.gradient(observe.name, path) for path in paths}
-                if all(slope.left is None for slope in slopes.values()):
-                    of_name[observe.name] = value
-                    of_name |= {slope_of(observe.name, path): float(slope) for path, slope in slopes.items()}
-            first = lines[0][1].name
-            if first in of_name:
-                cells |= of_name | {slope_of(name, path): of_name[slope_of(first, path)] for path in paths}
-        except (InputError, SolverError):
-            continue
+    for name, parts in near.items():
+        of_name = {}
+        for value, factor, observe in parts:
+            known = {path: slopes.get(slope_of(observe.name, path)) for path in paths}
+            if None not in known.values():
+                of_name[observe.name] = value
+                of_name |= {slope_of(observe.name, path): factor * slope for path, slope in known.items()}
+        first = parts[0].observe.name
+        if first in of_name:
+            cells |= of_name | {slope_of(name, path): of_name[slope_of(first, path)] for path in paths}
     return cells
 
 
@@ -181,18 +228,25 @@ def _of_strength(name, summary):
     return {"value": margin["value"], "error": wide, "unit": "1", "interval": (lower, upper)}
 
 
-def _frequencies(scene, names):
-    """Entries of natural frequencies."""
+def _number(name):
+    """Number of the mode of a natural frequency."""
+    return int(FREQUENCY.fullmatch(name)[1])
+
+
+def _modes(scene, names):
+    """Modes of a scene up to one behind some natural frequencies, which tells if that is equal to the last."""
     from ..studies.modes import modes
 
-    numbers = [int(FREQUENCY.fullmatch(name)[1]) for name in names]
-    computed, entries = modes(scene, max(numbers), progress=False), {}
-    for name, number in zip(names, numbers, strict=True):
-        if number > len(computed.frequency):
-            raise InputError(f"{name}: the web has {len(computed.frequency)} modes")
-        value, error = float(computed.frequency[number - 1]), float(computed.error[number - 1])
-        entries[name] = {"value": value, "error": error, "unit": "Hz"}
-    return entries
+    return modes(scene, max(map(_number, names)) + 1, progress=False)
+
+
+def _of_frequency(name, vibrations):
+    """Entry of a natural frequency."""
+    number = _number(name)
+    if number > len(vibrations.frequency):
+        raise InputError(f"{name}: the web has {len(vibrations.frequency)} modes")
+    value, error = float(vibrations.frequency[number - 1]), float(vibrations.error[number - 1])
+    return {"value": value, "error": error, "unit": "Hz"}
 
 
 def _by_difference(scene, path, number):
@@ -208,22 +262,3 @@ def _by_difference(scene, path, number):
         name: (8.0 * (by_step[1][name] - by_step[-1][name]) - (by_step[2][name] - by_step[-2][name])) / (12.0 * step)
         for name in SIZES
     }
-
-
-def _governing(summary):
-    """Observable of the stress that the margin of safety and the utilisation of a static solution follow from."""
-    from ..results.observables.observe import Observe
-
-    return Observe(name=GOVERNING, quantity="stress", line=summary["margin"]["line"])
-
-
-def _slope_of_strength(gradients, summary, name, path):
-    """Derivative of the margin or of the utilisation by the number at a path."""
-    from ..statics.gradients import LIMITS
-
-    margin = summary["margin"]
-    if path.rpartition(".")[2] in LIMITS or margin["value"] is None or margin["line"] != summary["utilisation"]["line"]:
-        raise InputError(f"{name} depends on {path} in another way than by a stress")
-    slope = float(gradients.gradient(GOVERNING, path))
-    stress, allowed = margin["stress"], margin["allowed"]
-    return slope / margin["strength"] if name == "utilisation" else -allowed / stress**2 * slope

@@ -7,20 +7,23 @@ bounds has multipliers λ ≥ 0 with
 
 (Karush, Kuhn and Tucker), where bounds have multipliers as well. `refweb.sizing.sqp` finds it.
 
-Derivatives are those of the adjoint. One that no adjoint gives, as that of a frequency, is a difference of runs.
+Derivatives are those of the adjoint. One that no adjoint gives, as that of a frequency that others are equal to and
+leave, is a difference of runs.
 
-A largest value has a kink where two lines share it. A condition that this value is below a limit is one for each line
-that is close to it, and each of these is smooth.
+A largest value has a kink where two lines or nodes share it. A condition that this value is below a limit is one for
+each of these that is close to it, and each of these is smooth. An objective with a largest value is a further variable
+t, which is least, with t ≥ f of each that is close.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from typing import NamedTuple
 
 import numpy as np
 
-from .case import of_line, slope_of
+from .case import part_of, slope_of
 from .runs import middle
 from .space import Design
 from .sqp import minimise
@@ -37,6 +40,10 @@ ROUNDED = 1e-12
 """Distance of a fraction to a bound that is one of rounding."""
 FARTHEST = 1e3
 """Largest violation of a requirement, over its limit, that is looked for, and reserve of lines that are not close."""
+OBJECTIVE = -1
+"""Number of the objective among parts of requirements."""
+PART = re.compile(r"(.*) of (line|node) (\d+)")
+"""Columns of `refweb.sizing.case.part_of`."""
 
 
 class Optimum(NamedTuple):
@@ -63,7 +70,8 @@ class Optimum(NamedTuple):
 class Point(NamedTuple):
     """A design: objective over its size with gradient, reserves and their half widths (parts,), and constraints.
 
-    ``rows`` has a value and a gradient (n,) by the number of a part and by its line, or None for all.
+    ``rows`` has a value and a gradient (n,) by the number of a part and by its line or node, or None for all; of
+    `OBJECTIVE` those of the objective over its size.
     """
 
     f: float
@@ -117,31 +125,39 @@ class Smooth:
         self.coarse = self.coarse or bool(lacking)
         ((f, df),) = self.problem.objective.slopes(numbers, slopes)
         self.size = self.size or abs(f) or 1.0
-        r, wide, rows, lines = [], [], {}, self._lines(row, design)
+        r, wide, lines = [], [], self._lines(row, design)
+        rows = self._of_objective(numbers, slopes, lines, self.problem.objective.number(values).high)
         for formula in self.problem.requirements.values():
             each = self._by_line(formula, numbers, slopes, lines)
             pairs = zip(formula.slopes(numbers, slopes), formula.reserves(values), strict=True)
             for part, ((value, slope), reserve) in enumerate(pairs):
                 near = {line: pairs_of[part] for line, pairs_of in each.items()}
-                if not near or min(v for v, _ in near.values()) < value - ROUNDED * (1.0 + abs(value)):
-                    near = {None: (value, slope)}
+                lowest = min((v for v, _ in near.values()), default=-math.inf)
+                if lowest < reserve.low - ROUNDED * (1.0 + abs(value)):
+                    near, lowest = {None: (value, slope)}, value
                 rows |= {(len(r), line): (v, np.zeros(self.count) + dv) for line, (v, dv) in near.items()}
-                r.append(value)
-                wide.append(max(value - reserve.low, 0.0))
+                r.append(lowest)
+                wide.append(max(lowest - reserve.low, 0.0))
         df = (np.zeros(self.count) + df) / self.size
         return Point(f / self.size, df, np.array(r), np.array(wide), rows)
 
+    def _of_objective(self, numbers, slopes, lines, high):
+        """Rows of the objective by line or node, where it is the largest of these values, up to ``high`` within ±."""
+        formula = self.problem.objective
+        ((f, df),) = formula.slopes(numbers, slopes)
+        near = {line: pairs[0] for line, pairs in self._by_line(formula, numbers, slopes, lines).items()}
+        if not near or max(v for v, _ in near.values()) > high + ROUNDED * (1.0 + abs(f)):
+            near = {None: (f, df)}
+        return {(OBJECTIVE, n): (v / self.size, (np.zeros(self.count) + dv) / self.size) for n, (v, dv) in near.items()}
+
     def _lines(self, row, design):
-        """{Line: (value, gradient)} by result, of lines whose value is close to the largest."""
+        """{Line or node: (value, gradient)} by result, of those whose value is close to the largest."""
         lines = {}
-        for name in self.problem.results:
-            head = of_line(name, "")
-            at = [key.removeprefix(head) for key in row if key.startswith(head) and key.removeprefix(head).isdecimal()]
-            known = {
-                int(n): (row[head + n], self._slope(head + n, row, design)) for n in at if row[head + n] is not None
-            }
-            if known:
-                lines[name] = known
+        for key in filter(PART.fullmatch, row):
+            name, kind, n = PART.fullmatch(key).groups()
+            if name in self.problem.results and row[key] is not None:
+                at = part_of(name, kind, n)
+                lines.setdefault(name, {})[int(n)] = (row[at], self._slope(at, row, design))
         return lines
 
     def _by_line(self, formula, numbers, slopes, lines):
@@ -156,14 +172,29 @@ class Smooth:
         }
 
     def _constraints(self, point, kept):
-        """Lower ends above the reserves that are kept, and gradients, of all lines that were close so far."""
+        """Lower ends above the reserves that are kept, and gradients, of all lines that were close so far.
+
+        Of the objective it is the reserve to its largest value.
+        """
         for key in point.rows:
             self._keys.setdefault(key, len(self._keys))
         r, dr = np.full(len(self._keys), FARTHEST), np.zeros((len(self._keys), self.count))
         for (part, line), (value, slope) in point.rows.items():
             at = self._keys[part, line]
-            r[at], dr[at] = value - point.wide[part] - kept[part], slope
+            if part == OBJECTIVE:
+                r[at], dr[at] = point.f - point.rows[part, line][0], -slope
+            else:
+                r[at], dr[at] = value - point.wide[part] - kept[part], slope
         return r, dr
+
+    def _groups(self):
+        """Number of the part of each constraint, 0 of the objective."""
+        return np.array([part - OBJECTIVE for part, _ in self._keys])
+
+    def _of_largest(self, point):
+        """True for each constraint that is one of the objective at a point."""
+        present = [key for key in point.rows if key[0] == OBJECTIVE]
+        return np.array([key in present for key in self._keys])
 
     def _slope(self, name, row, design):
         """Gradient of a result by fractions, None where the row lacks one."""
@@ -194,21 +225,36 @@ class Smooth:
     def optimise(self, u, reserve=0.0):
         """Least design from a start, with reserves of at least ``reserve``; the fractions."""
         u, kept = np.array(u, float), np.full(len(self.parts), reserve + INSIDE)
-        self.at(u)
-        return minimise(
-            lambda u: (self.at(u).f, self.at(u).df, *self._constraints(self.at(u), kept)),
-            u,
-            np.zeros(self.count),
-            np.ones(self.count),
-            BY_DIFFERENCES if self.coarse else PRECISE,
-        )
+        largest = (OBJECTIVE, None) not in self.at(u).rows and math.isfinite(self.at(u).f)
+        tolerance = BY_DIFFERENCES if self.coarse else PRECISE
+
+        def functions(u):
+            point = self.at(u)
+            r, dr = self._constraints(point, kept)
+            return point.f, point.df, np.where(self._of_largest(point), FARTHEST, r), dr, self._groups()
+
+        def of_largest(ut):
+            """Solve as `functions`, of t above each value of the objective."""
+            point = self.at(ut[:-1])
+            r, dr = self._constraints(point, kept)
+            above = self._of_largest(point)
+            r = r + np.where(above, ut[-1] - point.f, 0.0) if math.isfinite(point.f) else r
+            f = ut[-1] if math.isfinite(point.f) else math.inf
+            return f, np.eye(self.count + 1)[-1], r, np.column_stack([dr, above]), self._groups()
+
+        if not largest:
+            return minimise(functions, u, np.zeros(self.count), np.ones(self.count), tolerance)
+        lower, upper = np.append(np.zeros(self.count), -FARTHEST), np.append(np.ones(self.count), FARTHEST)
+        return minimise(of_largest, np.append(u, self.at(u).f), lower, upper, tolerance)[:-1]
 
     def nearest(self, u):
         """Design whose largest violation is least, from a start: t is least with r + t ≥ 0; the fractions."""
 
         def functions(ut):
             r, dr = self._constraints(self.at(ut[:-1]), np.zeros(len(self.parts)))
-            return ut[-1], np.eye(self.count + 1)[-1], r + ut[-1], np.hstack([dr, np.ones((len(r), 1))])
+            r[self._of_largest(self.at(ut[:-1]))] = FARTHEST
+            dr = np.hstack([dr, np.ones((len(r), 1))])
+            return ut[-1], np.eye(self.count + 1)[-1], r + ut[-1], dr, self._groups()
 
         start = np.append(u, max(-self.at(u).r.min(), 0.0))
         lower, upper = np.append(np.zeros(self.count), -1.0), np.append(np.ones(self.count), FARTHEST)
@@ -222,17 +268,20 @@ class Smooth:
         r, dr = self._constraints(point, np.full(len(self.parts), INSIDE))
         sides = np.where(u <= ACTIVE, 1.0, np.where(u >= 1.0 - ACTIVE, -1.0, 0.0))
         at_bound, active = np.flatnonzero(sides), np.flatnonzero(r <= ACTIVE)
+        above = self._of_largest(point)[active]
+        size = np.linalg.norm(dr[active[above]], axis=1).max() or 1.0
+        # With t: Σ μ ∇f = Σ λ ∇r, and the μ of values of the objective sum to 1.
         normals = np.vstack([dr[active].reshape(-1, self.count), (np.eye(self.count) * sides)[at_bound]])
+        normals = np.column_stack([normals, size * np.append(above, np.zeros(len(at_bound)))])
         scale = np.linalg.norm(normals, axis=1)
         scale[scale == 0.0] = 1.0
-        solved, left = (
-            nnls((normals / scale[:, None]).T, point.df) if len(normals) else (np.zeros(0), np.linalg.norm(point.df))
-        )
+        solved, left = nnls((normals / scale[:, None]).T, np.append(np.zeros(self.count), size))
         solved = solved / scale
         multipliers, of_bounds = np.zeros(len(self.parts)), np.zeros(self.count)
-        np.add.at(multipliers, np.array([part for part, _ in self._keys])[active], solved[: len(active)])
+        parts = self._groups()[active] + OBJECTIVE
+        np.add.at(multipliers, parts[~above], solved[: len(active)][~above])
         of_bounds[at_bound] = solved[len(active) :]
-        return multipliers, of_bounds, float(left / (np.linalg.norm(point.df) or 1.0))
+        return multipliers, of_bounds, float(left / size)
 
     def optimum(self, u):
         """The `Optimum` at some fractions."""

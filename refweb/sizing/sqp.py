@@ -7,11 +7,12 @@ The step p at a point solves
 with the matrix B of BFGS. This is a least-distance problem, which non-negative least squares solves exactly (Lawson and
 Hanson, Solving Least Squares Problems, 1974, chapter 23). Where it has no solution, violated constraints are relaxed.
 
-A step is taken if it lowers f + μ Σ max(−r, 0), with μ twice the largest multiplier. SLSQP of scipy takes μ close to
-the multiplier, for which this function is nearly flat between an infeasible point and the optimum, and steps become a
-tenth as long again and again: one variable and one active constraint take 100 evaluations in place of 5. A step is
-taken as well if the next one is at most half as long: near the optimum differences of f are those of rounding, and
-steps still lead to it.
+A step is taken if it lowers f + μ Σ max(−r, 0), with μ twice the largest multiplier. Constraints may be in groups, of
+which the largest violation of each counts, and not all of which are known at each point, but the most violated one.
+SLSQP of scipy takes μ close to the multiplier, for which this function is nearly flat between an infeasible point and
+the optimum, and steps become a tenth as long again and again: one variable and one active constraint take 100
+evaluations in place of 5. A step is taken as well if the next one is at most half as long: near the optimum differences
+of f are those of rounding, and steps still lead to it.
 """
 
 from __future__ import annotations
@@ -36,8 +37,9 @@ def minimise(functions, x, lower, upper, tolerance):
     Parameters
     ----------
     functions : callable
-        Returns at x (f, its gradient (n,), constraints r ≥ 0 (m,), their gradients (m, n)). Later
-        points may have further constraints behind these.
+        Returns at x (f, its gradient (n,), constraints r ≥ 0 (m,), their gradients (m, n)), and the number of the group
+        of each constraint (m,) where they are in groups. Later points may have further constraints behind these. A
+        constraint that is not known at a point has a gradient of 0 there.
     x, lower, upper : ndarray, shape (n,)
         Start and bounds.
     tolerance : float
@@ -48,7 +50,7 @@ def minimise(functions, x, lower, upper, tolerance):
     ndarray, shape (n,)
     """
     x, radius, penalty = np.clip(x, lower, upper), FIRST, 0.0
-    at = functions(x)
+    at = _grouped(functions(x))
     curvature = np.eye(len(x)) * max(np.linalg.norm(at[1]), 1e-3)
     step, multipliers = _step(curvature, at, lower - x, upper - x, radius)
     for _ in range(ROUNDS):
@@ -57,8 +59,8 @@ def minimise(functions, x, lower, upper, tolerance):
         if radius < SHORTEST:
             break
         moved = np.clip(x + step, lower, upper)
-        after = functions(moved)
-        penalty = max(penalty, 2.0 * multipliers.max(initial=0.0))
+        after = _grouped(functions(moved))
+        penalty = max(penalty, 2.0 * np.bincount(at[4], multipliers).max(initial=0.0))
         gain, expected = _merit(at, penalty) - _merit(after, penalty), _expected(curvature, at, step, penalty)
         curvature = _updated(curvature, step, at, after, multipliers)
         following, others = _step(curvature, after, lower - moved, upper - moved, radius)
@@ -74,20 +76,32 @@ def minimise(functions, x, lower, upper, tolerance):
     return x
 
 
+def _grouped(at):
+    """Functions at a point with the group of each constraint, by default one for each."""
+    return at if len(at) == 5 else (*at, np.arange(len(at[2])))
+
+
+def _violation(r, groups):
+    """Sum of the largest violations of each group."""
+    worst = np.zeros(groups.max(initial=-1) + 1)
+    np.maximum.at(worst, groups, -r)
+    return worst.sum()
+
+
 def _merit(at, penalty):
-    return at[0] + penalty * np.maximum(-at[2], 0.0).sum()
+    return at[0] + penalty * _violation(at[2], at[4])
 
 
 def _expected(curvature, at, step, penalty):
     """Gain of a step that the quadratic model expects."""
-    f, df, r, dr = at
-    left = np.maximum(-(r + dr @ step), 0.0).sum()
-    return penalty * (np.maximum(-r, 0.0).sum() - left) - df @ step - 0.5 * step @ curvature @ step
+    _, df, r, dr, groups = at
+    gain = _violation(r, groups) - _violation(r + dr @ step, groups)
+    return penalty * gain - df @ step - 0.5 * step @ curvature @ step
 
 
 def _step(curvature, at, lower, upper, radius):
     """(Step, multipliers of the constraints) of the quadratic problem."""
-    _, df, r, dr = at
+    _, df, r, dr, _ = at
     n, factor = len(df), np.linalg.cholesky(curvature)
     rows = np.vstack([dr, np.eye(n), -np.eye(n)])
     for share in RELAXED:
@@ -126,7 +140,9 @@ def _updated(curvature, step, at, after, multipliers):
     """B of BFGS after a step, with Powell's damping; as it is where the functions have no values."""
     if not math.isfinite(after[0]):
         return curvature
-    change = after[1] - at[1] - (after[3][: len(multipliers)] - at[3]).T @ multipliers
+    before, behind = at[3], after[3][: len(multipliers)]
+    both = before.any(axis=1) & behind.any(axis=1)  # the others are not known at one of the points
+    change = after[1] - at[1] - (behind - before)[both].T @ multipliers[both]
     along = curvature @ step
     old, new = step @ along, step @ change
     if new < CURVED * old:

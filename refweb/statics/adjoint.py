@@ -46,12 +46,21 @@ class Sensitivity(NamedTuple):
         By the mass of each row [kg].
     area : ndarray, shape (cells,)
         By the area of each element [m²], apart from EA and mass.
+    coupled : ndarray, shape (cells,)
+        By the mass of each element [kg], apart from that of rows: of consistent mass.
     """
 
     axial: np.ndarray
     length: np.ndarray
     mass: np.ndarray
     area: np.ndarray
+    coupled: np.ndarray
+
+    @classmethod
+    def zeros(cls, net):
+        """Derivatives that are 0."""
+        cells = len(net.cells)
+        return cls(*(np.zeros(count) for count in (cells, cells, len(net.points), cells, cells)))
 
     def plus(self, more, share=1.0):
         """The sum with a share of more."""
@@ -92,6 +101,11 @@ class LineState:
     def tangent(self):
         """Slope of tension over strain at each quadrature point [N], shape (cells, points)."""
         return self._of_law("tangent")
+
+    @cached_property
+    def curvature(self):
+        """Slope of the tangent over strain at each quadrature point [N], shape (cells, points)."""
+        return self._of_law("curvature")
 
     @cached_property
     def direction(self):
@@ -152,9 +166,9 @@ class Adjoint:
             raise InputError(
                 "it depends on parts of the web that move without stiffness: hold them by supports, loads or lines"
             )
-        return tuple(map(self._rows_of, solved))
+        return tuple(map(self.rows_of, solved))
 
-    def _rows_of(self, p):
+    def rows_of(self, p):
         """Displacement of all rows by that of the unknowns, to first order, nodes that bodies carry included."""
         rows = self.system.rows_of(p)
         if self.system.carriers:
@@ -195,7 +209,7 @@ class Adjoint:
         force, per_cell = self.system.forces(self.t, self.x)
         state = Equilibrium(self.t, self.x, per_cell.tension, force)
         moves = [self.newton.factor.solve(disturbance) for disturbance in self.newton.disturbing(state)[:2]]
-        return np.array([self._rows_of(p) for p in moves])
+        return np.array([self.rows_of(p) for p in moves])
 
     @cached_property
     def weight(self):
@@ -215,16 +229,16 @@ class Adjoint:
         """The `Sensitivity` of the virtual work of all forces on a displacement of all rows."""
         axial, length = self.lines.work(rows)
         mass = (self.acceleration * rows).sum(axis=1)
-        return Sensitivity(axial, length, mass, np.zeros_like(axial))
+        return Sensitivity.zeros(self.net)._replace(axial=axial, length=length, mass=mass)
 
     @cached_property
     def _shares(self):
         """Share of the mass of an element that each of its nodes has."""
         return lumped_shares(line_element(self.net.order))
 
-    def by_element_mass(self, mass):
-        """Derivatives by the mass of each element [kg], shape (cells,), from those by the mass of each row."""
-        return mass[self.net.cells] @ self._shares
+    def by_element_mass(self, by_numbers):
+        """Derivatives of a `Sensitivity` by the mass of each element [kg], shape (cells,)."""
+        return by_numbers.mass[self.net.cells] @ self._shares + by_numbers.coupled
 
 
 def _factorized(system, t, x):

@@ -9,7 +9,8 @@ equilibrium, by systems that are built with other values of the number: no equil
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -79,6 +80,9 @@ class Gradient:
         Unit of the derivative; of numbers of other tables that of the result, per unit of the number.
     number : float, optional
         The number of the scene; None by line, group and node.
+    equal : tuple of str
+        Natural frequencies that are equal within ±, of which the result is one; empty for other results. They keep
+        their order: the lowest has the least derivative for a number that rises, and the largest for one that falls.
     """
 
     result: str
@@ -90,6 +94,7 @@ class Gradient:
     left: NDArray[np.float64] | None
     unit: str
     number: float | None = None
+    equal: tuple[str, ...] = ()
 
     def __float__(self) -> float:
         """The derivative by one number."""
@@ -112,9 +117,12 @@ class Gradients:
         For a solution of dynamics, and lines that have yielded and turned back.
     """
 
+    of_modes = False
+    """True if the equilibrium may be that of a scene of dynamics."""
+
     def __init__(self, solution):
         self.scene, state = solution.scene, solution.state
-        if state is None or not state.system.net.quasi_static:
+        if state is None or not (self.of_modes or state.system.net.quasi_static):
             raise InputError('gradients are those of equilibria: [solve] kind = "static", with a solution')
         system = at_rest(state.system)
         for thread in (thread for thread in system.net.threads if thread.rings):
@@ -162,37 +170,57 @@ class Gradients:
 
         A list of lists, of each response: (`Adjoint`, `Response`, λ, share of the error).
         """
-        if result not in self._observed:
-            raise InputError(f'result "{short(result)}" is none of this scene, {nearest(result, self._observed)}')
         if result not in self._results:
-            observe = self._observed[result]
-            if self._yielded and observe.quantity in ("strain_energy", "plastic_energy"):
-                raise InputError(f'gradient of "{result}": of lines that yield observe the total_energy')
-            if self._yielded and observe.quantity == "total_energy" and self.state.system.net.factors:
-                raise InputError(
-                    f'gradient of "{result}": where lines yield beside [[reel]] or [temperature], the energy depends '
-                    "on the path: take tensions or displacements, or solve the scene again with other numbers"
-                )
+            self._refuse_unknown(result)
             try:
-                self._results[result] = [self._solved(item) for item in responses(observe, self.linear)]
+                self._results[result] = [self._solved(item) for item in self._responses(result)]
             except InputError as error:
                 raise InputError(f'gradient of "{result}": {error}') from None
         return self._results[result]
+
+    def _refuse_unknown(self, result):
+        """Refuse a result that the scene does not have."""
+        if result not in self._observed:
+            raise InputError(
+                f'result "{short(result)}" is none of this scene, {nearest(result, self._observed)}; frequencies are '
+                "results of refweb.modes(scene), which has gradients as well"
+            )
+
+    def _responses(self, result):
+        """The `refweb.statics.responses.Response` of each line, node or pair of shapes that has a part in a result."""
+        observe = self._observed[result]
+        if self._yielded and observe.quantity in ("strain_energy", "plastic_energy"):
+            raise InputError("of lines that yield observe the total_energy")
+        if self._yielded and observe.quantity == "total_energy" and self.state.system.net.factors:
+            raise InputError(
+                "where lines yield beside [[reel]] or [temperature], the energy depends on the path: take tensions or "
+                "displacements, or solve the scene again with other numbers"
+            )
+        return responses(observe, self.linear)
 
     def _solved(self, response):
         """The multipliers of a response, their last correction, and those beside the equilibrium."""
         rows, change = self.linear.multipliers(response.slope)
         if response.doubt is not None:
             change = change + self.linear.multipliers(response.doubt)[0]
-        self._refuse_kinks(rows - response.reacting)
+        self._refuse_kinks(np.abs(self.linear.lines.stretch(rows - response.reacting)))
         solved = [(self.linear, response, rows, 1.0), (self.linear, None, change, 1.0)]
         for linear, factor in self._moved:
             beside = response.again(linear)
             solved.append((linear, beside, linear.multipliers(beside.slope)[0], factor))
+        for beside, factor in response.beside:
+            try:
+                near = self.linear.multipliers(beside.slope)[0]
+            except InputError:  # an error that moves parts without stiffness, on which the result does not depend
+                near = rows
+            solved.append((self.linear, beside, near, factor))
         return solved
 
-    def _refuse_kinks(self, rows):
-        """Refuse lines that are neither slack nor taut, and that the result depends on."""
+    def _refuse_kinks(self, along):
+        """Refuse lines that are neither slack nor taut, and that move in what the result depends on.
+
+        ``along`` is the size of their move, shape (cells, points).
+        """
         linear, net = self.linear, self.linear.net
         kinked = (net.law_is("convex") & ~net.forming)[:, None]
         strains = net.slackness[:, None]
@@ -202,7 +230,6 @@ class Gradients:
             strains = np.hstack([strains, corners_of(self.state.system.net)])
         error = np.abs([linear.lines.stretch(move) for move in linear.deviations]).sum(axis=0)
         error = error / (net.weights * net.natural_length[:, None])
-        along = np.abs(linear.lines.stretch(rows))
         felt = along > FELT * along.max(initial=0.0)
         for number, strain in enumerate(strains.T):
             near = np.abs(linear.lines.strain - strain[:, None]) <= KINK + 3.0 * error
@@ -246,15 +273,28 @@ class Gradients:
 
     def _assembled(self, result, path, by, names, values, unit):
         """The `Gradient` of the values and errors of each response."""
-        observe = self._observed[result]
         every, errors = (np.array([pair[k] for pair in values]) for k in (0, 1))
-        error, low, high = errors.max(axis=0), every.min(axis=0), every.max(axis=0)
-        right, left = (low, high) if observe.select == "min" else (high, low)
-        one_sided = (high - low > 2.0 * error + 1e-9 * np.abs(every).max(initial=0.0)).any()
-        value = right if one_sided else every[0]
-        unit = f"{observe.unit} per {unit}" if unit else observe.unit
+        right, left, error = self._sides(result, every, errors)
+        one_sided = (abs(right - left) > 2.0 * error + 1e-9 * np.abs(every).max(initial=0.0)).any()
+        of_result = self._unit(result)
+        unit = f"{of_result} per {unit}" if unit else of_result
         number = None if by else _number_at(self._given, path)
-        return Gradient(result, path, by, names, value, error, left if one_sided else None, unit, number)
+        gradient = Gradient(result, path, by, names, right, error, left if one_sided else None, unit, number)
+        return replace(gradient, equal=self._equal(result))
+
+    def _sides(self, result, every, errors):
+        """(Derivatives for numbers that rise, for numbers that fall, ±) by those of each response."""
+        low, high = every.min(axis=0), every.max(axis=0)
+        right, left = (low, high) if self._observed[result].select == "min" else (high, low)
+        return right, left, errors.max(axis=0)
+
+    def _unit(self, result):
+        """Unit of a result."""
+        return self._observed[result].unit
+
+    def _equal(self, result):
+        """Names of results that are one value within ±, of which a derivative takes part in each."""
+        return ()
 
     # By line and node
 
@@ -268,6 +308,10 @@ class Gradients:
             raise InputError('by line and group [[reel]] mass = "follows" is not taken: name one number of the scene')
         if path != "cable.modulus" and system.carried.any() and self.linear.weight:
             raise InputError("by line and group mass beside [[attach]] is not taken: name one number of the scene")
+        if path != "cable.modulus" and net.consistent_minus_lumped is not None and system.rotating:
+            raise InputError(
+                'by line and group mass = "consistent" in axes that turn is not taken: name one number of the scene'
+            )
         for element in np.flatnonzero(net.forming)[:1] if path != "cable.density" else ():
             raise InputError(f"{path} of line {net.line[element]} has no meaning, whose law is one of form finding")
         curves = "curve" in (net.line_data.dtype.names or ())
@@ -305,7 +349,7 @@ class Gradients:
         given = self._properties
         modulus, area, density = (given[key][net.line] for key in ("modulus", "area", "density"))
         built = self.state.system.net.natural_length
-        stretched, by_mass = net.natural_length / built, linear.by_element_mass(by_numbers.mass)
+        stretched, by_mass = net.natural_length / built, linear.by_element_mass(by_numbers)
         if path == "cable.modulus":
             values = area * by_numbers.axial
         elif path == "cable.area":
@@ -356,20 +400,40 @@ class Gradients:
 
     # By one number of the scene
 
+    def together(self, results, path):
+        """The `Gradient` of several results by one number, by the same systems, a dict; without those refused."""
+        solved = {}
+        for result in results:
+            with contextlib.suppress(InputError):
+                solved[result] = self.of(result)
+        if self._is_of_all_lines(path):
+            return {result: self.gradient(result, path) for result in solved}
+        pairs = iter(self._of_number([item for items in solved.values() for item in items], path) if solved else ())
+        values = {result: [next(pairs) for _ in items] for result, items in solved.items()}
+        return {result: self._assembled(result, path, "", ("",), values[result], "") for result in solved}
+
     def _by_number(self, result, path):
         """Pairs of derivative and ± by one number of the scene, one of each response, each of shape (1,)."""
-        solved, given = self.of(result), self._given
+        return self._of_number(self.of(result), path)
+
+    def _of_number(self, solved, path):
+        """Solve as `_by_number`, by the multipliers of responses of some results."""
+        given = self._given
         number = _number_at(given, path)
         if number is None:
             raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(given))}")
         size = abs(number) or self._size_beside(given, path)
-        best = None
+        best = before = None
         for attempt in range(STEPS):
             step = LARGEST_STEP * size / SHRINKS**attempt
-            tried = self._differences(solved, path, number, step)
-            if best is None or tried[1].max() < best[1].max():
-                best = tried
-            if (best[1] <= ENOUGH * np.abs(best[0][:, 0])).all():
+            value, error, rounding = self._differences(solved, path, number, step)
+            if before is not None:  # whose error is larger than that of this step
+                error = np.minimum(error, np.abs(value - before)[:, 0])
+            before, rounded = value, (error <= rounding).all()
+            error = error + rounding
+            if best is None or error.max() < best[1].max():
+                best = value, error
+            if rounded or (best[1] <= ENOUGH * np.abs(best[0][:, 0])).all():
                 break
         pairs = []
         for values, error in zip(*best, strict=True):
@@ -389,7 +453,7 @@ class Gradients:
         return max([abs(number) for number in beside if number is not None], default=0.0) or 1.0
 
     def _differences(self, solved, path, number, step):
-        """(Derivatives of shape (responses, states), errors of shape (responses,)) by differences of two steps."""
+        """Derivatives by differences of two steps, (responses, states), and errors by the step and by rounding."""
         try:
             by_step = {k: self._lagrangians(solved, path, number + k * step) for k in (-2, -1, 1, 2)}
         except InputError as error:
@@ -398,8 +462,9 @@ class Gradients:
         narrow = (by_step[1] - by_step[-1]) / (2.0 * step)
         value = (4.0 * narrow - wide) / 3.0
         tension = np.abs(self.state.element_tension).max(initial=0.0)
-        summed = np.array([np.linalg.norm(items[0][2]) * tension for items in solved]) + np.abs(by_step[1][:, 0])
-        return value, np.abs(value - narrow)[:, 0] + 4.0 * np.finfo(float).eps * summed / step
+        summed = np.array([np.linalg.norm(items[0][2]) * tension + items[0][1].size for items in solved])
+        summed += np.abs(by_step[1][:, 0])
+        return value, np.abs(value - narrow)[:, 0], 4.0 * np.finfo(float).eps * summed / abs(step)
 
     def _step_of(self, scene, system):
         """The last load step of a scene whose load steps change."""

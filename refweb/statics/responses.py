@@ -52,6 +52,10 @@ class Response(NamedTuple):
         Possible error of the slope, where it is one of differences.
     loaded : ndarray, shape (rows, 3), optional
         ∂J/∂f by a further load on each row, where it is not 0: of work, the displacement.
+    size : float
+        Sum of the sizes of terms whose difference the value is, for its rounding.
+    beside : tuple of (Response, float)
+        The response with an enlarged error of what it is made of, and the share of that in ±.
     """
 
     again: Any
@@ -61,6 +65,8 @@ class Response(NamedTuple):
     reacting: np.ndarray
     doubt: np.ndarray | None = None
     loaded: np.ndarray | None = None
+    size: float = 0.0
+    beside: tuple[tuple[Any, float], ...] = ()
 
 
 def responses(observe, linear):
@@ -96,8 +102,7 @@ def responses(observe, linear):
 
 def _nothing(linear):
     """(Sensitivity, rows) of zeros."""
-    cells, rows = len(linear.net.cells), np.zeros_like(linear.x)
-    return Sensitivity(np.zeros(cells), np.zeros(cells), np.zeros(len(rows)), np.zeros(cells)), rows
+    return Sensitivity.zeros(linear.net), np.zeros_like(linear.x)
 
 
 def _equal(observable, values, changes):

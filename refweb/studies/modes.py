@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ..statics.gradients import Gradient
     from ..system.system import System
 
 MAX_MODES = 1000
@@ -71,6 +72,36 @@ class Modes(Solution):
         later.
         """
         return self.spectra[-1].shapes[:, : self.state.system.net.nodes]
+
+    def gradient(self, result: str, path: str, by: str | None = None) -> Gradient:
+        """Derivative of a natural frequency, or of another result of the equilibrium, by numbers of the scene.
+
+        It holds the change of the equilibrium: one solution with its factorization for all numbers. Frequencies that
+        are equal within ± keep their order as a number changes: their derivatives are sorted, ``left`` is that for a
+        number that falls, and ``equal`` names them.
+
+        Parameters
+        ----------
+        result : str
+            "frequency_1" and so on, or a result of the scene.
+        path, by : str
+            See `refweb.Solution.gradient`.
+
+        Returns
+        -------
+        refweb.statics.gradients.Gradient
+
+        Raises
+        ------
+        InputError
+            As `refweb.Solution.gradient`; for modes that grow in axes that turn, frequencies that meet there, and lines
+            that have yielded.
+        """
+        from .frequency_gradients import FrequencyGradients
+
+        if "_gradients" not in self.__dict__:
+            self._gradients = FrequencyGradients(replace(self, scene=_without_slips(self.scene)))
+        return self._gradients.gradient(result, path, by)
 
     def __repr__(self) -> str:
         frequencies = ", ".join(f"{f:.6g}" for f in self.frequency[:4]) if self.spectra else ""
@@ -173,11 +204,18 @@ def modes(
 
 
 def _without_slips(scene):
-    """The scene with one tension in threads whose friction is 0, a force with a potential, and what modes look at."""
-    effects = tuple(
-        replace(effect, friction=None) if type(effect).__name__ == "Thread" and not np.any(effect.friction) else effect
+    """The scene with one tension in threads whose friction is 0, a force with a potential, and what modes look at.
+
+    It is the scene itself where there are none.
+    """
+    free = [
+        type(effect).__name__ == "Thread" and effect.friction is not None and not np.any(effect.friction)
         for effect in scene.effects
-    )
+    ]
+    if not any(free):
+        return scene
+    pairs = zip(scene.effects, free, strict=True)
+    effects = tuple(replace(effect, friction=None) if slips else effect for effect, slips in pairs)
     return scene.replace(effects=effects, observe=(), event=(), control=())
 
 

@@ -110,14 +110,14 @@ def test_two_bars_of_least_mass(start, tmp_path):
     assert found.optimality["residual"] < 1e-9 and not found.optimality["at_bound"]
 
 
-def test_a_cable_under_a_point_load_that_may_sink(tmp_path):
+@pytest.mark.parametrize("start", [4e-3, *(pytest.param(d, marks=pytest.mark.slow) for d in (1.5e-3, 1.5e-2))])
+def test_a_cable_under_a_point_load_that_may_sink(start, tmp_path):
     """A straight cable sinks by d under P where E A ε 2 d/l = P; its stress does not govern."""
     scene = {**BARS, "web": {**BARS["web"], "points": [[-HALF, 0, 0], [0, 0, 0], [HALF, 0, 0]]}}
     scene["cable"] = {**BARS["cable"], "law": "tension-only", "strength": 4e9, "safety_factor": 2.0}
     wanted = {"stiff": "deflection < 0.05 and deflection > 0.01", "strong": "margin > 0.1"}
-    found = sized(
-        tmp_path, tables=scene, requirements=wanted, parameters={"cable.diameter": {"from": 1e-3, "to": 2e-2}}, starts=1
-    )
+    thick = {"cable.diameter": {"from": 1e-3, "to": 2e-2, "start": start}}
+    found = sized(tmp_path, tables=scene, requirements=wanted, parameters=thick, starts=1)
     length = math.hypot(HALF, 0.05)
     area = LOAD * length / (2.0 * 0.05 * MODULUS * (length / HALF - 1.0))
     stiff, strong = found.requirements
@@ -194,6 +194,56 @@ def test_where_two_lines_share_the_largest_stress(start, tmp_path):
     assert found.values["lower"] == pytest.approx(LOAD / LIMIT, rel=1e-8)
     (strong,) = found.requirements
     assert strong["governs"] and strong["costs"] == pytest.approx(0.01 * found.objective["value"], rel=1e-7)
+
+
+LINES_APART = {
+    **BARS,
+    "web": {
+        "kind": "inline",
+        "points": [[0, 0, 0], [0, 0, -1], [1, 0, 0], [1, 0, -1]],
+        "lines": [[0, 1], [2, 3]],
+        "supports": [0, 2],
+        "groups": {"upper": [0]},
+    },
+    "cable": CHAIN["cable"],
+    "load": [{"node": 1, "force": [0.0, 0.0, -2.0 * LOAD]}, {"node": 3, "force": [0.0, 0.0, -LOAD]}],
+}
+"""Two lines that hang apart, of which one carries twice the load: of stresses and deflections as the chain."""
+
+
+@pytest.mark.ordinary("max_stress*", "-margin*")
+@pytest.mark.parametrize("objective, unit", [("max_stress", LIMIT), ("-margin", None), ("deflection", LIMIT / MODULUS)])
+def test_where_lines_and_nodes_share_an_objective(objective, unit, tmp_path):
+    """Of a mass 3 ρ P/σ at most, the least of the largest stress is σ, of the largest deflection σ/E.
+
+    The mass that counts is that of the natural lengths of 1 m.
+    """
+    areas = {n: {"paths": [p], **AREA} for n, p in {"first": "cable.groups.upper.area", "second": "cable.area"}.items()}
+    areas["first"]["start"] = 3e-5
+    tables = {**LINES_APART, "cable": {**LINES_APART["cable"], "strength": 3.0 * LIMIT}}
+    keys = {"minimise": objective, "requirements": {"light": f"cable_mass < {3.0 * DENSITY * LOAD / LIMIT!r}"}}
+    found = sized(tmp_path, tables=tables, parameters=areas, starts=1, **keys)
+    assert found.status == "solved" and found.optimality["residual"] < 1e-8
+    least = -2.0 if unit is None else unit  # a margin of 3 σ/σ − 1
+    assert found.objective["value"] == pytest.approx(least, rel=1e-8)
+    assert found.values["first"] == pytest.approx(2.0 * LOAD / LIMIT, rel=1e-7)
+    (light,) = found.requirements  # stresses go as the inverse of the mass
+    costs = 0.01 * (3.0 if unit is None else least)
+    assert light["governs"] and light["costs"] == pytest.approx(costs, rel=1e-6)
+
+
+@pytest.mark.ordinary("margin*", "deflection*")
+@pytest.mark.parametrize(
+    "condition", ["margin > 2", "utilisation < 0.3333333333333333", f"deflection < {LIMIT / MODULUS!r}"]
+)
+def test_where_lines_and_nodes_share_a_limit(condition, tmp_path):
+    """The least mass that has the stress σ of a limit in both lines, as where they share the largest stress."""
+    areas = {n: {"paths": [p], **AREA} for n, p in {"first": "cable.groups.upper.area", "second": "cable.area"}.items()}
+    tables = {**LINES_APART, "cable": {**LINES_APART["cable"], "strength": 3.0 * LIMIT}}
+    found = sized(tmp_path, tables=tables, parameters=areas, starts=1, requirements={"strong": condition})
+    assert found.status == "solved" and found.optimality["residual"] < 1e-8
+    assert found.values["first"] == pytest.approx(2.0 * LOAD / LIMIT, rel=1e-8)
+    assert found.values["second"] == pytest.approx(LOAD / LIMIT, rel=1e-8)
 
 
 def test_at_a_bound(tmp_path):

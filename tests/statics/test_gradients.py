@@ -11,6 +11,7 @@ from refweb.errors import InputError
 from refweb.reference.paths import with_value
 from refweb.results.state import State
 from refweb.statics.gradients import BY_LINE, Gradients
+from refweb.system.factorization import Factor
 
 POINTS = [[0, 0, 0], [2, 0, 0.1], [2, 2, 0], [0, 2, 0.2], [0.7, 0.8, 0.1], [1.3, 0.9, -0.1], [1.1, 1.4, 0.1]]
 LINES = [[0, 4], [1, 5], [2, 6], [3, 4], [4, 5], [5, 6], [4, 6], [1, 6], [3, 6]]
@@ -343,6 +344,25 @@ def test_one_side_and_the_other():
         slope = sideways.value[0] if step > 0.0 else sideways.left[0]
         change = moved - solution.results["tension"].value
         np.testing.assert_allclose(change, step * slope, rtol=1e-3)
+
+
+def test_all_lines_and_results_take_one_factorization(monkeypatch):
+    """A gradient by each of 112 lines, and those of further results, as a solution takes a dozen."""
+    scene = refweb.Scene(
+        web=refweb.Window(mesh="square", rows=8, columns=8, side=0.25),
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0, prestrain=0.01),
+        effects=[refweb.Load(node="centre", force=(0.0, 0.0, 5.0))],
+        solve=refweb.Static(),
+    )
+    count, update = [], Factor.update
+    monkeypatch.setattr(Factor, "update", lambda *given: count.append(1) or update(*given))
+    solution = refweb.run(scene, progress=False)
+    assert len(count) > 3
+    count.clear()
+    for name in ("max_stress", "deflection"):
+        for path in ("cable.area", "natural_length"):
+            assert solution.gradient(name, path, "line").value.size == 112
+    assert len(count) == 1
 
 
 # Lines, nodes and supports, by forward solutions
