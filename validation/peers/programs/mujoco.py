@@ -1,0 +1,71 @@
+"""MuJoCo: nodes are bodies on three slides, lines are spatial tendons with a dead band below their natural length."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import mujoco
+import numpy as np
+
+COMPILES = False
+
+
+def version():
+    return f"MuJoCo {mujoco.__version__}"
+
+
+def model_of(problem, step, damping=0.0):
+    spec = mujoco.MjSpec()
+    spec.option.timestep, spec.option.gravity = step, (0.0, 0.0, 0.0)
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    free, masses = problem.free, problem.masses
+    for n, point in enumerate(problem.points):
+        body = spec.worldbody.add_body(name=f"n{n}", pos=point)
+        body.add_site(name=f"s{n}")
+        if free[n]:
+            body.mass, body.inertia, body.explicitinertial = masses[n], 3 * [1e-9], True
+            for axis in np.eye(3):
+                body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis, damping=damping)
+    for (i, j), length in zip(problem.lines, problem.natural, strict=True):
+        tendon = spec.add_tendon(stiffness=[problem.ea / length, 0, 0], springlength=(0.0, length))
+        tendon.wrap_site(f"s{i}")
+        tendon.wrap_site(f"s{j}")
+    return spec.compile()
+
+
+def impact(problem, steps):
+    model = model_of(problem, problem.duration / steps)
+    data = mujoco.MjData(model)
+    body = problem.node + 1  # the world is the first one
+    data.qvel[model.body_dofadr[body] + 2] = problem.speed
+    mujoco.mj_step(model, data, nstep=steps)
+    mujoco.mj_kinematics(model, data)
+    return data.xpos[1:].copy()
+
+
+def draws(problem, steps):
+    """One model, which two threads share: steps run outside of Python's lock."""
+    model = model_of(problem, problem.duration / steps)
+    body = problem.node + 1
+
+    def one(speed):
+        data = mujoco.MjData(model)
+        data.qvel[model.body_dofadr[body] + 2] = speed
+        mujoco.mj_step(model, data, nstep=steps)
+        mujoco.mj_kinematics(model, data)
+        return data.xpos[body].copy()
+
+    with ThreadPoolExecutor(2) as pool:
+        return np.array(list(pool.map(one, problem.draws.tolist())))
+
+
+def statics(problem, step=1e-4, damping=0.05, still=1e-6):
+    """Damped steps under the last load until nothing moves: MuJoCo has no solver for equilibria."""
+    model = model_of(problem, step, damping)
+    data = mujoco.MjData(model)
+    data.qpos[:] = (problem.start - problem.points)[problem.free].ravel()
+    data.xfrc_applied[problem.node + 1, 2] = problem.loads[-1]
+    while data.time < 10.0:
+        mujoco.mj_step(model, data, nstep=500)
+        if np.abs(data.qvel).max() < still:
+            mujoco.mj_kinematics(model, data)
+            return data.xpos[1:].copy()
+    raise RuntimeError(f"moves with {np.abs(data.qvel).max():.1e} m/s after {data.time:.0f} s of time")
