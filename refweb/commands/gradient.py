@@ -1,4 +1,4 @@
-"""Compute how results of statics change with the numbers of a scene: their gradients, by line as a picture."""
+"""Compute how results change with the numbers of a scene: their gradients, in statics by line as a picture."""
 
 from ..errors import InputError
 from .arguments import add_json, add_scene, add_values, print_json, scene_of
@@ -12,10 +12,11 @@ def add_arguments(parser):
     add_scene(parser)
     add_values(parser)
     parser.add_argument("--of", metavar="RESULT", help="name of a result (default: the first of the scene)")
-    text = "a number of the scene, as cable.area or load.0.force.2, or force or position, of each node; repeatable "
-    text += "(default: all, by line cable.area)"
+    text = "a number of the scene, as cable.area or load.0.force.2, in statics also force or position, of each node; "
+    text += "repeatable (default: all, by line cable.area)"
     parser.add_argument("--path", dest="paths", action="append", metavar="PATH", help=text)
-    text = "by each line or group, of cable.modulus, cable.area, cable.density, cable.prestrain or natural_length"
+    text = "in statics by each line or group, of cable.modulus, cable.area, cable.density, cable.prestrain or "
+    text += "natural_length"
     parser.add_argument("--by", choices=["line", "group"], help=text)
     text = "a picture of the web to write, with the lines coloured by the gradient by line of the first PATH"
     parser.add_argument("--picture", metavar="FILE", help=text)
@@ -29,8 +30,9 @@ def run(arguments):
     from ..statics.gradients import numbers_of
 
     scene = scene_of(arguments)
-    if scene.solve.kind != "static":
-        raise InputError(f'[solve] kind = "{scene.solve.kind}" must be "static": gradients are those of equilibria')
+    moves = scene.solve.kind == "dynamic"
+    if moves and (arguments.by or arguments.picture):
+        raise InputError('gradients by line or group, and their picture, need [solve] kind = "static"')
     names = [o.name for o in scene.observables]
     result = names[0] if arguments.of is None else arguments.of
     paths = arguments.paths or (["cable.area"] if arguments.by else numbers_of(scene.to_dict()))
@@ -41,6 +43,8 @@ def run(arguments):
     with followed(not arguments.json) as tell:
         solution = run(scene, progress=tell)
     gradients, refused = [], []
+    if moves:
+        paths, refused = _followed(solution, result, paths, bool(arguments.paths))
     for path in paths:
         try:
             gradients.append(solution.gradient(result, path, arguments.by))
@@ -59,6 +63,19 @@ def run(arguments):
     print_gradients(solution, result, gradients, refused, SHOWN)
     if arguments.picture:
         print(arguments.picture)
+
+
+def _followed(solution, result, paths, asked):
+    """(Paths with gradients in dynamics, texts of those without), from one pass; refuses a path that is asked for."""
+    from ..dynamics.parameters import FIXED
+
+    refused = {}
+    if not asked:
+        paths = [path for path in paths if path.partition(".")[0] not in FIXED]
+    solution.gradients.refuse(result)
+    solution.gradients.follow(paths, None if asked else refused)
+    texts = [text for path, text in refused.items() if not text.startswith(f"{path} = 0 cannot be changed")]
+    return [path for path in paths if path not in refused], texts
 
 
 def _draw(solution, result, path, out):

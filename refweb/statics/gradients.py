@@ -253,7 +253,7 @@ class Gradients:
         one_sided = (high - low > 2.0 * error + 1e-9 * np.abs(every).max(initial=0.0)).any()
         value = right if one_sided else every[0]
         unit = f"{observe.unit} per {unit}" if unit else observe.unit
-        number = None if by else _number_at(self._given, path)
+        number = None if by else number_at(self._given, path)
         return Gradient(result, path, by, names, value, error, left if one_sided else None, unit, number)
 
     # By line and node
@@ -359,7 +359,7 @@ class Gradients:
     def _by_number(self, result, path):
         """Pairs of derivative and ± by one number of the scene, one of each response, each of shape (1,)."""
         solved, given = self.of(result), self._given
-        number = _number_at(given, path)
+        number = number_at(given, path)
         if number is None:
             raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(given))}")
         size = abs(number) or self._size_beside(given, path)
@@ -385,7 +385,7 @@ class Gradients:
     def _size_beside(self, given, path):
         """Size by which a number that is 0 is changed: that of its list, else 1."""
         head, _, last = path.rpartition(".")
-        beside = [_number_at(given, f"{head}.{k}") for k in range(10)] if last.isdecimal() else []
+        beside = [number_at(given, f"{head}.{k}") for k in range(10)] if last.isdecimal() else []
         return max([abs(number) for number in beside if number is not None], default=0.0) or 1.0
 
     def _differences(self, solved, path, number, step):
@@ -442,7 +442,7 @@ def _with_error(parts):
     return value, error + 8.0 * np.finfo(float).eps * np.abs(value)
 
 
-def _number_at(given, path):
+def number_at(given, path):
     """The number at a path in the dict of a scene, None where there is none."""
     inner: Any = given
     for key in path.split("."):

@@ -1,0 +1,157 @@
+"""Tangent-linear steps of central differences: derivatives of a motion by numbers of a scene, beside its steps.
+
+With a derivative δ by a number p, K = −∂f/∂x and C = −∂f/∂v at the end of each step, and all steps as they were,
+
+    δv ← δv + ½h δa,   δx ← δx + h δv,  (1 + ½h M⁻¹C) δv ← δv + ½h b,  b = ∂(M⁻¹f)/∂p − M⁻¹K δx,  δa = b − M⁻¹C δv.
+
+This is the derivative of the steps themselves, to rounding, where each force is differentiable at each step: K and C
+are the kernels of implicit methods. A force with a kink, as of a line that goes slack, has the derivative of the side
+on which it is; the step that passes the kink leaves an error of order 1 in its size.
+∂(M⁻¹f)/∂p are differences of forces of systems with other values of p, of the terms alone whose numbers differ.
+
+`Steps` follows a run, and calls `Tangent.step` behind each step; `refweb.dynamics.gradients` is its user.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import types
+
+from ...errors import IntegrationError
+from ...kernels import INDICES, kernel
+
+CUBE = types.Array(types.float64, 3, "C")
+MOST_ROUNDS, CLOSE = 200, 1e-14
+"""Largest number of rounds of the equation of δv, and the change over its size at which they end."""
+
+
+@kernel(types.void(CUBE, INDICES, CUBE, CUBE))
+def subtract_products(blocks, cells, moves, forces):
+    """Subtract the products of the blocks of cells with each of some moves from forces, shapes (p, rows, 3)."""
+    arity = cells.shape[1]
+    for c in range(cells.shape[0]):
+        for p in range(moves.shape[0]):
+            for a in range(arity):
+                for i in range(3):
+                    total = 0.0
+                    for b in range(arity):
+                        for j in range(3):
+                            total += blocks[c, 3 * a + i, 3 * b + j] * moves[p, cells[c, b], j]
+                    forces[p, cells[c, a], i] -= total
+
+
+class Matrices:
+    """Products with K or C of a system: `set` takes the blocks of an instant, of some terms with their kernels."""
+
+    def __init__(self, terms):
+        self.terms = [
+            (term, matrix, np.zeros((len(term.cells), *2 * (3 * term.cells.shape[1],)))) for term, matrix in terms
+        ]
+
+    def set(self, system, t, x, v):
+        """Take the blocks at an instant."""
+        for term, matrix, blocks in self.terms:
+            matrix(t, x, v, blocks, term.cells, system.data_of(term, t), False)
+
+    def forces(self, moves):
+        """−K δx or −C δv of each of some moves, shape (p, rows, 3)."""
+        forces = np.zeros_like(moves)
+        for term, _, blocks in self.terms:
+            subtract_products(blocks, term.cells, moves, forces)
+        return forces
+
+
+class Tangent:
+    """Derivatives of a motion of central differences by some numbers.
+
+    Parameters
+    ----------
+    integrator : refweb.dynamics.integrators.central_difference.CentralDifference
+        The method, of a system without attached nodes, bodies that turn and internal variables.
+    numbers : sequence of refweb.dynamics.parameters.Parameter
+        The numbers p.
+    t : float
+        Time of the start [s].
+    x, v, f : ndarray, shape (rows, 3)
+        State of the start.
+
+    Attributes
+    ----------
+    x, v, a : ndarray, shape (p, rows, 3)
+        δx, δv and δa.
+    """
+
+    def __init__(self, integrator, numbers, t, x, v, f):
+        self.system, self.numbers = integrator.system, numbers
+        self.inverse = integrator.model.inertia.inverse
+        terms = self.system.terms
+        self._stiff = Matrices([(g, g.tangent.stiffness) for g in terms if g.tangent.stiffness is not None])
+        self._damped = Matrices([(g, g.velocity.damping) for g in terms if g.velocity.damping is not None])
+        self._driven = np.concatenate([[], *(drive.cells[:, 0] for drive in self.system.drives)]).astype(int)
+        shape = len(numbers), *x.shape
+        self.x, self.v = (np.array([number.start[k] for number in numbers]).reshape(shape) for k in (0, 1))
+        self.a = self._rates(t, x, v, f)
+        if self._damped.terms:
+            self._damped.set(self.system, t, x, v)
+            self.a += self.inverse * self._damped.forces(self.v)
+
+    def _rates(self, t, x, v, f):
+        """∂(M⁻¹f)/∂p − M⁻¹K δx, shape (p, rows, 3)."""
+        self._stiff.set(self.system, t, x, v)
+        rates = self.inverse * self._stiff.forces(self.x)
+        for number, rate in zip(self.numbers, rates, strict=True):
+            number.add_rate(t, x, v, f, self.inverse, rate)
+        return rates
+
+    def step(self, t, h, x, v, f):
+        """Take a step h to the time t, at the end of which the motion is at x, v with the force f."""
+        self.v += 0.5 * h * self.a
+        self.x += h * self.v
+        if len(self._driven):
+            for number, dx, dv in zip(self.numbers, self.x, self.v, strict=True):
+                dx[self._driven], dv[self._driven] = number.driven(t, h, self._driven)
+        rates = self._rates(t, x, v, f)
+        self.v += 0.5 * h * rates
+        if self._damped.terms:
+            self._damped.set(self.system, t, x, v)
+            self.v, losses = self._solved(t, h, self.v)
+            rates += losses
+        self.a = rates
+
+    def _solved(self, t, h, start):
+        """(δv, −M⁻¹C δv) of δv = start − ½h M⁻¹C δv."""
+        moves, before = start, np.inf
+        for _ in range(MOST_ROUNDS):
+            losses = self.inverse * self._damped.forces(moves)
+            last, moves = moves, start + 0.5 * h * losses
+            change, size = np.abs(moves - last).max(initial=0.0), np.abs(moves).max(initial=0.0)
+            if change <= CLOSE * size or change >= before and change <= 1e3 * CLOSE * size:
+                return moves, losses
+            before = change
+        raise IntegrationError(f"the derivatives of velocities at t = {t:.6g} s are not found: use a smaller safety")
+
+
+class Steps:
+    """Steps of a run of central differences, one by one.
+
+    Parameters
+    ----------
+    integrator : refweb.dynamics.integrators.central_difference.CentralDifference
+        The method; its steps are those of a run to the same times.
+    start : tuple
+        (x, v) as `refweb.dynamics.integrators.integrator.Integrator.start` takes them.
+    """
+
+    def __init__(self, integrator, start):
+        self.integrator, self.course = integrator, integrator.start(*start)
+        self.integrator.breath = 1
+
+    def follow(self, times, on_step):
+        """Go to each of the times, and call ``on_step(t, h)`` behind each step h, which ends at the time t."""
+        integrator, course, corners = self.integrator, self.course, self.integrator.system.corners
+        integrator.on_progress = lambda t: on_step(float(t), integrator.step)
+        inner = corners[(corners > course.time) & (corners < times[-1])]
+        for end in np.union1d(times, inner):
+            if end > course.time and not course.stopped:
+                integrator.advance(course, [end])
+                on_step(course.time, integrator.step)
