@@ -43,7 +43,7 @@ PATHWISE = ("dissipated_energy", "work", "winch_energy", "rupture_energy", "plas
 """Quantities that are summed over steps."""
 SUPPORTED = (
     "lines of laws without memory, loads, gravity, frame, orbit, pressure, thrust, damping, bending, drag, motion, "
-    "reels whose mass stays, temperature, threads over nodes, bodies that do not turn, and contact"
+    "reels whose mass stays, temperature, threads over nodes, bodies whose orientation does not count, and contact"
 )
 """Text of what gradients take."""
 
@@ -261,13 +261,11 @@ def _refuse(scene, system, solution):
         ),
         ('[[reel]] mass = "follows"', bool(net.flows)),
         ("threads over bodies", any(thread.wraps for thread in net.threads)),
-        ("bodies that turn", any(body.spin is not None for body in net.bodies)),
+        ("bodies whose orientation counts", any(body.turn is not None for body in net.bodies)),
         ("[[attach]]", bool(system.carried.any())),
         (f'[solve] start = "{short(str(scene.solve.start))}"', scene.solve.start != "web"),
     ]
     for term in system.terms:
         refused.append((f"[{term.name}] of so many pairs of lines", term.contact.finder is not None))
-        felt = term.velocity.implicit is not None and term.name != "drag"
-        refused.append((f"[{term.name}] with damping or friction", felt))
     if names := [name for name, stands in refused if stands]:
         raise InputError(f"gradients of dynamics take no {names[0]}; they take {SUPPORTED}")

@@ -176,6 +176,87 @@ def test_a_ball_that_falls_on_one_spring():
         assert gradient.error[0] < 0.05 * abs(exact)
 
 
+def on_a_rail(duration, step, contact, velocity, height, observe):
+    """A ball on one line whose ends are held, under gravity."""
+    return refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [3, 0, 0]], lines=[[0, 1]], supports=[0, 1]),
+        cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=1000.0),
+        effects=(
+            refweb.Body(
+                name="ball", shape="sphere", radius=0.1, mass=0.5, position=(0.5, 0, height), velocity=velocity
+            ),
+            contact,
+            refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
+        ),
+        observe=[refweb.Observe(name="place", quantity="position", body="ball", component=axis) for axis in observe],
+        solve=refweb.Dynamic(duration=duration, step_size=step),
+        output=refweb.Output(interval=5e-3),
+    )
+
+
+@pytest.mark.parametrize("duration", [0.1, 0.4], ids=["sliding", "rolling"])
+def test_friction(duration):
+    """A ball slides until it rolls: x'' = −μ g q, slip u' = −μ g (1 + m a²/I) q, q = u/√(u² + v_s²), as in scipy."""
+    friction, speed, slow, g, stiffness = 0.2, 1.0, 0.05, 9.81, 1e5
+    lever = 0.1 - 0.5 * g / stiffness
+    faster = 1.0 + lever**2 / (0.4 * 0.1**2)
+
+    def rate(t, y):
+        """x, v, u, and their derivatives by μ and by the first speed."""
+        x, v, u, *moves = y
+        parts = []
+        for du, by in ((0.0, 0.0), (moves[2], 1.0), (moves[5], 0.0)):
+            slip, rub = u + 1e-30j * du, friction + 1e-30j * by
+            parts.append(-rub * g * slip / np.sqrt(slip**2 + slow**2))
+        slopes = [v, parts[0].real, faster * parts[0].real]
+        for n in (1, 2):
+            change = parts[n].imag / 1e-30
+            slopes += [moves[3 * n - 2], change, faster * change]
+        return slopes
+
+    start = [0.0, speed, speed, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]
+    end = solve_ivp(rate, (0.0, duration), start, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    if duration == 0.1:  # with no slip velocity −½ g t² and t
+        assert end[3] == pytest.approx(-0.5 * g * duration**2, rel=0.01) and end[6] == pytest.approx(duration, rel=0.01)
+    off = []
+    for step in (8e-4, 4e-4):
+        contact = refweb.Contact(stiffness=stiffness, friction=friction, slip_velocity=slow)
+        solution = refweb.run(on_a_rail(duration, step, contact, (speed, 0.0, 0.0), lever, "x"), progress=False)
+        solution.gradients.follow(["contact.friction", "body.0.velocity.0"])
+        off.append([])
+        for path, exact in (("contact.friction", end[3]), ("body.0.velocity.0", end[6])):
+            gradient = solution.gradient("place", path)
+            off[-1].append(abs(float(gradient) - exact))
+            assert off[-1][-1] <= gradient.error[0] + 1e-8
+    assert 3.0 < np.linalg.norm(off[0]) / np.linalg.norm(off[1]) < 5.0
+
+
+def test_damping_of_contact():
+    """A ball that falls on m z'' = k δ max(1 + d δ', 0) − m g, beside its variational equation in scipy: order 2."""
+    k, d, m, g, end = 2e3, 0.3, 0.5, 9.81, 0.06
+
+    def rate(t, y):
+        """z, z' and their derivatives by d; the ball starts in touch and stays there."""
+        (z, v), moves = y[:2], y[2:]
+
+        def force(z, v, d):
+            return k * (0.1 - z) * (1.0 - d * v) / m - g
+
+        change = force(z + 1e-30j * moves[0], v + 1e-30j * moves[1], d + 1e-30j).imag / 1e-30
+        return [v, force(z, v, d), moves[1], change]
+
+    exact = solve_ivp(rate, (0.0, end), [0.1 - 1e-9, -0.5, 0.0, 0.0], rtol=1e-10, atol=1e-13).y[:, -1]
+    assert exact[0] < 0.1
+    off = []
+    for step in (4e-4, 2e-4):
+        contact = refweb.Contact(stiffness=k, damping=d)
+        solution = refweb.run(on_a_rail(end, step, contact, (0.0, 0.0, -0.5), 0.1 - 1e-9, "z"), progress=False)
+        gradient = solution.gradient("place", "contact.damping")
+        off.append(abs(float(gradient) - exact[2]))
+        assert off[-1] <= gradient.error[0]
+    assert 3.0 < off[0] / off[1] < 5.0
+
+
 def test_variational_equations():
     """Two masses in space on damped lines under gravity, beside their variational equations in scipy: order 2."""
     points, lines = np.array([[0.0, 0, 0], [1, 0, 0], [1.6, 0.5, 0]]), [(0, 1), (1, 2)]
@@ -222,7 +303,7 @@ def test_variational_equations():
         output=refweb.Output(interval=0.02),
     )
     off = []
-    for step in (1e-3, 5e-4):
+    for step in (8e-4, 4e-4):
         solution = refweb.run(scene.replace(solve=replace(scene.solve, step_size=step)), progress=False)
         solution.gradients.follow(["cable.area", "velocity.0.value.0"])
         off.append([])

@@ -9,6 +9,13 @@ are the kernels of implicit methods. A force with a kink, as of a line that goes
 on which it is; the step that passes the kink leaves an error of order 1 in its size.
 ∂(M⁻¹f)/∂p are differences of forces of systems with other values of p, of the terms alone whose numbers differ.
 
+Losses of contacts are stiff, and steps solve for them with the θ of `refweb.effects.contact_solver`. Their derivative
+has the limit of this: over a kick of size h it decays as δv' = b − M⁻¹C δv does,
+
+    δa = φ(h M⁻¹C) (b − M⁻¹C δv⁻),   φ(z) = (1 − e⁻ᶻ)/z,
+
+with δv⁻ before the kick. It is that of the steps to order 2, not to rounding.
+
 `Steps` follows a run, and calls `Tangent.step` behind each step; `refweb.dynamics.gradients` is its user.
 """
 
@@ -60,6 +67,38 @@ class Matrices:
             subtract_products(blocks, term.cells, moves, forces)
         return forces
 
+    def dense(self):
+        """(Places in a flat array of rows, matrix) of the cells that have a matrix."""
+        acting = [
+            (term.cells[cells], blocks[cells]) for term, _, blocks in self.terms for cells in [blocks.any(axis=(1, 2))]
+        ]
+        parts = [(3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1) for rows, _ in acting]
+        places = np.unique(np.concatenate([np.zeros(0, dtype=int), *(part.ravel() for part in parts)]))
+        matrix = np.zeros((len(places), len(places)))
+        for part, (_, blocks) in zip(parts, acting, strict=True):
+            at = np.searchsorted(places, part)
+            np.add.at(matrix, (at[:, :, None], at[:, None, :]), blocks)
+        return places, matrix
+
+
+def mean_decay(matrix):
+    """φ(Z) = (1 − e⁻ᶻ)/Z, the mean of e⁻ˢᶻ over s from 0 to 1."""
+    if np.array_equal(matrix, matrix.T):
+        values, vectors = np.linalg.eigh(matrix)
+        small = np.abs(values) < 1e-8
+        return (
+            vectors * np.where(small, 1.0 - 0.5 * values, -np.expm1(-values) / np.where(small, 1.0, values))
+        ) @ vectors.T
+    from scipy.linalg import expm
+
+    n = len(matrix)
+    return expm(np.block([[-matrix, np.eye(n)], [np.zeros((n, 2 * n))]]))[:n, n:]
+
+
+def _rubs(term):
+    """Tell if kicks solve for the losses of a term with a mean velocity of their own: contacts, not drag."""
+    return term.velocity.implicit is not None and term.name != "drag"
+
 
 class Tangent:
     """Derivatives of a motion of central differences by some numbers.
@@ -86,14 +125,16 @@ class Tangent:
         self.inverse = integrator.model.inertia.inverse
         terms = self.system.terms
         self._stiff = Matrices([(g, g.tangent.stiffness) for g in terms if g.tangent.stiffness is not None])
-        self._damped = Matrices([(g, g.velocity.damping) for g in terms if g.velocity.damping is not None])
+        damped = [(g, g.velocity.damping) for g in terms if g.velocity.damping is not None]
+        self._damped = Matrices([pair for pair in damped if not _rubs(pair[0])])
+        self._rubbing = Matrices([pair for pair in damped if _rubs(pair[0])])
         self._driven = np.concatenate([[], *(drive.cells[:, 0] for drive in self.system.drives)]).astype(int)
         shape = len(numbers), *x.shape
         self.x, self.v = (np.array([number.start[k] for number in numbers]).reshape(shape) for k in (0, 1))
         self.a = self._rates(t, x, v, f)
-        if self._damped.terms:
-            self._damped.set(self.system, t, x, v)
-            self.a += self.inverse * self._damped.forces(self.v)
+        for losses in (self._damped, self._rubbing):
+            losses.set(self.system, t, x, v)
+            self.a += self.inverse * losses.forces(self.v)
 
     def _rates(self, t, x, v, f):
         """∂(M⁻¹f)/∂p − M⁻¹K δx, shape (p, rows, 3)."""
@@ -111,22 +152,42 @@ class Tangent:
             for number, dx, dv in zip(self.numbers, self.x, self.v, strict=True):
                 dx[self._driven], dv[self._driven] = number.driven(t, h, self._driven)
         rates = self._rates(t, x, v, f)
-        self.v += 0.5 * h * rates
+        rub = self._rub(h, t, x, v)
         if self._damped.terms:
             self._damped.set(self.system, t, x, v)
-            self.v, losses = self._solved(t, h, self.v)
-            rates += losses
-        self.a = rates
+            self.a = self._solved(t, h, rates, rub)
+        else:
+            self.a = rub(rates)
+        self.v += 0.5 * h * self.a
 
-    def _solved(self, t, h, start):
-        """(δv, −M⁻¹C δv) of δv = start − ½h M⁻¹C δv."""
-        moves, before = start, np.inf
+    def _rub(self, h, t, x, v):
+        """Function of δa without losses of contacts that gives it with them."""
+        self._rubbing.set(self.system, t, x, v)
+        places, matrix = self._rubbing.dense()
+        inverse, start = self.inverse.ravel()[places], self.v.reshape(len(self.v), -1)[:, places]
+        if not len(places):
+            return lambda rates: rates
+        root = np.sqrt(inverse)
+        weight = mean_decay(h * root[:, None] * matrix * root)
+        free = np.where(root > 0.0, 1.0 / np.where(root > 0.0, root, 1.0), 0.0)
+
+        def rub(rates):
+            changed = rates.reshape(len(rates), -1).copy()
+            held = changed[:, places] - inverse * (start @ matrix.T)
+            changed[:, places] = root * ((free * held) @ weight.T)
+            return changed.reshape(rates.shape)
+
+        return rub
+
+    def _solved(self, t, h, rates, rub):
+        """δa of δa = rub(rates − M⁻¹C (δv + ½h δa))."""
+        a, before = rub(rates), np.inf
         for _ in range(MOST_ROUNDS):
-            losses = self.inverse * self._damped.forces(moves)
-            last, moves = moves, start + 0.5 * h * losses
-            change, size = np.abs(moves - last).max(initial=0.0), np.abs(moves).max(initial=0.0)
+            moves = self.v + 0.5 * h * a
+            last, a = a, rub(rates + self.inverse * self._damped.forces(moves))
+            change, size = 0.5 * h * np.abs(a - last).max(initial=0.0), np.abs(moves).max(initial=0.0)
             if change <= CLOSE * size or change >= before and change <= 1e3 * CLOSE * size:
-                return moves, losses
+                return a
             before = change
         raise IntegrationError(f"the derivatives of velocities at t = {t:.6g} s are not found: use a smaller safety")
 
