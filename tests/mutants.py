@@ -409,7 +409,7 @@ MUTANTS = [
     Mutant("dynamics/responses", "pairs = [((low, x, v), (high, x, v), number.step)]", "pairs = []"),
     Mutant("dynamics/responses", "tied = scores >= scores[best] - TIED * abs(scores[best])", "tied = scores != scores"),
     Mutant("dynamics/integrators/tangent", "inverse * (start @ matrix.T)", "0.0 * inverse * (start @ matrix.T)"),
-    Mutant("dynamics/integrators/tangent", "-np.expm1(-values) /", "values /"),
+    Mutant("dynamics/integrators/tangent", "0.5 * mean @ (one + decay)", "mean @ (one + decay)"),
     Mutant("dynamics/gradients", "now if time == t else between(1.0 - (t - time) / h, h, before[0], now)", "now"),
     Mutant("dynamics/gradients", "error = factor * apart + spread +", "error = 0.0 * factor * apart +"),
     Mutant("dynamics/divergence", "np.flatnonzero(np.sqrt(off[: last + 1]) < LOST * size)", "np.arange(last + 1)"),

@@ -39,6 +39,9 @@ SAMPLES = 32
 """Largest number of times at which gradients of run and step refinement are compared."""
 LEAST = 1e-7
 """± over the size of a gradient that differences of data and of values may leave."""
+AMPLIFIED = 10.0
+"""± of a gradient without a digit, over the size of the result over that of the number, from which on it is refused:
+a hundredth of the number changes a tenth of the result, one way or the other."""
 PATHWISE = ("dissipated_energy", "work", "winch_energy", "rupture_energy", "plastic_energy", "step_size")
 """Quantities that are summed over steps."""
 SUPPORTED = (
@@ -110,10 +113,19 @@ class Gradients:
         observe = self.refuse(result)
         self.follow([path])
         number, by_name = self._known[path]
-        value, left, error = by_name[result]
+        value, left, error, times, errors = by_name[result]
+        size, moved = abs(self._runs[0].results[result].value), abs(number.number) or number.size
+        limit = max(abs(value), AMPLIFIED * size / moved)
+        if error > limit > 0.0:
+            lost = times[errors > limit].min(initial=self._runs[0].results[result].time)
+            raise InputError(
+                f"{path}: the derivative of {result} is {value:.3g} ± {error:.1g}; behind the horizon, {lost:.4g} s, "
+                "it has no digit, since small motions are chaotic, as of slack lines without damping, even where large "
+                "ones are not: take a result of an earlier time, add damping, or vary the number widely by refweb sweep"
+            )
         unit = f"{observe.unit} per {BY_LINE[path]}" if path in BY_LINE else observe.unit
         arrays = [None if part is None else np.array([part]) for part in (value, error, left)]
-        return Gradient(result, path, "", ("",), *arrays, unit, number)
+        return Gradient(result, path, "", ("",), *arrays, unit, number.number)
 
     def refuse(self, result):
         """Refuse a result without a gradient, and one behind the horizon; return its `refweb.Observe`."""
@@ -172,7 +184,7 @@ class Gradients:
             by_name = {
                 name: tuple(part if part is None else part[n] for part in parts) for name, parts in every.items()
             }
-            self._known[number.path] = number.number, by_name
+            self._known[number.path] = number, by_name
 
     def _linear(self, integrator, run, numbers):
         """The `Linear` run of a method."""
@@ -230,7 +242,7 @@ class Linear(NamedTuple):
 
 
 def _with_errors(name, first, finer, factor, results):
-    """(Value, left or None, ±) of a result by some numbers, each of shape (numbers,)."""
+    """(Value, left or None, ±, times, ± there) of a result by some numbers, each a list of as many."""
     slopes, others, end = first.slopes[name], finer.slopes[name], results[name].time
     count = min(len(first.times), len(finer.times))
     times, rows, beside = (np.array(part[:count]) for part in (first.times, first.rows[name], finer.rows[name]))
@@ -240,7 +252,8 @@ def _with_errors(name, first, finer, factor, results):
     one_sided = (slopes.left != slopes.value).any()
     spread = 0.0 if one_sided else slopes.spread
     error = factor * apart + spread + LEAST * np.maximum(np.abs(slopes.value), np.abs(slopes.left))
-    return slopes.value, slopes.left if one_sided else None, error
+    errors = factor * np.abs(rows - beside)[times <= end].T
+    return slopes.value, slopes.left if one_sided else None, error, [times[times <= end]] * len(errors), errors
 
 
 def _is_smooth(observe):
