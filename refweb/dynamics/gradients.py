@@ -87,6 +87,7 @@ class Gradients:
         _refuse(scene, system, solution)
         self._simulation = Simulation(scene, system, load("refweb.solution:Solution")(scene))
         self._observed, self._known = {o.name: o for o in scene.observables}, {}
+        self._simulation.settle(lambda text, share: None)
         integrator = self._simulation.integrator
         self._methods = integrator, integrator.refined()
         self._runs = tuple(map(self._plain, self._methods))
@@ -166,9 +167,11 @@ class Gradients:
         Paths that are refused are errors, or get their reasons in the dict ``refused``.
         """
         simulation, numbers = self._simulation, []
+        scene, system = simulation.scene, simulation.system
+        equilibrium = simulation.begin.x if scene.solve.start == "equilibrium" else None
         for path in dict.fromkeys(paths):
             try:
-                numbers += [] if path in self._known else [Parameter(simulation.scene, simulation.system, path)]
+                numbers += [] if path in self._known else [Parameter(scene, system, path, equilibrium)]
             except InputError as error:
                 if refused is None:
                     raise
@@ -276,7 +279,7 @@ def _refuse(scene, system, solution):
         ("threads over bodies", any(thread.wraps for thread in net.threads)),
         ("bodies whose orientation counts", any(body.turn is not None for body in net.bodies)),
         ("[[attach]]", bool(system.carried.any())),
-        (f'[solve] start = "{short(str(scene.solve.start))}"', scene.solve.start != "web"),
+        (f'[solve] start = "{short(str(scene.solve.start))}"', scene.solve.start not in ("web", "equilibrium")),
     ]
     for term in system.terms:
         refused.append((f"[{term.name}] of so many pairs of lines", term.contact.finder is not None))

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..messages import nearest, quote
 from ..reference.paths import with_value
 from ..statics.gradients import number_at, numbers_of
+from ..system.static_system import at_rest
 
 CHANGE = 3e-7
 """Largest relative change of data by a step: its square and rounding over it leave errors of 1e-9 of a derivative."""
@@ -29,11 +30,13 @@ class Parameter:
     Parameters
     ----------
     scene : refweb.Scene
-        Dynamic scene that starts as built, with its stiffness of contact.
+        Dynamic scene with its stiffness of contact.
     system : refweb.system.system.System
         Its system.
     path : str
         Path of the number.
+    equilibrium : ndarray, shape (rows, 3), optional
+        Displacement of the equilibrium that the run starts from [m]; by default it starts as built.
 
     Attributes
     ----------
@@ -55,7 +58,7 @@ class Parameter:
         the net itself or times at which steps end.
     """
 
-    def __init__(self, scene, system, path):
+    def __init__(self, scene, system, path, equilibrium=None):
         self.path, self._scene, self._system, self._given = path, scene, system, scene.to_dict()
         number = number_at(self._given, path)
         if path.partition(".")[0] in FIXED:
@@ -66,6 +69,8 @@ class Parameter:
         self.step, self.systems = self._changed()
         low, high = self.systems
         self.start = (_start_of(high) - _start_of(low)) / (2.0 * self.step)
+        if equilibrium is not None:
+            self.start[0] = self._moved(equilibrium)
         self._differing = [n for n, pair in enumerate(zip(low.terms, high.terms, strict=True)) if _differ(*pair)]
         if _relative(low.net.line_data.matrix, high.net.line_data.matrix) or _tables(low) != _tables(high):
             over = [n for n, term in enumerate(system.terms) if term.over_lines]
@@ -108,6 +113,21 @@ class Parameter:
         """The system with another value of the number."""
         scene = type(self._scene).from_dict(with_value(self._given, self.path, float(value)), self._scene.folder)
         return scene.build()
+
+    def _moved(self, x):
+        """Derivative of the displacement x of an equilibrium, K⁻¹ ∂f/∂p, shape (rows, 3)."""
+        from ..statics.adjoint import Adjoint
+
+        rest, low, high = (at_rest(system) for system in (self._system, *self.systems))
+        change = (high.force(0.0, x) - low.force(0.0, x)) / (2.0 * self.step)
+        try:
+            if not rest.symmetric or rest.drives:
+                raise InputError("it has loads that follow it, or motion")
+            return Adjoint(rest, 0.0, x).multipliers(np.where(rest.supported, 0.0, change))[0]
+        except InputError as error:
+            raise InputError(
+                f"the equilibrium that the run starts from has no derivative by {self.path}: {error}"
+            ) from None
 
     def _inverse_of(self, system):
         """Inverse masses, 0 where a row is without one, shape (rows, 1)."""
