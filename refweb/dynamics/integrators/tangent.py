@@ -31,6 +31,8 @@ CUBE = types.Array(types.float64, 3, "C")
 MOST_ROUNDS, CLOSE = 200, 1e-13
 """Largest number of rounds of the equation of δv, and the change over its size at which they end."""
 
+SKIN = 0.1
+"""Approach over the mean length of elements up to which the cells of contact are not looked for again."""
 SMALL, TERMS = 0.25, 11
 """Norm of a matrix up to which its decay is a series, and the number of terms, whose remainder is 1e-14."""
 
@@ -38,47 +40,88 @@ SMALL, TERMS = 0.25, 11
 @kernel(types.void(CUBE, INDICES, CUBE, CUBE))
 def subtract_products(blocks, cells, moves, forces):
     """Subtract the products of the blocks of cells with each of some moves from forces, shapes (p, rows, 3)."""
-    arity = cells.shape[1]
+    size = 3 * cells.shape[1]
+    move = np.empty(size)
     for c in range(cells.shape[0]):
-        acts = False  # slack lines and those that touch nothing have zeros
-        for a in range(3 * arity):
-            for b in range(3 * arity):
-                acts = acts or blocks[c, a, b] != 0.0
-        for p in range(moves.shape[0] if acts else 0):
-            for a in range(arity):
+        first = 0  # slack lines have zeros
+        while first < size * size and blocks[c, first // size, first % size] == 0.0:
+            first += 1
+        for p in range(moves.shape[0] if first < size * size else 0):
+            for a in range(cells.shape[1]):
+                for i in range(3):
+                    move[3 * a + i] = moves[p, cells[c, a], i]
+            for a in range(cells.shape[1]):
                 for i in range(3):
                     total = 0.0
-                    for b in range(arity):
-                        for j in range(3):
-                            total += blocks[c, 3 * a + i, 3 * b + j] * moves[p, cells[c, b], j]
+                    for b in range(size):
+                        total += blocks[c, 3 * a + i, b] * move[b]
                     forces[p, cells[c, a], i] -= total
+
+
+class Blocks:
+    """K or C of a term by cell, of those alone that may act, where it acts near something.
+
+    Parameters
+    ----------
+    term : refweb.effects.base.ForceTerm
+        The term.
+    matrix : kernel
+        That of its blocks, of signature `refweb.kernels.STIFFNESS`.
+    skin : float
+        Approach of two rows up to which cells are not looked for again [m].
+    """
+
+    def __init__(self, term, matrix, skin):
+        self.term, self._matrix, self._skin, self.cells = term, matrix, skin, term.cells
+        self._space = np.zeros((len(term.cells), *2 * (3 * term.cells.shape[1],)))
+        self._chosen, self._data, self._place = np.empty(len(term.cells), dtype=np.int64), None, None
+
+    @property
+    def blocks(self):
+        """Blocks of the ``cells``, shape (cells, 3 arity, 3 arity)."""
+        return self._space[: len(self.cells)]
+
+    def set(self, system, t, x, v):
+        """Take the blocks at an instant."""
+        data = system.data_of(self.term, t)
+        if self.term.contact.near is not None:
+            data = self._near(x, data)
+        self._matrix(t, x, v, self.blocks, self.cells, data, False)
+
+    def _near(self, x, data):
+        """Choose the cells that may act, and return their data."""
+        if self._place is None or 2.0 * np.sqrt(((x - self._place) ** 2).sum(axis=1).max()) > self._skin:
+            count = self.term.contact.near(self._skin, x, self.term.cells, data, self._chosen)
+            chosen = self._chosen[:count]
+            self._place, self.cells, self._data = x.copy(), self.term.cells[chosen], data[chosen]
+        return self._data
 
 
 class Matrices:
     """Products with K or C of a system: `set` takes the blocks of an instant, of some terms with their kernels."""
 
-    def __init__(self, terms):
-        self.terms = [
-            (term, matrix, np.zeros((len(term.cells), *2 * (3 * term.cells.shape[1],)))) for term, matrix in terms
-        ]
+    def __init__(self, system, terms):
+        skin = SKIN * system.net.natural_length.mean()
+        self.terms = [Blocks(term, matrix, skin) for term, matrix in terms]
 
     def set(self, system, t, x, v):
         """Take the blocks at an instant."""
-        for term, matrix, blocks in self.terms:
-            matrix(t, x, v, blocks, term.cells, system.data_of(term, t), False)
+        for term in self.terms:
+            term.set(system, t, x, v)
 
     def forces(self, moves):
         """−K δx or −C δv of each of some moves, shape (p, rows, 3)."""
         forces = np.zeros_like(moves)
-        for term, _, blocks in self.terms:
-            subtract_products(blocks, term.cells, moves, forces)
+        for term in self.terms:
+            subtract_products(term.blocks, term.cells, moves, forces)
         return forces
 
     def dense(self):
         """(Places in a flat array of rows, matrix) of the cells that have a matrix."""
-        acting = [
-            (term.cells[cells], blocks[cells]) for term, _, blocks in self.terms for cells in [blocks.any(axis=(1, 2))]
-        ]
+        acting = []
+        for term in self.terms:
+            cells = term.blocks.any(axis=(1, 2))
+            acting.append((term.cells[cells], term.blocks[cells]))
         parts = [(3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1) for rows, _ in acting]
         places = np.unique(np.concatenate([np.zeros(0, dtype=int), *(part.ravel() for part in parts)]))
         matrix = np.zeros((len(places), len(places)))
@@ -130,10 +173,12 @@ class Tangent:
         self.system, self.numbers = integrator.system, numbers
         self.inverse = integrator.model.inertia.inverse
         terms = self.system.terms
-        self._stiff = Matrices([(g, g.tangent.stiffness) for g in terms if g.tangent.stiffness is not None])
+        self._stiff = Matrices(
+            self.system, [(g, g.tangent.stiffness) for g in terms if g.tangent.stiffness is not None]
+        )
         damped = [(g, g.velocity.damping) for g in terms if g.velocity.damping is not None]
-        self._damped = Matrices([pair for pair in damped if not _rubs(pair[0])])
-        self._rubbing = Matrices([pair for pair in damped if _rubs(pair[0])])
+        self._damped = Matrices(self.system, [pair for pair in damped if not _rubs(pair[0])])
+        self._rubbing = Matrices(self.system, [pair for pair in damped if _rubs(pair[0])])
         self._driven = np.concatenate([[], *(drive.cells[:, 0] for drive in self.system.drives)]).astype(int)
         shape = len(numbers), *x.shape
         self.x, self.v = (np.array([number.start[k] for number in numbers]).reshape(shape) for k in (0, 1))
