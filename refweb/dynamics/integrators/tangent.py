@@ -213,6 +213,8 @@ class Tangent:
 
     def _rub(self, h, t, x, v):
         """Function of δa without losses of contacts that gives it with them."""
+        if not self._rubbing.terms:
+            return lambda rates: rates
         self._rubbing.set(self.system, t, x, v)
         places, matrix = self._rubbing.dense()
         inverse, start = self.inverse.ravel()[places], self.v.reshape(len(self.v), -1)[:, places]
