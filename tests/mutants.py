@@ -396,8 +396,12 @@ MUTANTS = [
     Mutant("statics/monotone_loading", "(slope / (ea + slope)).T", "(slope / ea).T"),
     Mutant("statics/gradients", "rows - reacting + loaded", "rows - reacting + 0.0 * loaded"),
     Mutant("statics/responses", "|= system.fixed[", "|= False & system.fixed["),
-    Mutant("dynamics/integrators/tangent", "self.v += 0.5 * h * rates", "self.v += h * rates"),
-    Mutant("dynamics/integrators/tangent", "start + 0.5 * h * losses", "start + h * losses"),
+    Mutant(
+        "dynamics/integrators/tangent",
+        "self.v += 0.5 * h * self.a\n        self.x",
+        "self.v += h * self.a\n        self.x",
+    ),
+    Mutant("dynamics/integrators/tangent", "self.v + 0.5 * h * a\n", "self.v + h * a\n"),
     Mutant("dynamics/integrators/tangent", "dx[self._driven], dv[self._driven] = number", "_ = number"),
     Mutant("dynamics/parameters", "if self._lighter.any():", "if False:"),
     Mutant(
@@ -409,7 +413,7 @@ MUTANTS = [
     Mutant("dynamics/responses", "pairs = [((low, x, v), (high, x, v), number.step)]", "pairs = []"),
     Mutant("dynamics/responses", "tied = scores >= scores[best] - TIED * abs(scores[best])", "tied = scores != scores"),
     Mutant("dynamics/integrators/tangent", "inverse * (start @ matrix.T)", "0.0 * inverse * (start @ matrix.T)"),
-    Mutant("dynamics/integrators/tangent", "0.5 * mean @ (one + decay)", "mean @ (one + decay)"),
+    Mutant("dynamics/integrators/tangent", "0.5 * mean @ (identity + decay)", "mean @ (identity + decay)"),
     Mutant("dynamics/gradients", "now if time == t else between(1.0 - (t - time) / h, h, before[0], now)", "now"),
     Mutant("dynamics/gradients", "error = factor * apart + spread +", "error = 0.0 * factor * apart +"),
     Mutant("dynamics/divergence", "np.flatnonzero(np.sqrt(off[: last + 1]) < LOST * size)", "np.arange(last + 1)"),

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, SolverError
 from ..messages import nearest, quote, short
 from ..registry import load
 from ..results.observables.fuel import Fuel
@@ -90,7 +90,10 @@ class Gradients:
         self._simulation.settle(lambda text, share: None)
         integrator = self._simulation.integrator
         self._methods = integrator, integrator.refined()
-        self._runs = tuple(map(self._plain, self._methods))
+        try:
+            self._runs = tuple(map(self._plain, self._methods))
+        except SolverError as error:
+            raise InputError(f"gradients follow the steps of the scene, which end: {error}") from None
         if self._runs[0].nsteps != solution.solver["nsteps"]:
             raise InputError(
                 f"gradients follow the steps of the scene, {self._runs[0].nsteps}, but the run was repeated with "
@@ -117,12 +120,12 @@ class Gradients:
         value, left, error, times, errors = by_name[result]
         size, moved = abs(self._runs[0].results[result].value), abs(number.number) or number.size
         limit = max(abs(value), AMPLIFIED * size / moved)
-        if error > limit > 0.0:
+        if size > 0.0 and error > limit:
             lost = times[errors > limit].min(initial=self._runs[0].results[result].time)
             raise InputError(
-                f"{path}: the derivative of {result} is {value:.3g} ± {error:.1g}; behind the horizon, {lost:.4g} s, "
-                "it has no digit, since small motions are chaotic, as of slack lines without damping, even where large "
-                "ones are not: take a result of an earlier time, add damping, or vary the number widely by refweb sweep"
+                f"the derivative of {result} by {path} is {value:.3g} ± {error:.1g}; behind the horizon, {lost:.4g} "
+                "s, it has no digit, since small motions are chaotic, as of slack lines without damping, even where "
+                "large ones are not: take a result of an earlier time, add damping, or vary the number by refweb sweep"
             )
         unit = f"{observe.unit} per {BY_LINE[path]}" if path in BY_LINE else observe.unit
         arrays = [None if part is None else np.array([part]) for part in (value, error, left)]

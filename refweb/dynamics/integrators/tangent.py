@@ -74,7 +74,7 @@ class Blocks:
     def __init__(self, term, matrix, skin):
         self.term, self._matrix, self._skin, self.cells = term, matrix, skin, term.cells
         self._space = np.zeros((len(term.cells), *2 * (3 * term.cells.shape[1],)))
-        self._chosen, self._data, self._place = np.empty(len(term.cells), dtype=np.int64), None, None
+        self._chosen, self._data, self._reference = np.empty(len(term.cells), dtype=np.int64), None, None
 
     @property
     def blocks(self):
@@ -90,10 +90,10 @@ class Blocks:
 
     def _near(self, x, data):
         """Choose the cells that may act, and return their data."""
-        if self._place is None or 2.0 * np.sqrt(((x - self._place) ** 2).sum(axis=1).max()) > self._skin:
+        if self._reference is None or 2.0 * np.sqrt(((x - self._reference) ** 2).sum(axis=1).max()) > self._skin:
             count = self.term.contact.near(self._skin, x, self.term.cells, data, self._chosen)
             chosen = self._chosen[:count]
-            self._place, self.cells, self._data = x.copy(), self.term.cells[chosen], data[chosen]
+            self._reference, self.cells, self._data = x.copy(), self.term.cells[chosen], data[chosen]
         return self._data
 
 
@@ -133,14 +133,14 @@ class Matrices:
 
 def mean_decay(matrix):
     """φ(Z) = (1 − e⁻ᶻ)/Z, the mean of e⁻ˢᶻ over s from 0 to 1, by φ(2Z) = ½ φ(Z)(1 + e⁻ᶻ) from a series on."""
-    one = np.eye(len(matrix))
+    identity = np.eye(len(matrix))
     halvings = max(int(np.ceil(np.log2(max(np.abs(matrix).sum(axis=1).max(), 1e-300) / SMALL))), 0)
-    small, mean = matrix / 2.0**halvings, one
+    small, mean = matrix / 2.0**halvings, identity
     for n in range(TERMS, 1, -1):
-        mean = one - small @ mean / n
-    decay = one - small @ mean
+        mean = identity - small @ mean / n
+    decay = identity - small @ mean
     for _ in range(halvings):
-        mean, decay = 0.5 * mean @ (one + decay), decay @ decay
+        mean, decay = 0.5 * mean @ (identity + decay), decay @ decay
     return mean
 
 
@@ -226,8 +226,8 @@ class Tangent:
 
         def rub(rates):
             changed = rates.reshape(len(rates), -1).copy()
-            held = changed[:, places] - inverse * (start @ matrix.T)
-            changed[:, places] = root * ((free * held) @ weight.T)
+            undamped = changed[:, places] - inverse * (start @ matrix.T)
+            changed[:, places] = root * ((free * undamped) @ weight.T)
             return changed.reshape(rates.shape)
 
         return rub
