@@ -6,6 +6,7 @@ Public names are the interface of users; `load` reads keys that `results.solutio
 from __future__ import annotations
 
 import pathlib
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -158,26 +159,34 @@ class Solution(SolutionData):
         return picture(self, frame, time, field, range, scale, view, out, labels)
 
     def gradient(self, result: str, path: str, by: str | None = None) -> Gradient:
-        """Derivative of a result of statics by numbers of the scene, at the last load step.
+        """Derivative of a result by numbers of the scene: in statics at the last load step, in dynamics at its time.
 
-        One solution with the factorization of the equilibrium, its adjoint, gives the derivatives of a result by all
-        numbers. They are those of the law as it is: exact, and with ± from the residuals of the equilibrium and of the
-        adjoint, from rounding, and from differences where a number of the scene is changed. Where two lines or nodes
-        share the largest value, a derivative is that for a number that rises, and ``left`` that for one that falls.
+        In statics one solution with the factorization of the equilibrium, its adjoint, gives the derivatives of a
+        result by all numbers. They are those of the law as it is: exact, and with ± from the residuals of the
+        equilibrium and of the adjoint, from rounding, and from differences where a number of the scene is changed.
+
+        In dynamics the run and its step-refinement run are repeated by central differences, and the derivative of each
+        step, with its contacts, goes beside it; it gives those of all results by one number. ± is from the difference
+        of both, as that of a result. The largest value of a run has the derivative at its time.
+
+        Where two lines or nodes share the largest value, a derivative is that for a number that rises, and ``left``
+        that for one that falls.
 
         Parameters
         ----------
         result : str
             Name of a result: a tension, stress, strain, displacement, position, reaction of nodes, distance, mouth,
-            energy, a number of a thread, or the turn of a body. Forces on bodies, overlaps and shares are refused.
+            energy, a number of a thread, or the turn of a body. In statics forces on bodies, overlaps and shares are
+            refused, in dynamics means over a window, and what is summed over steps, as work.
         path : str
-            Any number of the scene by its path, such as ``cable.area`` or ``load.0.force.2``. By line or group
-            ``cable.modulus``, ``cable.area``, ``cable.density``, ``cable.prestrain`` or ``natural_length`` of each: the
-            others, natural lengths among them, stay as they are. ``force``: the forces on each node; ``position``: the
-            positions of each support, which moves as by ``[[motion]]``, so that natural lengths stay as they are and
-            displacements count from the web as built. The path ``web.points.0.2`` moves a point as built.
+            Any number of the scene by its path, such as ``cable.area`` or ``load.0.force.2``. In statics, by line or
+            group, ``cable.modulus``, ``cable.area``, ``cable.density``, ``cable.prestrain`` or ``natural_length`` of
+            each: the others, natural lengths among them, stay as they are. In statics also ``force``: the forces on
+            each node; ``position``: the positions of each support, which moves as by ``[[motion]]``, so that natural
+            lengths stay as they are and displacements count from the web as built. The path ``web.points.0.2`` moves a
+            point as built.
         by : {"line", "group", "node"}, optional
-            Entries of the gradient; by default one number of the scene, or nodes.
+            Entries of the gradient in statics; by default one number of the scene, or nodes.
 
         Returns
         -------
@@ -187,19 +196,26 @@ class Solution(SolutionData):
         Raises
         ------
         InputError
-            For a result or path that there is none of, dynamics, lines that have yielded and turned back, a result that
-            depends on parts without stiffness, and a kink: a line that is neither slack nor taut, or between yielding
-            and not, or a size that is 0.
+            For a result or path that there is none of. In statics for lines that have yielded and turned back, a result
+            that depends on parts without stiffness, and a kink: a line that is neither slack nor taut, or between
+            yielding and not, or a size that is 0. In dynamics for methods other than central differences, effects that
+            have no derivative, and results behind the time at which the run and its step refinement have no digit in
+            common, where motion is chaotic.
 
         Examples
         --------
         >>> solution.gradient("max_stress", "cable.area")  # doctest: +SKIP
         """
-        from .statics.gradients import Gradients
+        return self.gradients.gradient(result, path, by)
 
-        if "_gradients" not in self.__dict__:
-            self._gradients = Gradients(self)
-        return self._gradients.gradient(result, path, by)
+    @cached_property
+    def gradients(self) -> Any:
+        """The gradients of this solution, see `gradient`: those of `refweb.statics` or `refweb.dynamics`."""
+        if self.scene.solve.kind == "static":
+            from .statics.gradients import Gradients
+        else:
+            from .dynamics.gradients import Gradients
+        return Gradients(self)
 
     def to_pandas(self, what: str = "history") -> DataFrame:
         """Results or history as a table of pandas, which is to be installed.

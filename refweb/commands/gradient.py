@@ -1,4 +1,4 @@
-"""Compute how results of statics and frequencies change with numbers of a scene: gradients, by line as a picture."""
+"""Compute how results and frequencies change with numbers of a scene: gradients, in statics by line as a picture."""
 
 from ..errors import InputError
 from .arguments import add_json, add_scene, add_values, print_json, scene_of
@@ -14,10 +14,11 @@ def add_arguments(parser):
     parser.add_argument(
         "--of", metavar="RESULT", help="name of a result, or frequency_1 and so on (default: the first of the scene)"
     )
-    text = "a number of the scene, as cable.area or load.0.force.2, or force or position, of each node; repeatable "
-    text += "(default: all, by line cable.area)"
+    text = "a number of the scene, as cable.area or load.0.force.2, in statics also force or position, of each node; "
+    text += "repeatable (default: all, by line cable.area)"
     parser.add_argument("--path", dest="paths", action="append", metavar="PATH", help=text)
-    text = "by each line or group, of cable.modulus, cable.area, cable.density, cable.prestrain or natural_length"
+    text = "in statics by each line or group, of cable.modulus, cable.area, cable.density, cable.prestrain or "
+    text += "natural_length"
     parser.add_argument("--by", choices=["line", "group"], help=text)
     text = "a picture of the web to write, with the lines coloured by the gradient by line of the first PATH"
     parser.add_argument("--picture", metavar="FILE", help=text)
@@ -33,11 +34,9 @@ def run(arguments):
     names = [o.name for o in scene.observables]
     result = names[0] if arguments.of is None else arguments.of
     number = _mode(result, names)
-    if scene.solve.kind != "static" and number is None:
-        raise InputError(
-            f'[solve] kind = "{scene.solve.kind}" must be "static": gradients are those of equilibria, or of '
-            "frequency_1 and so on"
-        )
+    moves = scene.solve.kind == "dynamic" and number is None
+    if moves and (arguments.by or arguments.picture):
+        raise InputError('gradients by line or group, and their picture, need [solve] kind = "static"')
     paths = arguments.paths or (["cable.area"] if arguments.by else numbers_of(scene.to_dict()))
     if arguments.picture:
         from ..pictures.pictures import target
@@ -46,6 +45,8 @@ def run(arguments):
     with followed(not arguments.json) as tell:
         solution = _solved(scene, number, tell)
     gradients, refused = [], []
+    if moves:
+        paths, refused = _followed(solution, result, paths, bool(arguments.paths))
     for path in paths:
         try:
             gradients.append(solution.gradient(result, path, arguments.by))
@@ -76,7 +77,7 @@ def _mode(result, names):
 
 
 def _solved(scene, number, tell):
-    """The modes of a scene up to one behind a number, or its equilibrium where there is none."""
+    """The modes of a scene up to one behind a number; its run where there is no number."""
     if number is None:
         from ..runner import run
 
@@ -86,6 +87,19 @@ def _solved(scene, number, tell):
     if number >= MAX_MODES:
         raise InputError(f"frequency_{number} must be at most frequency_{MAX_MODES - 1}")
     return modes(scene, number + 1, progress=tell)
+
+
+def _followed(solution, result, paths, asked):
+    """(Paths with gradients in dynamics, texts of those without), from one pass; refuses a path that is asked for."""
+    from ..dynamics.parameters import FIXED
+
+    refused = {}
+    if not asked:
+        paths = [path for path in paths if path.partition(".")[0] not in FIXED]
+    solution.gradients.refuse(result)
+    solution.gradients.follow(paths, None if asked else refused)
+    texts = [text for path, text in refused.items() if not text.startswith(f"{path} = 0 cannot be changed")]
+    return [path for path in paths if path not in refused], texts
 
 
 def _draw(solution, result, path, out):

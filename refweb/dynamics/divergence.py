@@ -73,3 +73,29 @@ def divergence(rows, refined):
             behind = np.flatnonzero(means >= LOST)
             return Divergence(float(rate), float(times[-1] * behind[0] / WINDOWS) if len(behind) else np.inf)
     return None
+
+
+def lost_before(times, values, refined, end):
+    """Time from which on two runs have no digit of a quantity in common, up to a time ``end`` [s].
+
+    Parameters
+    ----------
+    times, values, refined : ndarray, shape (rows,)
+        Times of rows [s], and the quantity in both runs.
+    end : float
+        Time of a result [s].
+
+    Returns
+    -------
+    float
+        Infinite if they have one at the end, or if there are too few rows.
+    """
+    size = np.abs(values).max(initial=0.0)
+    if len(times) < WINDOWS or not size > 0.0:
+        return np.inf
+    part = np.minimum((times / times[-1] * WINDOWS).astype(int), WINDOWS - 1)
+    off = np.bincount(part, (values - refined) ** 2, WINDOWS) / np.maximum(np.bincount(part, minlength=WINDOWS), 1)
+    last = min(int(end / times[-1] * WINDOWS), WINDOWS - 1)
+    common = np.flatnonzero(np.sqrt(off[: last + 1]) < LOST * size)
+    first = common[-1] + 1 if len(common) else 0
+    return float(times[-1] * first / WINDOWS) if first <= last else np.inf

@@ -278,7 +278,7 @@ class Gradients:
         one_sided = (abs(right - left) > 2.0 * error + 1e-9 * np.abs(every).max(initial=0.0)).any()
         of_result = self._unit(result)
         unit = f"{of_result} per {unit}" if unit else of_result
-        number = None if by else _number_at(self._given, path)
+        number = None if by else number_at(self._given, path)
         gradient = Gradient(result, path, by, names, right, error, left if one_sided else None, unit, number)
         return replace(gradient, equal=self._equal(result))
 
@@ -419,7 +419,7 @@ class Gradients:
     def _of_number(self, solved, path):
         """Solve as `_by_number`, by the multipliers of responses of some results."""
         given = self._given
-        number = _number_at(given, path)
+        number = number_at(given, path)
         if number is None:
             raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(given))}")
         size = abs(number) or self._size_beside(given, path)
@@ -449,7 +449,7 @@ class Gradients:
     def _size_beside(self, given, path):
         """Size by which a number that is 0 is changed: that of its list, else 1."""
         head, _, last = path.rpartition(".")
-        beside = [_number_at(given, f"{head}.{k}") for k in range(10)] if last.isdecimal() else []
+        beside = [number_at(given, f"{head}.{k}") for k in range(10)] if last.isdecimal() else []
         return max([abs(number) for number in beside if number is not None], default=0.0) or 1.0
 
     def _differences(self, solved, path, number, step):
@@ -507,7 +507,7 @@ def _with_error(parts):
     return value, error + 8.0 * np.finfo(float).eps * np.abs(value)
 
 
-def _number_at(given, path):
+def number_at(given, path):
     """The number at a path in the dict of a scene, None where there is none."""
     inner: Any = given
     for key in path.split("."):

@@ -73,6 +73,8 @@ class CentralDifference(Integrator):
     ----------
     model : refweb.dynamics.integrators.records.Model
         The system as the compiled loop sees it.
+    breath : int, optional
+        Number of steps after which the loop returns for ``on_progress``; by default some tenths of a second.
 
     Raises
     ------
@@ -82,7 +84,7 @@ class CentralDifference(Integrator):
 
     method, order, stretch = "central-difference", 2, 1.0
     knob, retry, beside, follows_lines = "safety", 0.5, True, True
-    on_progress = staticmethod(lambda t: None)
+    on_progress, breath = staticmethod(lambda t: None), None
     variants = {"central-difference": Variant(kind="splitting")}
     kicks, drifts = np.array([0.5, 0.5]), np.array([1.0])
 
@@ -215,6 +217,11 @@ class CentralDifference(Integrator):
         course.force += change
 
     @property
+    def step(self) -> float:
+        """Size of the last step of the course that it advances [s]."""
+        return self._kept[1].clock[0]["step"].item()
+
+    @property
     def _keys(self) -> dict:
         return dict(safety=self.safety, step_size=self.step_size)
 
@@ -267,7 +274,7 @@ class CentralDifference(Integrator):
         times = np.atleast_1d(np.asarray(times, dtype=float))
         history = self._history.like(len(times))
         work = len(self.drifts) * sum(len(term.cells) for term in self.system.terms)
-        done, breath = 0, max(BREATH // max(work, 1), 1)
+        done, breath = 0, self.breath or max(BREATH // max(work, 1), 1)
         running, workspace = self._records(course)
         records = self._scheme, self.model, self._observed, running, workspace
         clock = running.clock

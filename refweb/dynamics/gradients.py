@@ -1,0 +1,290 @@
+"""Gradients of results of dynamics by numbers of the scene, with ±, by the tangent of central differences.
+
+The run is repeated with the same steps, and derivatives of its motion go beside it, see
+`refweb.dynamics.integrators.tangent`; `refweb.dynamics.parameters` has what a number changes. A result at the end, or
+at the time t* of its largest value, has the derivative of its value there: dJ/dp = ∂J/∂x δx + ∂J/∂v δv + ∂J/∂p. t*
+changes as well, but J is stationary there.
+
+± is the difference from the gradient of the step-refinement run, with the factors of the results themselves, see
+`refweb.dynamics.twin_error`. At a kink of the force, of a first contact or a line that snaps taut, derivatives have
+errors of order 1 in the step, which may agree by chance; so ± takes the differences at all times before as well.
+
+From the time on at which run and step refinement have no digit of a result in common, it has no gradient, see
+`refweb.dynamics.divergence`. `solution.gradient` and `commands.gradient` are its faces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, SolverError
+from ..messages import nearest, quote, short
+from ..registry import load
+from ..results.observables.fuel import Fuel
+from ..results.observables.slack_fraction import SlackFraction
+from ..statics.gradients import BY_LINE, Gradient
+from .divergence import divergence, lost_before
+from .history import SPREAD
+from .integrators.tangent import Steps, Tangent
+from .parameters import Parameter
+from .responses import Instant, between, rates_of, slopes_of
+from .schedule import blocks, times_of
+from .simulation import Simulation
+from .twin_error import largest_mean
+
+SAMPLES = 32
+"""Largest number of times at which gradients of run and step refinement are compared."""
+LEAST = 1e-7
+"""± over the size of a gradient that differences of data and of values may leave."""
+AMPLIFIED = 10.0
+"""± of a gradient without a digit, over the size of the result over that of the number, from which on it is refused:
+a hundredth of the number changes a tenth of the result, one way or the other."""
+PATHWISE = ("dissipated_energy", "work", "winch_energy", "rupture_energy", "plastic_energy", "step_size")
+"""Quantities that are summed over steps."""
+SUPPORTED = (
+    "lines of laws without memory, loads, gravity, frame, orbit, pressure, thrust, damping, bending, drag, motion, "
+    "reels whose mass stays, temperature, threads over nodes, bodies whose orientation does not count, and contact"
+)
+"""Text of what gradients take."""
+
+
+class Plain(NamedTuple):
+    """A run without derivatives: results without errors, rows as of `Watch.compared`, and its end."""
+
+    results: dict[str, Any]
+    rows: np.ndarray
+    nsteps: int
+    time: float
+    stopped: bool
+
+
+class Gradients:
+    """Gradients of the results of a dynamic solution.
+
+    Parameters
+    ----------
+    solution : refweb.Solution
+        The solution.
+
+    Raises
+    ------
+    InputError
+        For methods other than central differences, and effects and starts without derivatives.
+    """
+
+    def __init__(self, solution):
+        scene, method = solution.scene, solution.solver["method"] or solution.scene.solve.method
+        if method != "central-difference":
+            raise InputError(
+                f'[solve] method = "{method}": gradients of dynamics follow the steps of central differences: use '
+                '"central-difference"'
+            )
+        scene = scene.replace(solve=replace(scene.solve, method=method))
+        system = scene.build()
+        _refuse(scene, system, solution)
+        self._simulation = Simulation(scene, system, load("refweb.solution:Solution")(scene))
+        self._observed, self._known = {o.name: o for o in scene.observables}, {}
+        self._simulation.settle(lambda text, share: None)
+        integrator = self._simulation.integrator
+        self._methods = integrator, integrator.refined()
+        try:
+            self._runs = tuple(map(self._plain, self._methods))
+        except SolverError as error:
+            raise InputError(f"gradients follow the steps of the scene, which end: {error}") from None
+        if self._runs[0].nsteps != solution.solver["nsteps"]:
+            raise InputError(
+                f"gradients follow the steps of the scene, {self._runs[0].nsteps}, but the run was repeated with "
+                f"{solution.solver['nsteps']}: set [solve] safety so low that no run is repeated, without digits"
+            )
+
+    def _plain(self, integrator):
+        """The `Plain` run of a method."""
+        simulation, rows = self._simulation, []
+        course = integrator.start(*simulation.begin.motion)
+        for block in blocks(integrator, course, simulation.schedule):
+            table = simulation.watch.table(block.compared)
+            rows.append(simulation.watch.compared(table))
+        results = simulation.watch.results(course, table[-1])
+        return Plain(results, np.concatenate(rows), course.nsteps, course.time, course.stopped)
+
+    def gradient(self, result, path, by=None):
+        """The `refweb.statics.gradients.Gradient` of a result, see `refweb.Solution.gradient`."""
+        if by is not None:
+            raise InputError(f"by = {quote(by)} is of statics: in dynamics name one number of the scene")
+        observe = self.refuse(result)
+        self.follow([path])
+        number, by_name = self._known[path]
+        value, left, error, times, errors = by_name[result]
+        size, moved = abs(self._runs[0].results[result].value), abs(number.number) or number.size
+        limit = max(abs(value), AMPLIFIED * size / moved)
+        if size > 0.0 and error > limit:
+            lost = times[errors > limit].min(initial=self._runs[0].results[result].time)
+            raise InputError(
+                f"the derivative of {result} by {path} is {value:.3g} ± {error:.1g}; behind the horizon, {lost:.4g} "
+                "s, it has no digit, since small motions are chaotic, as of slack lines without damping, even where "
+                "large ones are not: take a result of an earlier time, add damping, or vary the number by refweb sweep"
+            )
+        unit = f"{observe.unit} per {BY_LINE[path]}" if path in BY_LINE else observe.unit
+        arrays = [None if part is None else np.array([part]) for part in (value, error, left)]
+        return Gradient(result, path, "", ("",), *arrays, unit, number.number)
+
+    def refuse(self, result):
+        """Refuse a result without a gradient, and one behind the horizon; return its `refweb.Observe`."""
+        if result not in self._observed:
+            raise InputError(f'result "{short(result)}" is none of this scene, {nearest(result, self._observed)}')
+        observe = self._observed[result]
+        name, (first, _) = f'gradient of "{observe.name}"', self._runs
+        if not _is_smooth(observe):
+            why = "means over a window" if observe.average is not None else f'quantity = "{observe.quantity}"'
+            raise InputError(
+                f"{name}: {why} have none in dynamics: take values of an instant, such as tensions, energies"
+            )
+        time = first.results[observe.name].time
+        if time >= (horizon := self.horizon(result)):
+            raise InputError(
+                f"{name}: its time, {time:.4g} s, is behind the horizon, {horizon:.4g} s, from which on the run and "
+                "its step refinement have no digit of it in common: take a result of an earlier time, smaller steps "
+                "where these are to blame, or, where the motion is chaotic, refweb trust and an ensemble"
+            )
+        if first.stopped and time >= first.time:
+            raise InputError(
+                f"{name}: an event ends the run at its time, which changes with the number: leave out stop"
+            )
+        return observe
+
+    def horizon(self, result):
+        """Time from which on a result has no gradient [s], infinite if there is none."""
+        first, finer = (run.rows for run in self._runs)
+        chaos, count = divergence(first, finer), min(len(first), len(finer))
+        column = 1 + list(self._observed).index(result)
+        end = self._runs[0].results[result].time
+        known = lost_before(first[:count, 0], first[:count, column], finer[:count, column], end)
+        return known if chaos is None else min(known, chaos.lost)
+
+    def follow(self, paths, refused=None):
+        """Find the gradients of all results by some paths, in one run and its step refinement.
+
+        Paths that are refused are errors, or get their reasons in the dict ``refused``.
+        """
+        simulation, numbers = self._simulation, []
+        scene, system = simulation.scene, simulation.system
+        equilibrium = simulation.begin.x if scene.solve.start == "equilibrium" else None
+        for path in dict.fromkeys(paths):
+            try:
+                numbers += [] if path in self._known else [Parameter(scene, system, path, equilibrium)]
+            except InputError as error:
+                if refused is None:
+                    raise
+                refused[path] = str(error)
+        if not numbers:
+            return
+        first, finer = (
+            self._linear(method, run, numbers) for method, run in zip(self._methods, self._runs, strict=True)
+        )
+        factor = SPREAD / (1.0 - (self._runs[0].nsteps / self._runs[1].nsteps) ** 2)
+        every = {name: _with_errors(name, first, finer, factor, self._runs[0].results) for name in first.slopes}
+        for n, number in enumerate(numbers):
+            by_name = {
+                name: tuple(part if part is None else part[n] for part in parts) for name, parts in every.items()
+            }
+            self._known[number.path] = number, by_name
+
+    def _linear(self, integrator, run, numbers):
+        """The `Linear` run of a method."""
+        simulation, observed = self._simulation, [o for o in self._observed.values() if _is_smooth(o)]
+        system, schedule = simulation.system, simulation.schedule
+        times = times_of(schedule, 0.0, 0, len(schedule.times))
+        ends = times[(times > 0.0) & (times <= run.time)]
+        sampled = set(ends[np.linspace(0, len(ends) - 1, min(len(ends), SAMPLES)).astype(int)].tolist())
+        results = {o.name: run.results[o.name] for o in observed}
+        waiting = sorted({*sampled, *(result.time for result in results.values())})
+        steps = Steps(integrator, simulation.begin.motion)
+        course, linear = steps.course, Linear([], {name: [] for name in results}, {})
+        tangent = Tangent(integrator, numbers, 0.0, course.x, course.v, course.force)
+
+        def instant():
+            inverse = integrator.model.inertia.inverse
+            return Instant(course.x, course.v, inverse * course.force, tangent.x, tangent.v, tangent.a).copied()
+
+        def error_of(name):
+            return abs(self._runs[0].results[name].value - self._runs[1].results[name].value) * SPREAD
+
+        def record(time, now):
+            rates = rates_of(observed, numbers, system, time, now)
+            if time in sampled:
+                linear.times.append(time)
+            for o in observed:
+                if time in sampled:
+                    linear.rows[o.name].append(slopes_of(o, *rates[o.name], 0.0).value)
+                if time == results[o.name].time:
+                    linear.slopes[o.name] = slopes_of(o, *rates[o.name], error_of(o.name))
+
+        def on_step(t, h):
+            tangent.step(t, h, course.x, course.v, course.force)
+            now = instant()
+            while waiting and waiting[0] <= t:
+                time = waiting.pop(0)
+                record(time, now if time == t else between(1.0 - (t - time) / h, h, before[0], now))
+            before[0] = now
+
+        before = [instant()]
+        while waiting and waiting[0] <= 0.0:
+            record(waiting.pop(0), before[0])
+        steps.follow(times, on_step)
+        for time in waiting:  # that of the end, but for rounding
+            record(time, before[0])
+        return linear
+
+
+class Linear(NamedTuple):
+    """Derivatives of a run: at times (k,), rows by name (k, numbers), and `Slopes` of results by name."""
+
+    times: list[float]
+    rows: dict[str, list[np.ndarray]]
+    slopes: dict[str, Any]
+
+
+def _with_errors(name, first, finer, factor, results):
+    """(Value, left or None, ±, times, ± there) of a result by some numbers, each a list of as many."""
+    slopes, others, end = first.slopes[name], finer.slopes[name], results[name].time
+    count = min(len(first.times), len(finer.times))
+    times, rows, beside = (np.array(part[:count]) for part in (first.times, first.rows[name], finer.rows[name]))
+    apart = np.maximum(np.abs(slopes.value - others.value), np.abs(slopes.left - others.left))
+    if count:
+        apart = np.maximum(apart, [largest_mean(times, column, end) for column in np.abs(rows - beside).T])
+    one_sided = (slopes.left != slopes.value).any()
+    spread = 0.0 if one_sided else slopes.spread
+    error = factor * apart + spread + LEAST * np.maximum(np.abs(slopes.value), np.abs(slopes.left))
+    errors = factor * np.abs(rows - beside)[times <= end].T
+    return slopes.value, slopes.left if one_sided else None, error, [times[times <= end]] * len(errors), errors
+
+
+def _is_smooth(observe):
+    """Tell if an observable is one of an instant that has derivatives."""
+    counted = observe.quantity in PATHWISE or isinstance(observe.observable, (Fuel, SlackFraction))
+    return observe.average is None and not counted
+
+
+def _refuse(scene, system, solution):
+    """Refuse effects and starts without derivatives; the message has what gradients take."""
+    net = system.net
+    refused = [
+        ("[rupture]", system.weakness is not None),
+        ("[[control]] and commands", bool(scene.control or solution.commands)),
+        (
+            "lines or threads with a memory, as those that yield, creep, slip or are wound",
+            bool(net.internal or net.wound),
+        ),
+        ('[[reel]] mass = "follows"', bool(net.flows)),
+        ("threads over bodies", any(thread.wraps for thread in net.threads)),
+        ("bodies whose orientation counts", any(body.turn is not None for body in net.bodies)),
+        ("[[attach]]", bool(system.carried.any())),
+        (f'[solve] start = "{short(str(scene.solve.start))}"', scene.solve.start not in ("web", "equilibrium")),
+    ]
+    for term in system.terms:
+        refused.append((f"[{term.name}] of so many pairs of lines", term.contact.finder is not None))
+    if names := [name for name, stands in refused if stands]:
+        raise InputError(f"gradients of dynamics take no {names[0]}; they take {SUPPORTED}")

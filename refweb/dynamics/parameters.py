@@ -1,0 +1,208 @@
+"""Numbers of a scene as parameters of its motion: what changes with them in the equations of motion, by differences.
+
+A scene is built with two other values of a number, at a path such as ``cable.area``. All that differs in these systems
+has a derivative: data of the cells of each term, masses, prescribed motion and the start. Data are smooth in a number,
+forces may have kinks in them. So the step is so small that data change by `CHANGE`, and forces, at the state of the
+motion, are differences of order 2 of those terms alone whose data differ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..messages import nearest, quote
+from ..reference.paths import with_value
+from ..statics.gradients import number_at, numbers_of
+from ..system.static_system import at_rest
+
+CHANGE = 3e-7
+"""Largest relative change of data by a step: its square and rounding over it leave errors of 1e-9 of a derivative."""
+PROBED, SHRINKS, TRIES = 1e-3, 100.0, 3
+"""First step over the size of a number, ratio of further steps where a value is refused, number of steps."""
+FIXED = ("schema", "title", "seed", "solve", "output", "accuracy", "observe", "event")
+"""Tables whose numbers are none of the motion."""
+
+
+class Parameter:
+    """A number of a scene.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        Dynamic scene with its stiffness of contact.
+    system : refweb.system.system.System
+        Its system.
+    path : str
+        Path of the number.
+    equilibrium : ndarray, shape (rows, 3), optional
+        Displacement of the equilibrium that the run starts from [m]; by default it starts as built.
+
+    Attributes
+    ----------
+    number : float
+        Its value.
+    size : float
+        Its size; of a number that is 0 that of those beside it, else 1.
+    step : float
+        Its change in the ``systems``.
+    systems : tuple of refweb.system.system.System
+        Systems with a value below and above.
+    start : ndarray, shape (2, rows, 3)
+        Derivatives of displacement and velocity at the start.
+
+    Raises
+    ------
+    InputError
+        For a path without a number, one of `FIXED`, a number that cannot be changed to both sides, and one that changes
+        the net itself or times at which steps end.
+    """
+
+    def __init__(self, scene, system, path, equilibrium=None):
+        self.path, self._scene, self._system, self._given = path, scene, system, scene.to_dict()
+        number = number_at(self._given, path)
+        if path.partition(".")[0] in FIXED:
+            raise InputError(f"path {quote(path)} is no number of the motion: it sets what is computed of it, or how")
+        if number is None:
+            raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(self._given))}")
+        self.number, self.size = number, abs(number) or self._size_beside()
+        self.step, self.systems = self._changed()
+        low, high = self.systems
+        self.start = (_start_of(high) - _start_of(low)) / (2.0 * self.step)
+        if equilibrium is not None:
+            self.start[0] = self._moved(equilibrium)
+        self._differing = [n for n, pair in enumerate(zip(low.terms, high.terms, strict=True)) if _differ(*pair)]
+        if _relative(low.net.line_data.matrix, high.net.line_data.matrix) or _tables(low) != _tables(high):
+            over = [n for n, term in enumerate(system.terms) if term.over_lines]
+            self._differing = sorted({*self._differing, *over})
+        self._lighter = self._inverse_of(high) - self._inverse_of(low)
+        self._outs = system.per_cell()
+
+    def _size_beside(self):
+        head, _, last = self.path.rpartition(".")
+        beside = [number_at(self._given, f"{head}.{k}") for k in range(10)] if last.isdecimal() else []
+        return max([abs(number) for number in beside if number is not None], default=0.0) or 1.0
+
+    def _changed(self):
+        """(Step, systems) for a change of data by `CHANGE`."""
+        for tried in range(TRIES):
+            step = PROBED * self.size / SHRINKS**tried
+            try:
+                systems = self._built(step)
+                change = max(_change(*systems), CHANGE)
+                return (
+                    (step, systems)
+                    if change == CHANGE
+                    else (step * CHANGE / change, self._built(step * CHANGE / change))
+                )
+            except InputError as error:
+                refused = error
+        raise InputError(f"{self.path} = {self.number:g} cannot be changed to both sides: {refused}")
+
+    def _built(self, step):
+        """Systems with the number less and more a step."""
+        systems = tuple(self.system_at(self.number + sign * step) for sign in (-1.0, 1.0))
+        for changed in systems:
+            if not _same_net(changed, self._system):
+                raise InputError(f"{self.path} changes the net itself, and has no gradient")
+            if not np.array_equal(changed.corners, self._system.corners):
+                raise InputError(f"{self.path} changes times at which steps end, and has no gradient")
+        return systems
+
+    def system_at(self, value):
+        """The system with another value of the number."""
+        scene = type(self._scene).from_dict(with_value(self._given, self.path, float(value)), self._scene.folder)
+        return scene.build()
+
+    def _moved(self, x):
+        """Derivative of the displacement x of an equilibrium, K⁻¹ ∂f/∂p, shape (rows, 3)."""
+        from ..statics.adjoint import Adjoint
+
+        rest, low, high = (at_rest(system) for system in (self._system, *self.systems))
+        change = (high.force(0.0, x) - low.force(0.0, x)) / (2.0 * self.step)
+        try:
+            if not rest.symmetric or rest.drives:
+                raise InputError("it has loads that follow it, or motion")
+            return Adjoint(rest, 0.0, x).multipliers(np.where(rest.supported, 0.0, change))[0]
+        except InputError as error:
+            raise InputError(
+                f"the equilibrium that the run starts from has no derivative by {self.path}: {error}"
+            ) from None
+
+    def _inverse_of(self, system):
+        """Inverse masses, 0 where a row is without one, shape (rows, 1)."""
+        mass = system.net.mass
+        return np.where(mass > 0.0, 1.0 / np.where(mass > 0.0, mass, 1.0), 0.0)[:, None]
+
+    def add_rate(self, t, x, v, f, inverse, rate):
+        """Add ∂(M⁻¹f)/∂p at a state with the force f to ``rate``, all of shape (rows, 3)."""
+        if self._lighter.any():
+            rate += np.where(inverse > 0.0, self._lighter / (2.0 * self.step), 0.0) * f
+        if self._differing:
+            by_side = []
+            for system in self.systems:
+                force = np.zeros_like(x)
+                for n in self._differing:
+                    term = system.terms[n]
+                    term.force(t, x, v, force, term.cells, system.data_of(term, t), self._outs[n])
+                by_side.append(force)
+            rate += inverse * ((by_side[1] - by_side[0]) / (2.0 * self.step))
+
+    def driven(self, t, h, rows):
+        """Derivatives of positions at t, and of velocities in the step h before, of rows with prescribed motion."""
+        ends = []
+        for system in self.systems:
+            x, v, aside = (np.zeros((system.rows, 3)) for _ in range(3))
+            system.drive(t, x)
+            system.drive(t - 0.5 * h, aside, v)
+            ends.append((x[rows], v[rows]))
+        (x_low, v_low), (x_high, v_high) = ends
+        return (x_high - x_low) / (2.0 * self.step), (v_high - v_low) / (2.0 * self.step)
+
+
+def _start_of(system):
+    """Displacement and velocity at the start of an integrator, shape (2, rows, 3)."""
+    x = np.zeros((system.rows, 3)) if system.laid is None else system.laid.copy()
+    v = system.initial_velocity()
+    v[system.supported] = 0.0
+    system.drive(0.0, x, v)
+    return np.array([x, v])
+
+
+def _same_net(first, second):
+    """Tell if two systems have the same rows, unknowns and cells, so that their states can be compared."""
+    same = first.rows == second.rows and np.array_equal(first.free, second.free)
+    same = same and [term.name for term in first.terms] == [term.name for term in second.terms]
+    return same and all(np.array_equal(a.cells, b.cells) for a, b in zip(first.terms, second.terms, strict=True))
+
+
+def _relative(low, high):
+    """Largest change of the columns of two arrays over the size of each."""
+    if np.shape(low) != np.shape(high):
+        return np.inf
+    low, high = (np.nan_to_num(np.reshape(part, (len(part), -1)), posinf=0.0, neginf=0.0) for part in (low, high))
+    size = np.maximum(np.abs(low), np.abs(high)).max(axis=0, initial=0.0)
+    change = np.abs(high - low).max(axis=0, initial=0.0)
+    return float(np.max(change / np.where(size > 0.0, size, 1.0), initial=0.0))
+
+
+def _tables(system):
+    """Tables of the factors of natural lengths."""
+    return [table for _, table in system.net.factors]
+
+
+def _differ(low, high):
+    """Tell if two terms may have different forces."""
+    return (
+        low.force is not high.force or low.data is not None and not np.array_equal(low.data, high.data, equal_nan=True)
+    )
+
+
+def _change(low, high):
+    """Largest relative change of what two systems are."""
+    pairs = [(low.net.line_data.matrix, high.net.line_data.matrix), (low.net.mass[:, None], high.net.mass[:, None])]
+    pairs += [(a.data, b.data) for a, b in zip(low.terms, high.terms, strict=True) if a.data is not None]
+    pairs += [(a.data, b.data) for a, b in zip(low.drives, high.drives, strict=True)]
+    pairs += list(zip(_start_of(low), _start_of(high), strict=True))
+    pairs += [(np.array(a), np.array(b)) for a, b in zip(_tables(low), _tables(high), strict=True)]
+    return max(_relative(*pair) for pair in pairs if len(pair[0]))

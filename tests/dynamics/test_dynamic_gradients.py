@@ -1,0 +1,491 @@
+"""Gradients of dynamics: closed forms, Taylor remainders, variational equations, ± that covers, refusals."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import refweb
+from refweb.__main__ import main
+from refweb.errors import InputError
+from refweb.reference.paths import with_value
+
+POINTS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.4, 0.45, 0], [0.6, 0.55, 0]]
+LINES = [[0, 4], [3, 4], [1, 5], [2, 5], [4, 5]]
+PRESSED = (
+    refweb.Body(
+        name="ball", shape="sphere", radius=0.3, mass=0.5, position=(0.5, 0.5, 0.28), velocity=(0.1, 0.2, -0.5)
+    ),
+    refweb.Contact(stiffness=300.0),
+    refweb.Gravity(acceleration=(0.0, 0.0, -30.0)),
+)
+"""A ball that presses on the middle of the net from the start on."""
+OBSERVE = [
+    refweb.Observe(name="moved", quantity="displacement", node=4),
+    refweb.Observe(name="speed", quantity="velocity", node=5, component="z"),
+    refweb.Observe(name="place", quantity="position", node=5, component="x"),
+    refweb.Observe(name="tension", quantity="tension", line=0),
+    refweb.Observe(name="stress", quantity="stress", line=3),
+    refweb.Observe(name="strain", quantity="strain", line=2),
+    refweb.Observe(name="reaction", quantity="reaction", node=[0, 1], component="z"),
+    refweb.Observe(name="apart", quantity="distance", node=[4, 5]),
+    refweb.Observe(name="moving", quantity="kinetic_energy"),
+    refweb.Observe(name="stored", quantity="strain_energy"),
+]
+LAWS = {
+    "tension-only": {},
+    "smooth": dict(slackness=1e-3, smoothing=2e-3),
+    "linear": {},
+    "table": dict(modulus=None, stress=[(0.0, 0.0), (0.02, 4e4), (0.1, 4e5)]),
+}
+
+
+def net(law="tension-only", effects=(), observe=(), cable=None, **solve):
+    """Two nodes of a plane net in tension that swing for 0.1 s, by steps of one size."""
+    given = dict(law=law, modulus=4e6, area=1e-5, density=500.0, prestrain=0.05, subdivide=2)
+    given |= LAWS[law] | (cable or {})
+    masses = refweb.PointMass(node=[4, 5], mass=0.1), refweb.Velocity(node=[4], value=(0.4, -0.3, 0.8))
+    return refweb.Scene(
+        web=refweb.Inline(points=POINTS, lines=LINES, supports=[0, 1, 2, 3]),
+        cable=refweb.Cable(**given),
+        effects=(*masses, *effects),
+        observe=[*OBSERVE, *observe],
+        solve=refweb.Dynamic(**{"duration": 0.1, "step_size": 2e-4, **solve}),
+        output=refweb.Output(interval=2e-3),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+
+
+def again(scene, path, number):
+    """The solution with another number at a path."""
+    return refweb.run(refweb.Scene.from_dict(with_value(scene.to_dict(), path, number), scene.folder), progress=False)
+
+
+CASES = [  # law, effects, paths
+    ("tension-only", (), ["cable.modulus", "cable.area", "cable.prestrain", "web.points.4.1", "velocity.0.value.2"]),
+    ("smooth", (), ["cable.density", "cable.smoothing", "point_mass.0.mass"]),
+    ("linear", (refweb.Damping(time=2e-3),), ["damping.time", "cable.modulus", "cable.density"]),
+    ("table", (refweb.Load(node=[5], force=(0.0, 1.0, 2.0)),), ["load.0.force.2", "cable.area", "cable.prestrain"]),
+    ("smooth", PRESSED, ["body.0.mass", "body.0.velocity.1", "contact.stiffness"]),
+    (
+        "tension-only",
+        (refweb.Drag(density=1000.0, normal=2.0, tangential=0.1, diameter=0.02),),
+        ["drag.normal", "cable.area"],
+    ),
+    ("linear", (refweb.Frame(angular_velocity=(0.0, 0.0, 3.0)),), ["frame.angular_velocity.2", "point_mass.0.mass"]),
+    (
+        "linear",
+        (refweb.Motion(node=[0], displacement=[(0.0, 0.0, 0.0, 0.0), (0.07, 0.0, 0.02, -0.05)]),),
+        ["motion.0.displacement.1.3"],
+    ),
+    ("linear", (refweb.Reel(lines=[0], factor=[(0.0, 1.0), (0.2, 0.97)]),), ["reel.0.factor.1.1", "cable.area"]),
+]
+
+
+@pytest.mark.parametrize(("law", "effects", "paths"), CASES, ids=[f"{law}-{paths[0]}" for law, _, paths in CASES])
+def test_taylor_remainders(law, effects, paths):
+    """|J(p + h) − J(p) − h dJ/dp| falls as h² of each result: the slope is 2 unless rounding is left."""
+    observe = (
+        [refweb.Observe(name="height", quantity="position", body="ball", component="z")] if effects == PRESSED else []
+    )
+    scene = net(law, effects, observe)
+    solution = refweb.run(scene, progress=False)
+    solution.gradients.follow(paths)
+    for path in paths:
+        gradients = {name: solution.gradient(name, path) for name in solution.results}
+        number = gradients["moved"].number
+        left = {name: [] for name in gradients}
+        for step in (4e-4, 2e-4):
+            step *= abs(number) or 0.1
+            changed = again(scene, path, number + step).results
+            for name, gradient in gradients.items():
+                value = solution.results[name].value
+                left[name].append(abs(changed[name].value - value - step * float(gradient)))
+        for name, (wide, narrow) in left.items():
+            small = 3e-12 * max(abs(solution.results[name].value), 1e-3)  # rounding of 500 steps, in both runs
+            small += 1e-8 * step * abs(float(gradients[name]))  # that of differences of data and of values
+            assert narrow < small or 1.8 < np.log2(wide / narrow) < 2.3, (path, name, wide, narrow)
+
+
+def spring(mass=0.5, speed=0.3, duration=1.3, **solve):
+    """A mass on one line with a stiffness of 10 N/m, which it pulls at the start."""
+    return refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
+        cable=refweb.Cable(law="linear", modulus=1e6, area=1e-5, density=0.0),
+        effects=(refweb.PointMass(node=[1], mass=mass), refweb.Velocity(node=[1], value=(speed, 0.0, 0.0))),
+        observe=[
+            refweb.Observe(name="x", quantity="displacement", node=1, component="x"),
+            refweb.Observe(name="top", quantity="tension", reduce="max"),
+            refweb.Observe(name="energy", quantity="total_energy"),
+        ],
+        solve=refweb.Dynamic(duration=duration, **solve),
+        output=refweb.Output(interval=0.02),
+    )
+
+
+def test_oscillator():
+    """x = v0 sin(ωt)/ω: its derivatives by k, m and v0, and those of the largest tension v0 √(km), lie within ±."""
+    k, m, v, t = 10.0, 0.5, 0.3, 1.3
+    w = np.sqrt(k / m)
+    by_w = v * (t * np.cos(w * t) / w - np.sin(w * t) / w**2)
+    exact = {
+        ("x", "cable.modulus"): by_w * 0.5 * w / k * 1e-5,
+        ("x", "point_mass.0.mass"): -by_w * 0.5 * w / m,
+        ("x", "velocity.0.value.0"): np.sin(w * t) / w,
+        ("top", "cable.modulus"): 0.5 * v * np.sqrt(m / k) * 1e-5,
+        ("top", "velocity.0.value.0"): np.sqrt(k * m),
+        ("top", "point_mass.0.mass"): 0.5 * v * np.sqrt(k / m),
+        ("energy", "velocity.0.value.0"): m * v,
+        ("energy", "cable.modulus"): 0.0,
+    }
+    coarse, fine = (refweb.run(spring(step_size=step), progress=False) for step in (4e-3, 2e-3))
+    for (result, path), value in exact.items():
+        off = []
+        for solution in (coarse, fine):
+            gradient = solution.gradient(result, path)
+            off.append(abs(float(gradient) - value))
+            assert off[-1] <= gradient.error[0], (result, path)
+        if result == "x":  # the method has order 2
+            assert 3.5 < off[0] / off[1] < 4.5
+    assert coarse.gradient("top", "cable.modulus").unit == "N per Pa"
+
+
+def test_a_start_at_equilibrium():
+    """A mass that hangs on a spring and is struck: z = −m g/k + v0 sin(ωt)/ω, with the change of its rest."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [0, 0, -1]], lines=[[0, 1]], supports=[0]),
+        cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-5, density=0.0),
+        effects=(
+            refweb.PointMass(node=[1], mass=0.05),
+            refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
+            refweb.Velocity(node=[1], value=(0.0, 0.0, -0.1)),
+        ),
+        observe=[refweb.Observe(name="z", quantity="displacement", node=1, component="z")],
+        solve=refweb.Dynamic(duration=0.5, step_size=1e-3, start="equilibrium"),
+        output=refweb.Output(interval=0.01),
+    )
+    solution = refweb.run(scene, progress=False)
+    k, m, g, v, t = 10.0, 0.05, 9.81, -0.1, 0.5
+    w = np.sqrt(k / m)
+    by_w = v * (t * np.cos(w * t) / w - np.sin(w * t) / w**2)
+    exact = {
+        "cable.modulus": 1e-5 * (m * g / k**2 + by_w * 0.5 * w / k),
+        "point_mass.0.mass": -g / k - by_w * 0.5 * w / m,
+        "gravity.acceleration.2": m / k,
+        "velocity.0.value.2": np.sin(w * t) / w,
+    }
+    for path, value in exact.items():
+        gradient = solution.gradient("z", path)
+        assert abs(float(gradient) - value) <= gradient.error[0] <= 0.01 * abs(value), path
+
+
+def test_a_ball_that_falls_on_one_spring():
+    """A ball that meets what is fixed has the largest force v √(km): derivatives F/v, F/2m and F/2k."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1]),
+        cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=1000.0),
+        effects=(
+            refweb.Body(
+                name="ball", shape="sphere", radius=0.1, mass=0.5, position=(0.5, 0, 0.11), velocity=(0, 0, -2)
+            ),
+            refweb.Contact(stiffness=1e3),
+        ),
+        observe=[refweb.Observe(name="force", quantity="reaction", body="ball", reduce="max")],
+        solve=refweb.Dynamic(duration=0.05, safety=0.02),
+        output=refweb.Output(interval=2e-3),
+    )
+    solution = refweb.run(scene, progress=False)
+    force = solution.results["force"]
+    for path, share in (("body.0.velocity.2", 1.0), ("body.0.mass", 0.5), ("contact.stiffness", 0.5)):
+        gradient = solution.gradient("force", path)
+        exact = share * force.value / gradient.number
+        assert abs(float(gradient) - exact) <= gradient.error[0] + abs(exact) * force.error / force.value
+        assert gradient.error[0] < 0.05 * abs(exact)
+
+
+def on_a_rail(duration, step, contact, velocity, height, observe):
+    """A ball on one line whose ends are held, under gravity."""
+    return refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [3, 0, 0]], lines=[[0, 1]], supports=[0, 1]),
+        cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=1000.0),
+        effects=(
+            refweb.Body(
+                name="ball", shape="sphere", radius=0.1, mass=0.5, position=(0.5, 0, height), velocity=velocity
+            ),
+            contact,
+            refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
+        ),
+        observe=[refweb.Observe(name="place", quantity="position", body="ball", component=axis) for axis in observe],
+        solve=refweb.Dynamic(duration=duration, step_size=step),
+        output=refweb.Output(interval=5e-3),
+    )
+
+
+@pytest.mark.parametrize("duration", [0.1, 0.4], ids=["sliding", "rolling"])
+def test_friction(duration):
+    """A ball slides until it rolls: x'' = −μ g q, slip u' = −μ g (1 + m a²/I) q, q = u/√(u² + v_s²), as in scipy."""
+    friction, speed, slow, g, stiffness = 0.2, 1.0, 0.05, 9.81, 1e5
+    lever = 0.1 - 0.5 * g / stiffness
+    faster = 1.0 + lever**2 / (0.4 * 0.1**2)
+
+    def rate(t, y):
+        """x, v, u, and their derivatives by μ and by the first speed."""
+        x, v, u, *moves = y
+        parts = []
+        for du, by in ((0.0, 0.0), (moves[2], 1.0), (moves[5], 0.0)):
+            slip, rub = u + 1e-30j * du, friction + 1e-30j * by
+            parts.append(-rub * g * slip / np.sqrt(slip**2 + slow**2))
+        slopes = [v, parts[0].real, faster * parts[0].real]
+        for n in (1, 2):
+            change = parts[n].imag / 1e-30
+            slopes += [moves[3 * n - 2], change, faster * change]
+        return slopes
+
+    start = [0.0, speed, speed, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]
+    end = solve_ivp(rate, (0.0, duration), start, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    if duration == 0.1:  # with no slip velocity −½ g t² and t
+        assert end[3] == pytest.approx(-0.5 * g * duration**2, rel=0.01) and end[6] == pytest.approx(duration, rel=0.01)
+    off = []
+    for step in (8e-4, 4e-4):
+        contact = refweb.Contact(stiffness=stiffness, friction=friction, slip_velocity=slow)
+        solution = refweb.run(on_a_rail(duration, step, contact, (speed, 0.0, 0.0), lever, "x"), progress=False)
+        solution.gradients.follow(["contact.friction", "body.0.velocity.0"])
+        off.append([])
+        for path, exact in (("contact.friction", end[3]), ("body.0.velocity.0", end[6])):
+            gradient = solution.gradient("place", path)
+            off[-1].append(abs(float(gradient) - exact))
+            assert off[-1][-1] <= gradient.error[0] + 1e-8
+    assert 3.0 < np.linalg.norm(off[0]) / np.linalg.norm(off[1]) < 5.0
+
+
+def test_damping_of_contact():
+    """A ball that falls on m z'' = k δ max(1 + d δ', 0) − m g, beside its variational equation in scipy: order 2."""
+    k, d, m, g, end = 2e3, 0.3, 0.5, 9.81, 0.06
+
+    def rate(t, y):
+        """z, z' and their derivatives by d; the ball starts in touch and stays there."""
+        (z, v), moves = y[:2], y[2:]
+
+        def force(z, v, d):
+            return k * (0.1 - z) * (1.0 - d * v) / m - g
+
+        change = force(z + 1e-30j * moves[0], v + 1e-30j * moves[1], d + 1e-30j).imag / 1e-30
+        return [v, force(z, v, d), moves[1], change]
+
+    exact = solve_ivp(rate, (0.0, end), [0.1 - 1e-9, -0.5, 0.0, 0.0], rtol=1e-10, atol=1e-13).y[:, -1]
+    assert exact[0] < 0.1
+    off = []
+    for step in (4e-4, 2e-4):
+        contact = refweb.Contact(stiffness=k, damping=d)
+        solution = refweb.run(on_a_rail(end, step, contact, (0.0, 0.0, -0.5), 0.1 - 1e-9, "z"), progress=False)
+        gradient = solution.gradient("place", "contact.damping")
+        off.append(abs(float(gradient) - exact[2]))
+        assert off[-1] <= gradient.error[0]
+    assert 3.0 < off[0] / off[1] < 5.0
+
+
+def test_variational_equations():
+    """Two masses in space on damped lines under gravity, beside their variational equations in scipy: order 2."""
+    points, lines = np.array([[0.0, 0, 0], [1, 0, 0], [1.6, 0.5, 0]]), [(0, 1), (1, 2)]
+    lengths = [np.linalg.norm(points[j] - points[i]) for i, j in lines]
+    ea, tau, m, start = 40.0, 2e-3, np.array([0.3, 0.2]), [0.2, 0.5, -0.3]
+
+    def force(x, v, ea):
+        pulls, at, speed = np.zeros((3, 3), dtype=complex), points + 0j, np.zeros((3, 3), dtype=complex)
+        at[1:], speed[1:] = at[1:] + x.reshape(2, 3), v.reshape(2, 3)
+        for (i, j), length in zip(lines, lengths, strict=True):
+            d = at[j] - at[i]
+            size = np.sqrt((d * d).sum())
+            rate = (d * (speed[j] - speed[i])).sum() / size / length
+            pull = ea * (size / length - 1.0 + tau * rate) * d / size
+            pulls[i], pulls[j] = pulls[i] + pull, pulls[j] - pull
+        return ((pulls[1:] + m[:, None] * [0.0, 0.0, -9.81]) / m[:, None]).ravel()
+
+    def rate(t, y):
+        """x, v and δx, δv by EA and by the first speed; the directions are those of a complex step."""
+        x, v, *moves = y.reshape(6, 6)
+        parts = [v, force(x, v, ea).real]
+        for (dx, dv), by in zip((moves[:2], moves[2:]), (1.0, 0.0), strict=True):
+            parts += [dv, force(x + 1e-30j * dx, v + 1e-30j * dv, ea + 1e-30j * by).imag / 1e-30]
+        return np.concatenate(parts)
+
+    y = np.zeros((6, 6))
+    y[1, 3:], y[5, 3] = start, 1.0
+    end = solve_ivp(rate, (0.0, 0.6), y.ravel(), method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1].reshape(6, 6)
+    scene = refweb.Scene(
+        web=refweb.Inline(points=points.tolist(), lines=lines, supports=[0]),
+        cable=refweb.Cable(law="linear", modulus=ea / 1e-4, area=1e-4, density=0.0),
+        effects=(
+            *(refweb.PointMass(node=[n + 1], mass=float(m[n])) for n in range(2)),
+            refweb.Velocity(node=[2], value=tuple(start)),
+            refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
+            refweb.Damping(time=tau),
+        ),
+        observe=[
+            refweb.Observe(name=f"{quantity} {axis}", quantity=quantity, node=2, component=axis)
+            for quantity in ("displacement", "velocity")
+            for axis in "xyz"
+        ],
+        solve=refweb.Dynamic(duration=0.6, step_size=1e-3),
+        output=refweb.Output(interval=0.02),
+    )
+    off = []
+    for step in (8e-4, 4e-4):
+        solution = refweb.run(scene.replace(solve=replace(scene.solve, step_size=step)), progress=False)
+        solution.gradients.follow(["cable.area", "velocity.0.value.0"])
+        off.append([])
+        for row, name in enumerate(("displacement", "velocity")):
+            for k, axis in enumerate("xyz"):
+                for first, path, scale in ((2, "cable.area", ea / 1e-4), (4, "velocity.0.value.0", 1.0)):
+                    gradient, exact = solution.gradient(f"{name} {axis}", path), scale * end[first + row, 3 + k]
+                    off[-1].append(abs(float(gradient) - exact) / scale)
+                    assert abs(float(gradient) - exact) <= gradient.error[0]
+    assert 3.5 < np.linalg.norm(off[0]) / np.linalg.norm(off[1]) < 4.5
+
+
+def test_one_sided_where_lines_share_the_largest_value():
+    """A mass between two equal lines that falls straight: moved to a side, one line or the other is the tighter."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[-1, 0, 0], [1, 0, 0], [0, 0, 0]], lines=[[0, 2], [1, 2]], supports=[0, 1]),
+        cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-6, density=1000.0),
+        effects=(
+            refweb.PointMass(node=[2], mass=0.1),
+            refweb.Velocity(node=[2], value=(0.0, 0.0, -1.0)),
+            refweb.Load(node=[2], force=(0.0, 0.0, -1.0)),
+        ),
+        observe=[refweb.Observe(name="top", quantity="tension", reduce="max")],
+        solve=refweb.Dynamic(duration=0.5, safety=0.1),
+        output=refweb.Output(interval=5e-3),
+    )
+    solution = refweb.run(scene, progress=False)
+    aside, down = solution.gradient("top", "load.0.force.0"), solution.gradient("top", "load.0.force.2")
+    assert down.left is None and float(down) < 0.0
+    assert float(aside) > 0.0 and aside.left[0] == pytest.approx(-float(aside))  # by symmetry
+    gained = again(scene, "load.0.force.0", 1e-4).results["top"].value - solution.results["top"].value
+    assert gained == pytest.approx(1e-4 * float(aside), rel=0.02)  # the second order of a large sag
+
+
+def chain(duration):
+    """Three masses on soft lines that whirl about each other, which is chaotic."""
+    return refweb.Scene(
+        web=refweb.Inline(points=[[n, 0, 0] for n in range(4)], lines=[[n, n + 1] for n in range(3)], supports=[0]),
+        cable=refweb.Cable(law="linear", modulus=1e6, area=2e-4, density=0.0),
+        effects=(
+            refweb.PointMass(node=[1, 2, 3], mass=1.0),
+            refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
+        ),
+        observe=[
+            refweb.Observe(name="x", quantity="position", node=3, component="x"),
+        ],
+        solve=refweb.Dynamic(duration=duration, safety=0.5),
+        output=refweb.Output(interval=0.05),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+
+
+def test_beyond_the_horizon():
+    """A chaotic motion has no gradient at its end; the refusal names the time behind which there is none."""
+    solution = refweb.run(chain(20.0), progress=False)
+    horizon = solution.gradients.horizon("x")
+    assert 4.0 < horizon < 16.0
+    with pytest.raises(InputError, match=rf'"x": its time, 20 s, is behind the horizon, {horizon:.4g} s, '):
+        solution.gradient("x", "gravity.acceleration.2")
+    before = refweb.run(chain(2.0), progress=False)
+    assert before.gradients.horizon("x") == np.inf
+    gradient, step = before.gradient("x", "gravity.acceleration.2"), 1e-4
+    ends = [again(chain(2.0), "gravity.acceleration.2", -9.81 + sign * step).results["x"].value for sign in (-1, 1)]
+    assert abs((ends[1] - ends[0]) / (2.0 * step) - float(gradient)) <= min(
+        gradient.error[0], 1e-5 * abs(float(gradient))
+    )
+
+
+REFUSED = [
+    (
+        dict(solve=dict(method="cvode", step_size=None)),
+        'method = "cvode": gradients of dynamics follow the steps of central',
+    ),
+    (dict(cable=dict(strength=1e9), effects=(refweb.Rupture(),)), "take no .rupture.; they take lines"),
+    (dict(cable=dict(viscous=refweb.Viscous(arms=[[0.2, 0.1]]))), "take no lines or threads with a memory"),
+]
+
+
+@pytest.mark.parametrize(("keys", "text"), REFUSED, ids=[text[:30] for _, text in REFUSED])
+def test_refused(keys, text):
+    """What has no derivative is refused by name, with the list of what gradients take."""
+    keys = dict(keys)
+    solution = refweb.run(net(duration=4e-3, **keys.pop("solve", {}), **keys), progress=False)
+    with pytest.raises(InputError, match=text):
+        solution.gradient("moved", "cable.area")
+
+
+def test_wrong_names(tmp_path):
+    """Results, paths and entries that there are not; means and sums over steps; times at which steps end."""
+    load = refweb.Load(node=[4], force=(1.0, 0.0, 0.0), factor=[(0.0, 0.0), (0.003, 1.0)])
+    more = [
+        refweb.Observe(name="mean", quantity="velocity", average=1e-3),
+        refweb.Observe(name="given", quantity="work"),
+        refweb.Observe(name="slack", quantity="slack_fraction"),
+    ]
+    solution = refweb.run(net(effects=(load,), observe=more, duration=6e-3), progress=False)
+    for result, path, by, text in (
+        ("mouved", "cable.area", None, 'result "mouved" is none of this scene, did you mean "moved"'),
+        ("moved", "cable.aera", None, 'path "cable.aera" is no number of this scene, did you mean "cable.area"'),
+        ("moved", "cable.area", "line", 'by = "line" is of statics'),
+        ("mean", "cable.area", None, "means over a window have none"),
+        ("given", "cable.area", None, 'quantity = "work" have none'),
+        ("slack", "cable.area", None, 'quantity = "slack_fraction" have none'),
+        ("moved", "solve.duration", None, "is no number of the motion"),
+        ("moved", "load.0.factor.1.0", None, "changes times at which steps end"),
+        ("moved", "cable.subdivide", None, "cannot be changed to both sides"),
+    ):
+        with pytest.raises(InputError, match=text):
+            solution.gradient(result, path, by)
+
+
+def test_command(tmp_path, capsys):
+    """The table of all numbers, JSON of one, and refusals, at the command line."""
+    import tomli_w
+
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps(spring(duration=0.2).to_dict()), encoding="utf-8")
+    assert main(["gradient", str(path), "--of", "top"]) in (0, None)
+    shown = capsys.readouterr().out
+    assert "gradient of top" in shown and "velocity.0.value.0" in shown and "cable.modulus" in shown
+    assert main(["gradient", str(path), "--of", "x", "--path", "velocity.0.value.0", "--json"]) in (0, None)
+    (entry,) = json.loads(capsys.readouterr().out)
+    w = np.sqrt(20.0)
+    assert abs(entry["value"][0] - np.sin(0.2 * w) / w) <= entry["error"][0]
+    assert main(["gradient", str(path), "--by", "line"]) == 2
+    assert 'need [solve] kind = "static"' in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_errors_cover():
+    """± holds the gradient of a run of a fifth of the steps in 97 % of impacts on nets, damped and not."""
+    draw, inside, count = np.random.default_rng(5), 0, 0
+    paths = ["cable.area", "body.0.mass", "body.0.velocity.2", "contact.stiffness", "cable.prestrain"]
+    for number in range(10):
+        ball = refweb.Body(
+            name="ball",
+            shape="sphere",
+            radius=0.15,
+            mass=float(draw.uniform(0.2, 1.0)),
+            position=(*draw.uniform(0.4, 0.6, 2).tolist(), 0.16),
+            velocity=(*draw.uniform(-0.2, 0.2, 2).tolist(), float(draw.uniform(-2.0, -0.5))),
+        )
+        effects = [ball, refweb.Contact(stiffness=float(draw.uniform(300.0, 900.0)))]
+        effects += [refweb.Damping(time=2e-3)] if number % 2 else []
+        scene = net(("tension-only", "smooth", "linear")[number % 3], effects, step_size=None, safety=0.3)
+        scene = scene.replace(observe=[*scene.observe, refweb.Observe(name="force", quantity="reaction", body="ball")])
+        fine = scene.replace(solve=replace(scene.solve, safety=0.06))
+        pair = [refweb.run(changed, progress=False) for changed in (scene, fine)]
+        for solution in pair:
+            solution.gradients.follow(paths)
+        for path in paths:
+            for name in pair[0].results:
+                first, last = (solution.gradient(name, path) for solution in pair)
+                inside += abs(float(first) - float(last)) <= first.error[0]
+                count += 1
+    assert count > 300 and inside >= 0.97 * count
