@@ -745,7 +745,7 @@ MUTANTS = [
     # Dynamics, its books and its ±
     Mutant("dynamics/integrators/simpson_balance", "np.where(self._supported, 0.0, v)", "v"),
     Mutant("dynamics/integrators/simpson_balance", "s - 1.5 * s**2 + s**3 / 1.5", "s - 1.5 * s**2 + s**3 / 3.0"),
-    Mutant("dynamics/integrators/simpson_balance", "np.bincount(self._fixed % 3,", "np.bincount(self._fixed // 3 % 3,"),
+    Mutant("dynamics/integrators/simpson_balance", "np.bincount(self._axes,", "np.bincount(self._fixed // 3 % 3,"),
     Mutant("dynamics/integrators/rows", "if inertia.inverse[r, k] > 0.0 else", "if inertia.mass[r] > 0.0 else"),
     Mutant("dynamics/integrators/energy_balance", "DRIFT = 1e-2", "DRIFT = 2e-2"),
     Mutant("dynamics/integrators/energy_balance", "+= (kick * before[d", "+= 2.0 * (kick * before[d"),
