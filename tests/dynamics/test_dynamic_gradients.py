@@ -401,6 +401,23 @@ def test_beyond_the_horizon():
     )
 
 
+def test_slack_lines_are_chaotic():
+    """A ball on slack lines has a height with digits, and a gradient without: it is refused from its horizon on."""
+
+    def pushed(duration):
+        cable = dict(prestrain=-0.01, subdivide=4, modulus=4e7)
+        scene = net(effects=PRESSED, cable=cable, step_size=None, safety=0.4, duration=duration)
+        height = refweb.Observe(name="height", quantity="position", body="ball", component="z")
+        return refweb.run(scene.replace(observe=[height], accuracy=refweb.Accuracy()), progress=False)
+
+    whole = pushed(0.3)
+    assert whole.results["height"].error < 0.01  # of a way of some tenths of a metre
+    with pytest.raises(InputError, match=r"derivative of height by cable.area .* behind the horizon, (0\.[\d]+) s, it"):
+        whole.gradient("height", "cable.area")
+    gradient = pushed(0.02).gradient("height", "body.0.velocity.2")
+    assert 0.015 < float(gradient) < 0.02  # of free flight it is 0.02
+
+
 REFUSED = [
     (
         dict(solve=dict(method="cvode", step_size=None)),
