@@ -83,7 +83,8 @@ def case(quick):
             at, yes = found.values(path), (inside > 0.5) & (closed > 0.5)
             plot.plot(at[yes], covers[yes], ".", label="holds")
             plot.plot(at[~yes], covers[~yes], "x", label="does not")
-        panels[0].legend(frameon=False, fontsize="small")
+        named = panels[0].get_legend_handles_labels()
+        page.legend(*named, loc="outside upper right", ncols=2, frameon=False, fontsize="small")
         return page
 
     figures = [Figure("What is covered at the end, by what varies [m, m, rad/s, m/s].", drawn)]
