@@ -14,8 +14,9 @@ are compared and no numbers.
 
 Envisat counts as caught if, at the end, its centre is in the convex hull of the net, and the mouth between the
 satellites has at most a tenth of its largest area. Each run has a step refinement: both statements are true or false
-where their margins, a depth and an area, exceed ±, and else undecided. The area at first touch is that of the convex
-hull of the net's nodes, seen along the approach, where a line first touches the body.
+where their margins, a depth and an area, exceed ±, and else undecided; where they are, the run is made again with
+shorter steps. The area at first touch is that of the convex hull of the net's nodes, seen along the approach, where a
+line first touches the body.
 
 The controls are held against a program of their own: the satellites alone, without net and target, by
 
@@ -54,6 +55,10 @@ MASS, LIMIT, PERIOD, MOTION = 100.0, 120.0, 0.1, np.sqrt(3.986004418e14 / (63781
 """Mass [kg], largest thrust [N], period [s] and mean motion [rad/s] of the satellites."""
 
 
+SAFETIES = (0.5, 0.2)
+"""Shares of the bound of the step; the second is taken where ± of the first leaves a capture undecided."""
+
+
 def scene(law, attitude=ATTITUDES["array across"], spin=STILL, error="none", **keys):
     """The shipped scene under a law; with ``error="twin"`` it has a step-refinement run."""
     given = refweb.Scene.load("four-satellites")
@@ -65,8 +70,8 @@ def scene(law, attitude=ATTITUDES["array across"], spin=STILL, error="none", **k
     return given.replace(effects=effects, control=control, accuracy=refweb.Accuracy(error=error), **keys)
 
 
-def caught(task):
-    """Numbers of a (law, attitude, spin), a dict.
+def caught(task, safeties=SAFETIES):
+    """Numbers of a (law, attitude, spin), a dict, with the first of some step sizes that decides the statement.
 
     ``held`` is True, False or None, ``drawn`` what the run itself has; ``depth`` of the centre in the hull [m] and
     ``spent``, Δv of each satellite [m/s], are pairs of a value and its ±. A run without an answer has not caught it.
@@ -77,12 +82,16 @@ def caught(task):
     first = refweb.run(given.replace(event=[replace(touch, stop=True)], throw=None), progress=None)
     net = first.state.system.net
     area = ConvexHull(first.state.position[: net.nodes, :2]).volume if first.events[0]["time"] else np.nan
-    try:
-        run = refweb.run(scene(law, attitude, spin, error="twin"), progress=None)
-    except refweb.SolverError:
-        return dict(held=False, drawn=False, depth=(np.nan, np.nan), spent=[(np.nan, np.nan)] * 4, area=area)
-    flags = [run.throw[name] for name in ("inside", "closed")]
-    values = [flag["value"] for flag in flags]
+    for safety in safeties:
+        try:
+            steps = replace(given.solve, safety=safety)
+            run = refweb.run(scene(law, attitude, spin, error="twin", solve=steps), progress=None)
+        except refweb.SolverError:
+            return dict(held=False, drawn=False, depth=(np.nan, np.nan), spent=[(np.nan, np.nan)] * 4, area=area)
+        flags = [run.throw[name] for name in ("inside", "closed")]
+        values = [flag["value"] for flag in flags]
+        if False in values or None not in values:
+            break
     return dict(
         held=False if False in values else None if None in values else True,
         drawn=all(flag["drawn"] for flag in flags),
