@@ -132,4 +132,6 @@ def test_the_curves_are_drawn(measured):
         one.records.append({"program": "mujoco", "settings": settings, "cpu": 2.0**n, "error": 4.0**-n, "beside": None})
     assert page.points(one, "mujoco") == [(1.0, 1.0), (2.0, 0.25), (4.0, 0.0625)]
     (plot,) = page.drawn([one]).axes
+    one.records.append({"program": "moordyn", "settings": {"steps": 1}, "failure": "x", "beside": None})
+    assert one.chosen("mujoco") is None and one.chosen("moordyn") is None, "errors of 0.06 m are too large"
     assert len(plot.lines) == 1 and len(problem.lines) == 112

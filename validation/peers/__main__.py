@@ -30,6 +30,7 @@ def main(arguments=None):
     parser.add_argument("--limit", type=float, default=300.0, help="longest time of a run [s]")
     parser.add_argument("--quick", action="store_true", help="small nets, short motions and one pair")
     parser.add_argument("--text", type=pathlib.Path, metavar="FILE", help="write the page to a file of its own")
+    parser.add_argument("--no-runs", action="store_true", help="write the page of what is measured, and run nothing")
     parser.add_argument("--list", action="store_true", help="print works and peers, with versions, and stop")
     given = parser.parse_args(arguments)
     for name in given.peers:
@@ -47,12 +48,13 @@ def main(arguments=None):
         print("\n".join(f"{work.name}: {work.title}" for work in known.values()))
         return 0
     given.out.mkdir(parents=True, exist_ok=True)
-    there = [name for name in names if versions[name][0]]
+    there = [name for name in names if versions[name][0]] if not given.no_runs else []
     done = []
     for work in known.values():
         if not given.work or any(work.name.startswith(name) for name in given.work):
-            done.append(compared(work, there, machine, given))
-    if any("start".startswith(name) for name in given.work):
+            found = compared(work, there, machine, given)
+            done += [found] if found.records else []
+    if there and any("start".startswith(name) for name in given.work):
         start.compare(there, given.out, tell)
     print(f"page in {page.write(given.out, done, versions, start.compare((), given.out), given.text)}")
     return 0

@@ -79,7 +79,7 @@ class Comparison:
 
     def chosen(self, name):
         """Settings of a program that cost least of those that reach the target; None where none does."""
-        good = [r for r in self.of(name) if r.get("error", np.inf) <= self.work.target]
+        good = [r for r in self.of(name) if "error" in r and r["error"] <= self.work.target]
         return min(good, key=lambda r: r["cpu"])["settings"] if good else None
 
     def ladder(self, names):

@@ -63,7 +63,7 @@ def equilibrium(problem):
     """The positions under the last load, a `Truth`."""
     found, other = refweb.statics(problem), newton(problem)
     apart = float(np.abs(found - other).max())
-    return Truth(found, apart, "refweb's Newton method with its bound, and a shifted Newton method in NumPy and SciPy")
+    return Truth(other, apart, "a shifted Newton method in NumPy and SciPy, and refweb's with its bound")
 
 
 def verlet(problem, steps):
@@ -82,4 +82,8 @@ def motion(problem, steps=8000):
     """The positions at the end of the motion, a `Truth`."""
     found, other = refweb.impact(problem, steps=2 * steps, method="explicit", order=6), verlet(problem, 2 * steps)
     apart = float(np.abs(found - other).max())
-    return Truth(found, apart, f"refweb's steps of order 6 and the Verlet method in NumPy, {2 * steps} steps each")
+    return Truth(
+        0.5 * (found + other),
+        apart,
+        f"the mean of refweb's steps of order 6 and the Verlet method in NumPy, {2 * steps} steps each",
+    )

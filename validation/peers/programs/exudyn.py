@@ -28,7 +28,7 @@ def system(problem):
     mbs = exu.SystemContainer().AddSystem()
     velocity = np.zeros_like(problem.points)
     velocity[problem.node, 2] = problem.speed
-    moved, nodes, markers = problem.start - problem.points, [], []
+    moved, masses, nodes, markers = problem.start - problem.points, problem.masses, [], []
     for n, (point, free) in enumerate(zip(problem.points, problem.free, strict=True)):
         if free:
             nodes.append(
@@ -36,7 +36,7 @@ def system(problem):
                     NodePoint(referenceCoordinates=point, initialCoordinates=moved[n], initialVelocities=velocity[n])
                 )
             )
-            mbs.AddObject(ObjectMassPoint(mass=problem.masses[n], nodeNumber=nodes[n]))
+            mbs.AddObject(ObjectMassPoint(mass=masses[n], nodeNumber=nodes[n]))
         else:
             nodes.append(mbs.AddNode(NodePointGround(referenceCoordinates=point)))
         markers.append(mbs.AddMarker(MarkerNodePosition(nodeNumber=nodes[n])))

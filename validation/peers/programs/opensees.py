@@ -14,14 +14,15 @@ def net(problem):
     """Nodes stand at the start of a search, so that materials have the strain that lines have there."""
     ops.wipe()
     ops.model("basic", "-ndm", 3, "-ndf", 3)
-    for n, point in enumerate(problem.start.tolist()):
+    start, ends = problem.start, problem.lines.T
+    lengths = np.linalg.norm(start[ends[0]] - start[ends[1]], axis=1).tolist()
+    for n, point in enumerate(start.tolist()):
         ops.node(n, *point)
     for n in problem.supports.tolist():
         ops.fix(n, 1, 1, 1)
-    for c, (i, j) in enumerate(problem.lines.tolist()):
-        length = float(np.linalg.norm(problem.start[i] - problem.start[j]))
-        ops.uniaxialMaterial("Elastic", 2 * c + 1, problem.ea * length / problem.natural[c], 0.0, 0.0)
-        ops.uniaxialMaterial("InitStrainMaterial", 2 * c + 2, 2 * c + 1, 1.0 - problem.natural[c] / length)
+    for c, ((i, j), natural) in enumerate(zip(problem.lines.tolist(), problem.natural.tolist(), strict=True)):
+        ops.uniaxialMaterial("Elastic", 2 * c + 1, problem.ea * lengths[c] / natural, 0.0, 0.0)
+        ops.uniaxialMaterial("InitStrainMaterial", 2 * c + 2, 2 * c + 1, 1.0 - natural / lengths[c])
         ops.element("corotTruss", c, i, j, 1.0, 2 * c + 2)
 
 
