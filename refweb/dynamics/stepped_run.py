@@ -230,7 +230,8 @@ class SteppedRun:
             Time [s], a multiple of ``[output] interval``; by default the time to the next row. Where the duration ends
             before, the run goes to its end.
         budget : float, optional
-            CPU time that it may take [s], looked at some times a second; by default any.
+            CPU time that it may take [s], by default any; explicit methods look at it each ten million steps of an
+            element, others each hundred steps.
 
         Returns
         -------

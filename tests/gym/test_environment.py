@@ -222,6 +222,7 @@ def test_a_run_that_fails_ends_its_episode(task, tables, message):
             raising.step(action)
 
 
+@pytest.mark.ordinary("cvode")
 @pytest.mark.parametrize("method", ["central-difference", "cvode"])
 def test_a_period_has_a_budget(method):
     """A run that is too slow ends its episode with a reason, and the next one can begin; one in time is the same."""
