@@ -98,6 +98,11 @@ def _blocks(done, quick):
         "text",
         "Differences are relative to the reference unless a row says otherwise. ± is refweb's own estimate or bound.",
     )
+    yield (
+        "text",
+        "Times and errors beside those of other programs stand in ``validation/PEERS.md``, which "
+        "``python -m validation.peers`` writes.",
+    )
     yield "result", (_result(done), not any(one.case.failures for one in done))
     yield "part", "Contents"
     yield (

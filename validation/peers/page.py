@@ -16,6 +16,8 @@ from . import runs
 PICTURES = pathlib.Path(__file__).parents[1] / "pictures"
 ENOUGH = 10
 """Pairs from which on a ratio is a claim."""
+BUSY = 1.5
+"""Wall time over CPU time from which on a page says that the machine was busy."""
 INTRODUCTION = """# Beside its peers
 
 `python -m validation.peers` gives one problem as plain arrays to refweb and to other programs, each as its users would
@@ -69,7 +71,7 @@ def write(folder, done, versions, start, target=None):
     picture = folder / "peers.png" if target is None else PICTURES / "peers.png"
     target = target or folder / "peers.md"
     link = os.path.relpath(picture, target.parent).replace(os.sep, "/")
-    parts = [INTRODUCTION.strip(), programs(versions), summary(done)]
+    parts = [INTRODUCTION.strip(), programs(versions), business(done), summary(done)]
     curves = [one for one in done if one.work.name in ("impact-error", "implicit")]
     if any(points(one, name) for one in curves for name in one.settings):
         picture.write_bytes(plots.image(drawn(curves)).png)
@@ -103,6 +105,17 @@ def programs(versions):
         words = " ".join(ast.get_docstring(ast.parse(text)).split())
         rows.append([f"`{name}`", version or f"left out: {reason}", words])
     return f"Machine: {machine()}.\n\n" + table(["program", "version", "set-up"], rows)
+
+
+def business(done):
+    """A note where other programs have used the machine."""
+    shares = [r["wall"] / r["cpu"] for one in done for r in one.records if r.get("cpu", 0.0) > 0.1]
+    if not shares or statistics.median(shares) < BUSY:
+        return ""
+    return (
+        f"The machine had other things to do: wall times are {statistics.median(shares):.1f} times CPU times in the "
+        "median, and CPU times themselves vary by tens of per cent."
+    )
 
 
 def ratio(comparison, name):

@@ -20,7 +20,12 @@ from refweb.reference import glossary, words
 ROOT = Path(__file__).parents[3]
 """Folder of the clone."""
 PICTURES = re.compile(r"validation/pictures/[\w.-]+")
-KNOWN = {"validation/REFERENCE.md": "scene-files.md", "validation/REPORT.md": "validation.md", "CONTRIBUTING.md": ""}
+KNOWN = {
+    "validation/REFERENCE.md": "scene-files.md",
+    "validation/REPORT.md": "validation.md",
+    "validation/PEERS.md": "peers.md",
+    "CONTRIBUTING.md": "",
+}
 """Pages of the site for what the README links to."""
 FIRST = """[Quick start](start.md) · [A net of your own](own-net.md) · [How far can I trust it?](trust.md) ·
 [Scene files](scene-files.md) · [Python](api.md) · [Theory](theory.md) · [Plug-ins](plug-ins.md)"""
@@ -108,6 +113,7 @@ PAGES = {
     "glossary.md": lambda: "# Glossary\n\n" + glossary.as_markdown().partition("\n\n")[2],
     "api.md": api,
     "validation.md": report,
+    "peers.md": lambda: (ROOT / "validation" / "PEERS.md").read_text(encoding="utf-8"),
     "contributing.md": text_of("CONTRIBUTING.md"),
     "changes.md": text_of("CHANGELOG.md"),
     **{f"how-to/{name}.md": (lambda name=name: words.guide(f"own-{name}")) for name in words.HOW_TO},
