@@ -183,7 +183,7 @@ def show_all(i: int, m: int, cells: IndexTable, data: MatrixTable, outs: MatrixT
 def show_some(
     i: int,
     m: int,
-    chosen: Integers,
+    chosen: Indices,
     some: Indices,
     numbers: Matrix,
     cells: IndexTable,
@@ -192,12 +192,10 @@ def show_some(
     stored: VectorTable,
 ) -> None:
     """Take the chosen cells of term i, the m-th that acts nearby, and their numbers into the tables of `SWAP`."""
-    observed, column = outs[2 * len(data) - len(cells) + m], np.empty((chosen.size, 1), dtype=np.int32)
-    for n in range(chosen.size):
-        column[n, 0] = chosen[n]
+    observed = outs[2 * len(data) - len(cells) + m]
     observed[:] = 0.0
-    cells[i], data[i], cells[len(data) + m] = some, numbers, column
-    outs[i], stored[i] = np.zeros((chosen.size, observed.shape[1])), np.zeros(chosen.size)
+    cells[i], data[i], cells[len(data) + m] = some, numbers, chosen
+    outs[i], stored[i] = np.zeros((len(some), observed.shape[1])), np.zeros(len(some))
 
 
 @functools.cache
@@ -214,8 +212,11 @@ def swap_of(near):
             return
         source = 2 * len(data) - len(cells) + m
         touching = np.empty(cells[source].shape[0], dtype=np.int64)
-        chosen = touching[: near(depth, x, cells[source], data[source], touching)]
-        some, numbers = rows_of(chosen, cells[source], data[source])
+        count = near(depth, x, cells[source], data[source], touching)
+        some, numbers = rows_of(touching[:count], cells[source], data[source])
+        chosen = np.empty((count, 1), dtype=np.int32)
+        for n in range(count):
+            chosen[n, 0] = touching[n]
         show_some(i, m, chosen, some, numbers, cells, data, outs, stored)
 
     return swap
@@ -232,7 +233,7 @@ def swap_pairs_of(pairs):
             return
         source = 2 * len(data) - len(cells) + m
         chosen, some, numbers = pairs(depth, x, cells[source], data[source])
-        show_some(i, m, chosen, some, numbers, cells, data, outs, stored)
+        show_some(i, m, chosen.astype(np.int32), some, numbers, cells, data, outs, stored)
 
     return swap
 
