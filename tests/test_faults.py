@@ -396,6 +396,7 @@ def test_a_diagram_is_not_resumed(tmp_path, capsys, interrupted):
     assert "no dynamic run" in capsys.readouterr().err and files(folder) == before
 
 
+@pytest.mark.ordinary("run.json-{")
 @pytest.mark.parametrize("name, content", [("checkpoint.npz", None), ("run.json", b"{")])
 def test_a_spoilt_folder_is_still_drawn(tmp_path, interrupted, name, content):
     """Supports and title are then those that frames and the folder's name tell."""

@@ -347,6 +347,7 @@ print(len([1 for _, e in seen.buffer if e.is_start]), *(one(2.0) for one in many
 """
 
 
+@pytest.mark.ordinary("end-words1-10")
 @pytest.mark.skipif(sys.platform != "linux", reason="no second process there")
 @pytest.mark.skipif(len(getattr(os, "sched_getaffinity", lambda _: [0])(0)) < 2, reason="one core")
 @pytest.mark.parametrize("what, words, most", [("wait", ["alone"], 0), ("end", ["ended", "alone"], 10)])

@@ -141,6 +141,7 @@ def test_order_2_across_periods():
     assert abs(np.polyfit(np.log(steps), np.log(errors), 1)[0] - 2.0) < 0.2  # the light node vibrates near the bound
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("method", ["central-difference", "cvode"])
 def test_a_line_is_reeled_in_at_a_rate(method):
     """A mass that hangs is pulled up by a line that gets shorter at a rate; a tenth of its length later it rests."""
@@ -310,7 +311,7 @@ def test_a_scene_by_name_and_an_equilibrium():
     assert abs(begun.observe("x2") - 2.0 / EA) < 1e-6
 
 
-@pytest.mark.ordinary("central-difference", "cvode")
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("name", STEPS)
 def test_a_restarted_run_is_a_new_one(name):
     """With other loads and velocities, for which the system is used again, with other masses, and as before."""

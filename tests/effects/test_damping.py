@@ -151,7 +151,7 @@ def by_formula(zeta, law, gap, end, slackness=0.0, smoothing=0.0):
     return [*y, tension(y)]
 
 
-@pytest.mark.ordinary("smooth")
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["smooth", "linear"])
 def test_other_laws(law):
     """Of order 2 on the way out and back, and right where the smooth law is at its floor, and the linear one pushes."""

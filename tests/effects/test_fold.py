@@ -40,6 +40,7 @@ def sampled(a, b, c, d):
     return np.sqrt(min(one.fun for one in found))
 
 
+@pytest.mark.slow
 def test_distance_of_segments():
     """By minimization of a convex function, and where lines are parallel, cross or have no length."""
     rng = np.random.default_rng(1)

@@ -87,7 +87,7 @@ def test_lines_are_hardly_deeper_than_what_is_shown(shape, exponent):
     assert 0.99 < largest <= (1.0 if shape == "sphere" else (exponent + 2.0) / (exponent + 1.0)) + 1e-9
 
 
-@pytest.mark.ordinary("sphere")
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", some(SHAPES, 2))
 def test_drifts_that_come_to_the_middle_are_seen(shape):
     """Lines on random straight ways, followed at 40 times and 200 places: none comes there where it is said to stay.

@@ -366,6 +366,7 @@ def test_statics_refuses_a_frame_with_broken_lines(tmp_path):
         refweb.run(pulled(web=web, method="cvode", mass="consistent"))
 
 
+@pytest.mark.ordinary("central-difference-at0")
 @pytest.mark.parametrize("method, at", nets.some([(method, at) for method in METHODS for at in ((), (0.02,))], 3))
 def test_a_line_breaks_once(tmp_path, method, at):
     """A run that starts behind a break has the same line broken, with a [rupture] that names it again or without."""

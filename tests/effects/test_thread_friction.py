@@ -317,6 +317,7 @@ def test_methods_agree(thrown, method):
     np.testing.assert_allclose(energy, energy[0], atol=1e-3 * history["dissipated_energy"][-1])
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("method", ["central-difference", "bdf"])
 def test_a_run_goes_on_with_its_slips(tmp_path, thrown, method):
     """What slips have been and have lost is in the folder of a run, and a run from there continues."""
@@ -347,6 +348,7 @@ def randomly(seed, solve, **tables):
     return scene(points.tolist(), fixed, rope, {"kind": "dynamic", "duration": 0.15, **solve}, masses, **given | tables)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count, least", [(10, 9), pytest.param(100, 97, marks=pytest.mark.slow)])
 def test_random_scenes(count, least):
     """± holds what a tighter run gives, in nearly all, and what is lost only grows."""

@@ -42,6 +42,7 @@ def test_values_are_those_of_numpy(rows):
             assert slope == pytest.approx(steep, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_long_table_is_not_walked_through():
     """Reads of a table of 100 000 rows, wherever the time is: two ends, a bisection, a piece."""
     rows = 100_000

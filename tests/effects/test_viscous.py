@@ -171,7 +171,7 @@ def slack_reference(push, rate, end):
     return solution.y[:, -1]
 
 
-@pytest.mark.ordinary("CentralDifference", "Ida")
+@pytest.mark.ordinary("CentralDifference")
 @pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
 def test_a_slack_line_creeps_back_and_never_pushes(method):
     """A mass that bounces on a rope: its arms relax while it hangs loose, as a program of its own finds."""

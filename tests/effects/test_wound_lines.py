@@ -137,6 +137,7 @@ def test_powers_of_several_lines_beside_a_thread():
     np.testing.assert_allclose(together["z1"], together["z5"], atol=1e-9)
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("method", ["central-difference", "ida"])
 def test_constant_tension(method):
     """m a = T − m g until the speed limit; behind it the load rises at this, and swings about it."""
@@ -279,6 +280,7 @@ def test_a_load_that_a_winch_pulls_in():
         refweb.run(given)
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("method", ["central-difference", "bdf"])
 def test_a_run_goes_on(tmp_path, method):
     """A run that was stopped and resumed is the same, bit for bit, and one from its folder goes on like one run."""

@@ -252,6 +252,7 @@ def test_refusals(tmp_path, capsys, more, words_of_it):
     assert words_of_it in capsys.readouterr().err and not (folder / "sheet.html").exists()
 
 
+@pytest.mark.slow
 def test_a_study_has_no_sheet(tmp_path, capsys):
     refweb.sweep(hanging(), {"cable.modulus": [1e9]}, tmp_path / "study", workers=1, progress=False)
     assert main(["report", str(tmp_path / "study"), "--sheet"]) == 2

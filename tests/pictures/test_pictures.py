@@ -449,6 +449,7 @@ def test_a_mode_swings_about_the_equilibrium(modes):
     assert np.abs(frame.posed(3.0).paths - rest).max() == pytest.approx(3.0 * np.abs(frame.swing).max())
 
 
+@pytest.mark.slow
 def test_a_film_of_a_mode(modes, no_opengl, monkeypatch, tmp_path):
     monkeypatch.setattr(films, "PHASES", 8)
     with Image.open(films.animate(modes, tmp_path / "mode.gif", frame=2)) as gif:

@@ -102,6 +102,7 @@ def test_what_is_refused(one, message):
         square([one]).build()
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("method", ["central-difference", "cvode"])
 def test_angular_momentum_of_all_is_kept(method):
     """Of a net that spins and a ball that passes by, whatever the net does; web and ball are its parts."""

@@ -79,6 +79,7 @@ def test_what_is_compared(found):
     assert all(t.status == "solved" for t in found.trials)
 
 
+@pytest.mark.slow
 def test_references_agree(found):
     """Two kinds of method agree to ten digits on a smooth motion; neither refweb's loop nor scipy can make that up."""
     one, other = found.references

@@ -375,7 +375,7 @@ def test_motion_of_a_cable_that_goes_slack(order, counts, expected):
     assert abs(order_of_motion(order, counts, SLACK) - expected) < 0.25
 
 
-@pytest.mark.ordinary("2-counts1")
+@pytest.mark.slow
 @pytest.mark.parametrize("order, counts", [(1, (80, 160, 320)), (2, (40, 80, 160)), (3, (20, 40, 80))])
 def test_motion_of_a_slack_cable_that_is_pulled_taut(order, counts):
     """Order 1 at best: a jump in strain inside an element, which snaps taut at once and rings behind the front.
