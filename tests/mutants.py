@@ -160,7 +160,7 @@ MIRRORS = {
     "dynamics/history": "dynamics/test_agreement_by_chance.py dynamics/test_dynamics.py results/test_remarks.py "
     "effects/test_plastic.py",
     "dynamics/initial_state": "dynamics/test_starts.py",
-    "dynamics/commands": "dynamics/test_stepped_run.py",
+    "dynamics/commands": "dynamics/test_stepped_run.py effects/test_wound_lines.py",
     "dynamics/stepped_run": "dynamics/test_stepped_run.py",
     "dynamics/controllers": "dynamics/test_control.py dynamics/test_attitude.py",
     "gym": "gym/test_environment.py",
@@ -431,6 +431,7 @@ MUTANTS = [
     Mutant("net/law_keys", 'if curves[line].unit == "N" else 1.0', 'if curves[line].unit == "Pa" else 1.0'),
     Mutant("dynamics/integrators/yielding", "self._turned = True", "self._turned = False"),
     Mutant("dynamics/commands", "course.work[-1] += energy - before[1]", "pass"),
+    Mutant("dynamics/commands", "setdefault(address, (array", "setdefault(id(array), (array"),
     Mutant("dynamics/commands", "course.ledger.given[:] += impulse - before[2]", "pass"),
     Mutant("dynamics/commands", "integrator.renew(course, force - before[0])", "integrator.renew(course, 0.0 * force)"),
     Mutant("dynamics/commands", "last = now + rate * (end - t)", "last = now + rate * end"),

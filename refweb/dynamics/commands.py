@@ -177,8 +177,8 @@ class Inputs:
         self.reset()
         for name, number, effect in changes:
             writes: list[Any] = self._writes(name, self._given[name][number], effect) if name in INPUTS else []
-            for array, numbers in writes:
-                array[...] = numbers
+            for array, part, numbers in writes:
+                array[part] = numbers
             self._given[name][number] = effect
             self._acting[name][number].effect = effect
         self._first.clear()
@@ -223,7 +223,7 @@ class Inputs:
     def apply(self, writes: list[Any], integrator: Integrator, course: IntegratorState) -> None:
         """Write the numbers of checked commands in a run, and keep the balances of the run closed."""
         system, t, x, v = self._system, course.time, course.x, course.v
-        terms = [term for term in system.terms if any(term.data is array for array, _ in writes)]
+        terms = [term for term in system.terms if any(term.data is array for array, *_ in writes)]
         acting = terms if len(terms) == len(writes) else system.terms  # a motion or a length acts on all
         before = self._force_of(acting, t, x, v), *self._booked(terms, t, x)
         self._write(writes)
@@ -252,9 +252,10 @@ class Inputs:
         return energy, impulse
 
     def _write(self, writes):
-        for array, numbers in writes:
-            self._first.setdefault(id(array), (array, array.copy()))
-            array[...] = numbers
+        for array, part, numbers in writes:
+            address = array.__array_interface__["data"][0]  # an array may be a new view at each command
+            self._first.setdefault(address, (array, array.copy()))
+            array[part] = numbers
         self._system.forget_lengths()
 
     def _changed(self, command, t):
@@ -335,7 +336,7 @@ class Inputs:
             raise InputError(f"body = {quote(motion.body)} turns about no axle: angular velocities need one")
 
     def _writes(self, name, given, effect):
-        """[(array, numbers)] of what an effect writes in place of that of the scene."""
+        """[(whole array, part of it, numbers)] of what an effect writes in place of that of the scene."""
         system = self._system
         if name == "body":
             return self._writes_of_torque(given, effect)
@@ -343,17 +344,18 @@ class Inputs:
             return effect.writes(system)
         if name == "reel":
             at = next(i for i, (_, table) in enumerate(system.net.factors) if table is given.factor)
-            return [(system.lengths.tables[at], np.array(flattened(effect.factor)))]
+            return [(system.lengths.tables[at], ..., np.array(flattened(effect.factor)))]
         old = next(parts for acting, parts in system.acting if getattr(acting, "effect", None) is given)
         if name == "load" and effect.body is None:
-            return [(part.data, effect.numbers(part.data)) for part in old]
+            return [(part.data, ..., effect.numbers(part.data)) for part in old]
         new = effect.on(system.net)
         writes = []
         for part, changed in zip(old, new if isinstance(new, list) else [new], strict=True):
             same = np.array_equal(part.cells, changed.cells) and part.data.shape == changed.data.shape
             if not same or isinstance(part, ForceTerm) and part.force is not changed.force:
                 raise InputError("it would change more than numbers, which a command cannot")
-            writes.append((part.data, changed.data))
+            columns = getattr(part, "of_field", ...)  # a winch has other ones
+            writes.append((part.data, columns, changed.data[columns]))
         return writes
 
     def _writes_of_torque(self, given, body):
@@ -361,7 +363,7 @@ class Inputs:
         for term in self._system.terms:
             if term.name == "axle" and term.cells[0, 0] == rigid.spin:
                 table = body.axle.at(body.position).torque
-                return [(term.data, np.array([[*rigid.axle.direction, *flattened(table)]]))]
+                return [(term.data, ..., np.array([[*rigid.axle.direction, *flattened(table)]]))]
         raise InputError(f"body {quote(given.name)} does not turn freely")
 
 

@@ -317,7 +317,7 @@ class Winch(Table):
         return replace(self, **{key: of_table})
 
     def writes(self, system: System) -> list[Any]:
-        """(Array, numbers) of the thread or lines in a system, with the numbers of this winch."""
+        """(Array, part of it, numbers of this winch) of the thread or lines in a system."""
         net, numbers = system.net, self.numbers(system.net.quasi_static)
         lines, others = None if self.lines is None else net.web.find_lines(self.lines), []
         if self.mass == "follows":
@@ -335,7 +335,7 @@ class Winch(Table):
             return [*write_numbers(net, lines, numbers), *others]
         number = next(number for number, thread in system.threads.items() if thread.name == self.thread)
         array = system.terms[number].data
-        return [(array, np.append(array[:, : -len(numbers)], [numbers], axis=1)), *others]
+        return [(array, np.s_[:, -len(numbers) :], numbers), *others]
 
     def settled(self, net: Net, x: Any) -> Any:
         """Displacement of all rows as a run begins from, None as it is given, with what lines have wound."""

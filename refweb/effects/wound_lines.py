@@ -222,12 +222,9 @@ def with_wound(net: Net) -> Net:
 
 
 def write_numbers(net: Net, elements: NDArray[np.int64], numbers: tuple[float, ...]) -> list[Any]:
-    """(Array, numbers) of the line data of a net, with other numbers of the winch of some elements."""
-    at = net.line_data.column(FIRST) + NUMBERS
-    array = net.line_data.matrix[:, at : at + len(numbers)]
-    changed = array.copy()
-    changed[elements] = numbers
-    return [(array, changed)]
+    """(Line data of a net, places of the numbers of the winch of some elements, other ``numbers``)."""
+    columns = net.line_data.column(FIRST) + NUMBERS + np.arange(len(numbers))
+    return [(net.line_data.matrix, np.ix_(elements, columns), numbers)]
 
 
 def elements_of(net: Net) -> NDArray[np.int64]:

@@ -183,6 +183,11 @@ class WoundTerm(ForceTerm):
 
     flow: Any = None
 
+    @property
+    def of_field(self) -> tuple[slice, slice]:
+        """The part of the data that is no number of the winch."""
+        return np.s_[:, -OF_FIELD - OF_NODE * self.cells.shape[1] :]
+
 
 def moving(net: Net) -> NDArray[np.float64]:
     """1 for each row that no body carries, and 0 for the others, shape (rows,)."""
@@ -192,21 +197,19 @@ def moving(net: Net) -> NDArray[np.float64]:
 
 
 def write_numbers(system: System, thread: str | None, lines: Any, numbers: tuple[float, ...]) -> list[Any]:
-    """(Array, numbers) of terms of the mass of a winch on a thread or on lines, with other ``numbers`` of it."""
+    """(Array, part of it, ``numbers``) of terms of the mass of a winch on a thread or on lines."""
     writes = []
     for term in system.terms:
         if not isinstance(term, WoundTerm) or term.flow.thread != thread:
             continue
         if thread is None and not np.array_equal(term.flow.lines, lines):
             continue
-        end = term.data.shape[1] - OF_FIELD - OF_NODE * term.cells.shape[1]
-        changed = term.data.copy()
+        end = term.of_field[1].start
         if thread is None:
             from .wound_lines import FIRST, NUMBERS
 
             end = system.net.line_data.column(FIRST) + NUMBERS + len(numbers)
-        changed[:, end - len(numbers) : end] = numbers
-        writes.append((term.data, changed))
+        writes.append((term.data, np.s_[:, end - len(numbers) : end], numbers))
     return writes
 
 

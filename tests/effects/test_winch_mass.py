@@ -300,6 +300,21 @@ def test_commands(of):
         np.testing.assert_array_equal(one, expected)
 
 
+def test_gravity_leaves_what_a_winch_was_told():
+    """Also where both are set at one row: the weight of what has come has the numbers of both."""
+    tables = {"web": {"kind": "inline", "points": [*LINE, *threads.FAR], "lines": [[2, 3]]}}
+    tables |= {"supports": {"nodes": [0, 2, 3]}, "thread": [{"name": "rope", "nodes": [0, 1], **CABLE}]}
+    of, weight = {"thread": "rope", "end": "first", "mass": "follows"}, [0.0, 0.0, -2.0]
+    run = refweb.start(on_line({"step_size": 1e-4}, winch=[{**of, "speed": 0.1}], **tables))
+    other = on_line({}, winch=[{**of, "speed": 0.4}], **{**tables, "gravity": {"acceleration": weight}})
+    run.set("winch.0.speed", 0.4)
+    run.set("gravity.acceleration", weight)
+    run.advance()
+    numbers = [[term.data for term in system.terms if isinstance(term, WoundTerm)] for system in
+               (run.state.system, other.build())]  # fmt: skip
+    np.testing.assert_array_equal(*numbers)
+
+
 @pytest.mark.parametrize(
     "winch, tables, message",
     [

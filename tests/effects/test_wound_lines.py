@@ -7,6 +7,7 @@ import threads
 from threads import FAR, G
 
 import refweb
+from refweb.effects.wound_lines import SLIP, numbers_in
 
 EA, MASS = 1e5, 2.0
 CABLE = {"law": "tension-only", "modulus": 1e10, "area": 1e-5, "density": 0.0}
@@ -386,6 +387,36 @@ def test_commands():
     run = refweb.start(hanging(BRAKE, {"step_size": 1e-4}))
     with pytest.raises(refweb.InputError, match="tension is not a key of this winch in the scene, which has speed or"):
         run.set("winch.0.tension", 1.0)
+
+
+def test_commands_to_two_winches_and_the_runs_of_their_errors():
+    """Lengths are integrals of the speeds that are set, also where both are set at once; later runs begin as the first.
+
+    One winch has a table, whose numbers are more than those of the other.
+    """
+    points, table = [*HANGING, [5, 0, 0], [5, 0, -3.0]], [[0.0, 0.0], [0.1, 0.0], [0.2, 0.0]]
+    given = scene(
+        points, [[0, 1], [2, 3]], [0, 2], [{"lines": 0, "speed": 0.0}, {"lines": 1, "speed": table}],
+        {"kind": "dynamic", "duration": 0.4}, point_mass=[{"node": node, "mass": MASS} for node in (1, 3)],
+        observe=[{"name": f"z{n}", "quantity": "position", "node": n, "component": "z"} for n in (1, 3)],
+        cable={**CABLE, "modulus": 1e8}, accuracy={"digits": 3}, output={"interval": 0.05},
+    )  # fmt: skip
+    run, speeds = refweb.start(given), np.array([[0.5, 0.3], [0.2, 0.6]])
+    run.advance(0.1)
+    for both, dt in zip(speeds, (0.1, 0.2), strict=True):
+        for n, speed in enumerate(both):
+            run.set(f"winch.{n}.speed", speed)
+        run.advance(dt)
+    wound = numbers_in(run.state.system.net, run.state.x)[:, SLIP]
+    np.testing.assert_allclose(wound, np.array([0.1, 0.2]) @ speeds, rtol=1e-9)
+    solution = run.finish()
+    for name, result in solution.results.items():
+        assert result.value == pytest.approx(run.observe(name), abs=result.error)
+        assert result.error < 1e-3
+        np.testing.assert_array_equal(
+            solution.history[name][:3], run.history[name][:3]
+        )  # nothing has moved until 0.1 s
+    np.testing.assert_allclose(numbers_in(solution.state.system.net, solution.state.x)[:, SLIP], wound, rtol=1e-9)
 
 
 def test_commands_beside_a_reel():
