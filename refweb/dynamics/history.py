@@ -326,7 +326,7 @@ class Watch:
             term.balance.power is not None and not term.dead or changing and term.balance.column == "plastic_energy"
             for term in system.terms
         ]
-        work = bool(system.drives) or changing or any(np.array(path) & (system.working > 0))
+        work = system.works or any(np.array(path) & (system.working > 0))
         return np.array([*path, False, work, False], dtype=float)
 
     def drifts(self, course, twin, time):

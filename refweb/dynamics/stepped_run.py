@@ -209,12 +209,13 @@ class SteppedRun:
         Raises
         ------
         InputError
-            For what cannot be set.
+            For what cannot be set, and for a run that has ended.
         """
         if isinstance(value, np.ndarray):
             value = value.tolist()
         if not isinstance(path, str):
             raise InputError(f"path = {path!r} must be a text, such as load.0.force")
+        self._refuse_ended()
         if (commands := self._schedule.commands) is not None:
             commands.refuse_controlled(path)
         command = Command(self.time, path, value)
@@ -246,8 +247,7 @@ class SteppedRun:
             As `refweb.run`, and for a time that takes more than the budget: the run has to be ended then.
         """
         times = self._schedule.times
-        if self.stopped:
-            raise InputError(f"the run has ended at t = {self.time:.6g} s: start it again, or give a longer duration")
+        self._refuse_ended()
         if dt is None:
             stop = self._row + 1
         else:
@@ -262,6 +262,11 @@ class SteppedRun:
         else:
             self._go_in_time(stop, budget)
         return self.time
+
+    def _refuse_ended(self):
+        """Refuse a run that has ended; `InputError`."""
+        if self.stopped:
+            raise InputError(f"the run has ended at t = {self.time:.6g} s: start it again, or give a longer duration")
 
     def _go_in_time(self, stop, budget):
         """Go on to the row before ``stop`` within a CPU time [s]."""

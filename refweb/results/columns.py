@@ -25,7 +25,7 @@ def static_energies(system):
 def dynamic_energies(system):
     """Names of the energies of a motion."""
     books = dict.fromkeys(term.balance.column for term in system.terms)
-    works = "work" in books or system.drives or system.net.factors
+    works = "work" in books or system.works
     return ["kinetic_energy", *(book for book in books if book != "work"), *(["work"] if works else []), "total_energy"]
 
 

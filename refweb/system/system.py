@@ -355,6 +355,11 @@ class System:
         )
 
     @property
+    def works(self) -> bool:
+        """True where motion, natural lengths that change or material that comes does work, beside the terms."""
+        return bool(self.drives or self.net.factors or self.net.flows)
+
+    @property
     def corners(self) -> NDArray[np.float64]:
         """Times at which a table of time has a corner [s], increasing."""
         times = [t for term in self.terms for t in term.timing.times]

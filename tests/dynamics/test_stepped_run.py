@@ -262,8 +262,10 @@ def test_other_refusals():
     with pytest.raises(InputError, match='did you mean "x2"'):
         run.observe("x22")
     run.advance(9.0)
-    with pytest.raises(InputError, match=r"the run has ended at t = 0.2 s"):
-        run.advance()
+    for ended in (run.advance, lambda: run.set("load.0.force", [0.0, 0.0, 1.0])):
+        with pytest.raises(InputError, match=r"the run has ended at t = 0.2 s"):
+            ended()
+    assert not run.commands
     with pytest.raises(InputError, match="statics has load steps"):
         refweb.start(scene(solve={}).replace(solve=refweb.Static(), output=refweb.Output()))
     with pytest.raises(InputError, match=r"cannot stand beside \[rupture\]"):
@@ -281,6 +283,9 @@ def test_an_event_ends_the_run():
     while not run.stopped:
         run.advance()
     assert run.time < 0.2 and run.observe("x4") >= 0.01
+    with pytest.raises(InputError, match=r"the run has ended at t = 0\.\d+ s: start it again"):
+        run.set("load.1.force", [0.0, 0.0, 0.0])
+    assert run.finish().results["x4"].value == run.observe("x4")
 
 
 def test_a_run_that_is_ended():

@@ -300,6 +300,18 @@ def test_commands(of):
         np.testing.assert_array_equal(one, expected)
 
 
+@pytest.mark.parametrize("method", ["central-difference", "adams"])
+def test_what_material_brings_is_work_where_nothing_else_does_any(method):
+    """A line whose end goes with it: what it has taken up of energy is work and that of the winch."""
+    given = {"gravity": None, "observe": [{"name": "brought", "quantity": "work"}]}
+    run = refweb.run(on_line(STEPS[method], winch=[{"lines": 0, "speed": 0.8, "mass": "follows"}], **given))
+    history, change = run.history, {name: values - values[0] for name, values in run.history.items()}
+    assert np.abs(change["work"]).max() > 1e-3
+    np.testing.assert_array_equal(history["brought"], history["work"])
+    closing = change["total_energy"] - change["work"]
+    np.testing.assert_allclose(closing, 0.0, atol=1e-4 * np.abs(history["total_energy"]).max())
+
+
 def test_gravity_leaves_what_a_winch_was_told():
     """Also where both are set at one row: the weight of what has come has the numbers of both."""
     tables = {"web": {"kind": "inline", "points": [*LINE, *threads.FAR], "lines": [[2, 3]]}}

@@ -189,12 +189,12 @@ class Work(Booked):
 
     def on(self, system: System) -> None:
         """Refuse a scene without such effects, and in statics work that depends on the path."""
-        moved = system.drives or system.net.factors
+        moved = system.works
         if not moved:
             super().on(system)
         loads = [f for f in system.terms if f.balance.column == "work"]
         if system.net.quasi_static and (moved or any(f.energy is None for f in loads)):
-            tables = "[[motion]], [[pressure]], [[thrust]], [[reel]] and [temperature]"
+            tables = "[[motion]], [[pressure]], [[thrust]], [[reel]], [temperature] and mass that follows"
             raise InputError(f'quantity = "work" is not known in statics with {tables}: it depends on the path')
 
 
