@@ -159,7 +159,8 @@ MIRRORS = {
     "dynamics/integrators/tangent": "dynamics/test_dynamic_gradients.py",
     "dynamics/history": "dynamics/test_agreement_by_chance.py dynamics/test_dynamics.py results/test_remarks.py "
     "effects/test_plastic.py",
-    "dynamics/initial_state": "dynamics/test_starts.py",
+    "dynamics/initial_state": "dynamics/test_starts.py dynamics/test_internal_start.py",
+    "dynamics/internal_start": "dynamics/test_internal_start.py",
     "dynamics/commands": "dynamics/test_stepped_run.py",
     "dynamics/stepped_run": "dynamics/test_stepped_run.py",
     "dynamics/controllers": "dynamics/test_control.py dynamics/test_attitude.py",
@@ -774,7 +775,9 @@ MUTANTS = [
     Mutant("dynamics/schedule", "if duration - times[-1] > 1e-9 * interval:", "if duration - times[-1] > interval:"),
     Mutant("dynamics/initial_state", "positions - displacements + x, x", "positions + x, x"),
     Mutant("dynamics/initial_state", "moving = v.copy(), bool(velocities.any())", "moving = v.copy(), True"),
-    Mutant("dynamics/initial_state", "same and title == system.internal_of_lines", "same"),
+    Mutant("dynamics/internal_start", "(alike and title == before)", "alike"),
+    Mutant("dynamics/internal_start", "if before == now:", "if now:"),
+    Mutant("dynamics/initial_state", "x[going_on] = before", "pass"),
     # Checkpoints and folders
     Mutant("dynamics/accuracy_loop", 'int(kept["repeated"])', "0"),
     Mutant("dynamics/accuracy_loop", 'float(kept["drift"])', "np.inf"),

@@ -6,7 +6,6 @@ writes, so that a renamed one breaks folders of users.
 
 from __future__ import annotations
 
-import re
 from typing import NamedTuple
 
 import numpy as np
@@ -174,10 +173,10 @@ def stored(system, folder):
         )
     if "lines" in given and not np.array_equal(given["lines"], net.web.lines):
         raise InputError(f"{name} holds other lines between its nodes than this scene: it must be the same web")
-    _refuse_other_variables(system, given, name)
+    known = _known_variables(system, given, name)
     broken = given.get("broken", np.zeros(0, dtype=np.int64))
     bearings = _bearings(system, given, bodies, name)
-    start = _start_at(system, positions, displacements, velocities, bodies, bearings)
+    start = _start_at(system, positions, displacements, velocities, bodies, bearings, known)
     start = start._replace(broken=broken if len(broken) else None, contact_shares=given.get("contact_shares"))
     _refuse_jumps(system, start.x, name)
     if not velocities.any():  # statics has no steps
@@ -185,22 +184,7 @@ def stored(system, folder):
     x, v = (given.get(f"twin_{key}") for key in ("displacements", "velocities"))
     if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):
         return start, None
-    return start, _start_at(system, positions - displacements + x, x, v, bodies, bearings)
-
-
-def _refuse_other_variables(system, given, name):
-    """Refuse a folder whose lines have internal variables, such as plastic strains, that this scene has not."""
-    names = system.net.internal_names[: system.net.rows_of_elements]
-    of_lines = [i for i, row in enumerate(given["bodies"].tolist()) if re.fullmatch(r"\.\d+\.\d+", str(row))]
-    first = len(given["displacements"]) - len(given["bodies"])
-    same = [given["bodies"][i] for i in of_lines] == names
-    title = str(given.get("internal", "" if not same else system.internal_of_lines))
-    if given["displacements"][[first + i for i in of_lines]].any() and not (same and title == system.internal_of_lines):
-        present = f"those of {system.internal_of_lines}" if names else "none"
-        raise InputError(
-            f"{name} its lines have internal variables{f' of {title}' if title else ''}, such as plastic strains, and "
-            f"lines of this scene have {present}: without them natural lengths would be wrong; take the same law"
-        )
+    return start, _start_at(system, positions - displacements + x, x, v, bodies, bearings, known)
 
 
 def unused_velocities(system, start):
@@ -288,15 +272,28 @@ def _start_turning(body, x, v):
         v[body.row] += np.cross(omega, built - body.offset @ now)
 
 
-def _start_at(system, positions, displacements, velocities, bodies, bearings):
-    """The `Start` of a system from the nodes of a checkpoint and, after them, from the bodies with their names."""
+def _known_variables(system, given, name):
+    """Names of rows of internal variables that go on, see `refweb.dynamics.internal_start`."""
+    if not any(str(row).startswith(".") for row in given["bodies"]):
+        return set()
+    from .internal_start import known_variables
+
+    return known_variables(system, given, name)
+
+
+def _start_at(system, positions, displacements, velocities, bodies, bearings, known):
+    """The `Start` of a system from the nodes of a checkpoint and, after them, from the rows with their names.
+
+    ``known`` are the names of internal variables that go on.
+    """
     net, nodes = system.net, len(positions) - len(bodies)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     names = [*row_names(net.bodies), *net.internal_names]
     row = {str(body): nodes + i for i, body in enumerate(bodies)}
     numbered = zip(names, range(net.nodes, system.rows), strict=True)
     fixed_names = [body.name for body in net.bodies if body.fixed]
-    pairs = [(row_here, row[name]) for name, row_here in numbered if name in row and name not in fixed_names]
+    new = {*fixed_names, *net.internal_names} - known
+    pairs = [(row_here, row[name]) for name, row_here in numbered if name in row and name not in new]
     row_here, rows_there = np.array([*((i, i) for i in range(nodes)), *pairs]).T
     reference = positions - displacements
     same = np.isclose(
@@ -327,4 +324,8 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
         from ..effects.wound_lines import rewind
 
         rewind(net, x)
-    return Start(x if set(net.internal_names) <= set(row) else system.settled(x), v)
+    if not set(net.internal_names) <= known:
+        going_on = [row_here for row_here, _ in pairs if row_here >= system.rows - net.internal]
+        before, x = x[going_on], system.settled(x)
+        x[going_on] = before
+    return Start(x, v)

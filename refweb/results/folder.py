@@ -320,8 +320,10 @@ class Folder:
             names = [*row_names(net.bodies), *net.internal_names]
             arrays |= {"supported": state.system.fixed, "bodies": np.array(names, dtype=str)}
             arrays |= {"lines": net.web.lines, "scene": self._scene}
-            if net.rows_of_elements:
-                arrays["internal"] = np.array(state.system.internal_of_lines)
+            if net.internal:
+                from ..system.internal_rows import kept
+
+                arrays |= kept(state.system)
             for key in ("axes", "inertia", "offset") if net.bodies else ():
                 arrays[f"body_{key}"] = np.array([getattr(body, key) for body in net.bodies])
             if net.point_mass is not None:

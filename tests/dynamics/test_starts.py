@@ -313,7 +313,7 @@ def test_lines_that_have_yielded_keep_their_law(tmp_path):
 
     refweb.run(pulled(**law), out=tmp_path / "yielded")
     for keys in ({}, {"viscous": refweb.Viscous(arms=[(1e6, 1.0)])}):
-        with pytest.raises(refweb.InputError, match='internal variables of law = "elastic-plastic", .* same law'):
+        with pytest.raises(refweb.InputError, match='internal variables of law = "elastic-plastic" .* same law'):
             refweb.run(pulled(tmp_path / "yielded", **keys))
     solution = refweb.run(pulled(tmp_path / "yielded", **law))
     plastic = solution.frames[0][1].x[-1]
