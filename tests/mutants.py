@@ -448,7 +448,11 @@ MUTANTS = [
     Mutant("effects/body_load", "internal=moment, twists=moment", "internal=moment, twists=False"),
     Mutant("effects/body_load", "blocks[c, first + i, 3 + j] = -change[i]", "blocks[c, first + i, 3 + j] = change[i]"),
     Mutant("results/observables/fuel", "data[0, 1] * (t - data[0, 2])", "data[0, 1] * t"),
-    Mutant("results/observables/fuel", "system.fixed[nodes].all(axis=1)", "system.fixed[nodes].any(axis=1)"),
+    Mutant(
+        "results/observables/fuel",
+        "system.fixed[nodes][:, pushed].all(axis=1)",
+        "system.fixed[nodes][:, pushed].any(axis=1)",
+    ),
     Mutant("studies/predictability", "schedule.commands.act(row, integrator, course, history)", "pass"),
     Mutant("dynamics/control_laws", "        if not measurement.limited:\n", "        if True:\n"),
     Mutant("dynamics/control_laws", "/ (2.0 * self.strength)", "/ self.strength"),
@@ -778,6 +782,7 @@ MUTANTS = [
     Mutant("dynamics/internal_start", "(alike and title == before)", "alike"),
     Mutant("dynamics/internal_start", "if before == now:", "if now:"),
     Mutant("dynamics/initial_state", "x[going_on] = before", "pass"),
+    Mutant("dynamics/initial_state", "ratio = lengths / before", "ratio = lengths"),
     # Checkpoints and folders
     Mutant("dynamics/accuracy_loop", 'int(kept["repeated"])', "0"),
     Mutant("dynamics/accuracy_loop", 'float(kept["drift"])', "np.inf"),

@@ -80,8 +80,14 @@ def remarks_on(start, system):
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)
         by = "[[motion]]" if system.drives and not system.carried[moved[0]] else "[[attach]]"
-        text = f"{by} has moved {system.row_name(moved[0])} at t = 0 already: the web starts with {stored:.4g} J"
-        yield Finding("moved-at-start", text, by.strip("[]"))
+        text = f"{by} has moved {system.row_name(moved[0])} at t = 0 already"
+        for body in (body for body in system.net.bodies if body.fixed and moved[0] in body.carried):
+            away = np.linalg.norm((driven - before)[moved[0]])
+            by, text = (
+                "body",
+                f'body "{body.name}" is fixed, and its node {moved[0]} jumps by {away:.4g} m to it at t = 0',
+            )
+        yield Finding("moved-at-start", f"{text}: the web starts with {stored:.4g} J", by.strip("[]"))
     off = np.linalg.norm(np.where(system.fixed, driven, 0.0), axis=1)
     off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0
     if off.max() > OFF * np.ptp(system.net.points, axis=0).max():
@@ -201,6 +207,21 @@ def unused_velocities(system, start):
             if given.any() and not np.allclose(given, now, rtol=SAME, atol=SAME * np.abs(given).max()):
                 text = f'{key} of body "{body.name}" has no effect: the folder that the run starts from has its motion'
                 yield Finding("left-out", text, "body", NOTE)
+
+
+def remarks_on_lengths(system, folder):
+    """Findings on natural lengths that tables of a scene have otherwise at t = 0 than the end of a folder."""
+    net, given = system.net, checkpoint(folder, "")
+    lengths = system.natural_length(0.0) / net.natural_length
+    before = given.get("length_factors", np.ones(len(lengths)))
+    if before.shape == lengths.shape and not np.allclose(lengths, before, rtol=SAME, atol=0.0):
+        ratio = lengths / before
+        worst = int(np.abs(ratio - 1.0).argmax())
+        text = (
+            f"the natural length of line {net.line[worst]} is {ratio[worst]:.6g} times that at the end of the folder: "
+            "[[reel]] and [temperature] are those of this scene alone; begin their tables where that run ended"
+        )
+        yield Finding("moved-at-start", text, "solve")
 
 
 def _refuse_jumps(system, x, name):

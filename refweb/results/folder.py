@@ -324,6 +324,8 @@ class Folder:
                 from ..system.internal_rows import kept
 
                 arrays |= kept(state.system)
+            if net.factors:
+                arrays["length_factors"] = state.system.natural_length(state.time) / net.natural_length
             for key in ("axes", "inertia", "offset") if net.bodies else ():
                 arrays[f"body_{key}"] = np.array([getattr(body, key) for body in net.bodies])
             if net.point_mass is not None:

@@ -321,6 +321,32 @@ def test_lines_that_have_yielded_keep_their_law(tmp_path):
     np.testing.assert_array_equal(plastic, refweb.load(tmp_path / "yielded").state.x[-1])
 
 
+def test_natural_lengths_that_jump_are_said(tmp_path):
+    """Not where the table goes on; else by the factor at t = 0 over that at the end of the folder."""
+
+    def reeled(start, *factors):
+        reel = [refweb.Reel(lines=[3], factor=[(0.0, factors[0]), (0.02, factors[1])])] if factors else []
+        return refweb.run(scene(start, [*PULLED, *reel], duration=1e-3))
+
+    refweb.run(scene(effects=[*PULLED, refweb.Reel(lines=[3], factor=[(0.0, 1.0), (0.02, 0.9)])]), out=tmp_path / "cut")
+    for factors, ratio in (((0.9, 0.9), None), ((1.0, 0.9), 1.0 / 0.9), ((), 1.0 / 0.9), ((0.45, 0.9), 0.5)):
+        said = [f.text for f in reeled(tmp_path / "cut", *factors).findings if f.code == "moved-at-start"]
+        expected = [] if ratio is None else [f"the natural length of line 3 is {ratio:.6g} times that at the end"]
+        assert [text[: len(begins)] for text, begins in zip(said, expected, strict=True)] == expected
+
+
+def test_a_body_that_is_fixed_elsewhere_than_before_is_named(tmp_path):
+    """Its node jumps with it, which no `[[motion]]` of the scene does."""
+    chain = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0])
+    box = dict(name="box", shape="box", size=(0.2, 0.2, 0.2), position=(1.1, 0.0, 0.0))
+    carries = refweb.Attach(body="box", node=1)
+    free = refweb.Body(mass=1.0, velocity=(-1.0, 0.0, 0.0), **box)
+    refweb.run(scene(web=chain, effects=[free, carries], duration=5e-3), out=tmp_path / "free")
+    fixed = scene(tmp_path / "free", web=chain, effects=[refweb.Body(fixed=True, **box), carries], duration=1e-3)
+    said = [finding.text for finding in refweb.run(fixed).findings if finding.code == "moved-at-start"]
+    assert len(said) == 1 and said[0].startswith('body "box" is fixed, and its node 1 jumps by 0.005 m to it at t = 0')
+
+
 def test_a_velocity_of_the_scene_comes_instead(ended):
     """Of its nodes; the others go on as they did."""
     folder, before = ended
