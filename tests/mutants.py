@@ -783,6 +783,8 @@ MUTANTS = [
     Mutant("dynamics/internal_start", "if before == now:", "if now:"),
     Mutant("dynamics/initial_state", "x[going_on] = before", "pass"),
     Mutant("dynamics/initial_state", "ratio = lengths / before", "ratio = lengths"),
+    Mutant("dynamics/initial_state", "omega = spin if axle.any() else", "omega ="),
+    Mutant("dynamics/initial_state", "return omega if body.axle else now", "return now"),
     # Checkpoints and folders
     Mutant("dynamics/accuracy_loop", 'int(kept["repeated"])', "0"),
     Mutant("dynamics/accuracy_loop", 'float(kept["drift"])', "np.inf"),

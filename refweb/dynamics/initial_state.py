@@ -185,6 +185,7 @@ def stored(system, folder):
     start = _start_at(system, positions, displacements, velocities, bodies, bearings, known)
     start = start._replace(broken=broken if len(broken) else None, contact_shares=given.get("contact_shares"))
     _refuse_jumps(system, start.x, name)
+    _refuse_off_axles(system, start, name)
     if not velocities.any():  # statics has no steps
         return start, start
     x, v = (given.get(f"twin_{key}") for key in ("displacements", "velocities"))
@@ -242,8 +243,31 @@ def _refuse_jumps(system, x, name):
             )
 
 
+def _refuse_off_axles(system, start, name):
+    """Refuse a start in which a body on an axle has a place, an orientation or a motion that the axle does not let."""
+    size = np.ptp(system.net.points, axis=0).max()
+    for body in (body for body in system.net.bodies if body.axle and not body.prescribed):
+        turned, along = body.rotation(start.x), body.axle.direction
+        spin, speed = start.v[body.spin], start.v[body.row]
+        off = np.linalg.norm(start.x[body.row] - (turned @ body.arm - body.arm)) / size
+        tilt = float(np.linalg.norm(turned @ along - along))
+        across = np.linalg.norm(spin - along * (along @ spin)) / max(np.linalg.norm(spin), 1e-300)
+        moves = np.linalg.norm(speed - np.cross(spin, turned @ body.arm)) / max(np.linalg.norm(speed), 1e-300)
+        for share, why in (
+            (off, f"stands {off * size:.3g} m off"),
+            (tilt, f"is tilted by {tilt:.3g} rad from"),
+            (across, f"turns about an axis {across:.3g} rad from"),
+            (moves, "moves away from"),
+        ):
+            if share > JUMP:
+                raise InputError(
+                    f'{name} body "{body.name}" {why} the axle that it has in this scene: give it the axle in that run '
+                    "too, or none here"
+                )
+
+
 def _bearings(system, given, bodies, name):
-    """(Axes, inertia, offset) of rotating bodies at the start of the run of a checkpoint, by name."""
+    """(Axes, inertia, offset, direction of an axle) of rotating bodies where the run of a checkpoint began, by name."""
     known, bearings = [str(body) for body in bodies], {}
     for body in system.net.bodies:
         spins = body.spin is not None and f"{body.name}.spin" in known
@@ -251,12 +275,19 @@ def _bearings(system, given, bodies, name):
             continue
         try:
             arrays = (given[f"body_{key}"][known.index(body.name)] for key in ("axes", "inertia", "offset"))
-            bearings[body.name] = tuple(arrays)
+            axles = given.get("body_axle")  # older folders have none: as in this scene
+            axle = _axle_of(body) if axles is None else axles[known.index(body.name)]
+            bearings[body.name] = (*arrays, axle)
         except (KeyError, IndexError):
             raise InputError(
                 f'{name} checkpoint.npz does not say which axes body "{body.name}" began with: run that again'
             ) from None
     return bearings
+
+
+def _axle_of(body):
+    """Direction of the axle of a body, 0 without one."""
+    return body.axle.direction if body.axle else np.zeros(3)
 
 
 def _turn(body, bearing, rows, x, v):
@@ -265,11 +296,11 @@ def _turn(body, bearing, rows, x, v):
     ``rows`` has (displacement, velocity) of the rows of rotation of that start; x and v of the row of the body are set
     already.
     """
-    axes, inertia, offset = bearing
+    axes, inertia, offset, axle = bearing
     (vector, spin), *last = rows
     if last:
         now = axes @ matrix_of((1.0 + last[0][0][0], *vector)).T
-        omega = now.T @ np.linalg.solve(inertia, now @ spin) * np.linalg.eigvalsh(inertia)[-1]
+        omega = spin if axle.any() else now.T @ np.linalg.solve(inertia, now @ spin) * np.linalg.eigvalsh(inertia)[-1]
     else:
         now, omega = axes, spin
     if body.turn is None:  # a sphere looks the same
@@ -277,10 +308,17 @@ def _turn(body, bearing, rows, x, v):
     else:
         quaternion = quaternion_of(now.T @ body.axes)
         x[body.turn, 0], x[body.spin] = quaternion[0] - 1.0, quaternion[1:]
-        v[body.turn], v[body.spin] = 0.0, now.T @ (body.inertia @ (now @ omega)) / body.moment
+        v[body.turn], v[body.spin] = 0.0, _spin(body, now, omega)
+        if not axle.any() or not body.axle:
+            x[body.turn, 1] = 2.0 * np.arctan2(quaternion[1:] @ _axle_of(body), quaternion[0])
     shift = (offset - body.offset) @ now
     x[body.row] += shift
     v[body.row] += np.cross(omega, shift)
+
+
+def _spin(body, now, omega):
+    """Velocity of the row of rotation of a body with axes ``now``, see `refweb.net.rotation`."""
+    return omega if body.axle else now.T @ (body.inertia @ (now @ omega)) / body.moment
 
 
 def _start_turning(body, x, v):
@@ -289,7 +327,7 @@ def _start_turning(body, x, v):
     v[body.spin] = omega
     if body.turn is not None:
         now = body.axes @ body.rotation(x).T
-        v[body.turn], v[body.spin] = 0.0, now.T @ (body.inertia @ (now @ omega)) / body.moment
+        v[body.turn], v[body.spin] = 0.0, _spin(body, now, omega)
         v[body.row] += np.cross(omega, built - body.offset @ now)
 
 
@@ -329,7 +367,10 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings, kn
     for body in net.bodies:
         if body.name not in bearings:
             continue
-        numbered, rows = (body.axes, body.inertia, body.offset), (f"{body.name}.spin", f"{body.name}.turn")
+        numbered, rows = (
+            (body.axes, body.inertia, body.offset, _axle_of(body)),
+            (f"{body.name}.spin", f"{body.name}.turn"),
+        )
         rows_there = [(displacements[row[name]], velocities[row[name]]) for name in rows if name in row]
         alike = (
             np.array_equal(array, array_before)
@@ -339,6 +380,8 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings, kn
             _turn(body, bearings[body.name], rows_there, x, v)
         if not moving:
             _start_turning(body, x, v)
+        if body.pivot is not None and not moving:
+            v[body.row] = np.cross(v[body.spin], body.rotation(x) @ body.arm)
     for thread in net.threads:
         thread.rewind(x)
     if net.wound:

@@ -328,6 +328,8 @@ class Folder:
                 arrays["length_factors"] = state.system.natural_length(state.time) / net.natural_length
             for key in ("axes", "inertia", "offset") if net.bodies else ():
                 arrays[f"body_{key}"] = np.array([getattr(body, key) for body in net.bodies])
+            if net.bodies:
+                arrays["body_axle"] = np.array([b.axle.direction if b.axle else np.zeros(3) for b in net.bodies])
             if net.point_mass is not None:
                 arrays["point_masses"] = net.point_mass
             if state.system.weakness is not None:

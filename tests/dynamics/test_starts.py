@@ -347,6 +347,35 @@ def test_a_body_that_is_fixed_elsewhere_than_before_is_named(tmp_path):
     assert len(said) == 1 and said[0].startswith('body "box" is fixed, and its node 1 jumps by 0.005 m to it at t = 0')
 
 
+def test_an_axle_takes_what_turns_about_it(tmp_path):
+    """A box that turns about x goes on at its speed, on an axle along x and free again; other axles refuse it."""
+    chain = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1])
+    observed = [refweb.Observe(name="speed", quantity="angular_velocity", body="box", component="x")]
+    observed += [refweb.Observe(name="turned", quantity="orientation", body="box", component="x")]
+
+    def turned(name, start, duration=0.1, **keys):
+        box = dict(name="box", shape="box", size=(0.3, 0.2, 0.1), position=(0.0, 0.0, 5.0), mass=1.0)
+        body = refweb.Body(**{**box, "angular_velocity": (2.0, 0.0, 0.0), **keys})
+        given = scene(start, [CALM, body], duration, web=chain, observe=observed)
+        return refweb.run(given, out=tmp_path / name).history
+
+    turned("free", "web")
+    along = turned("axle", tmp_path / "free", axle={"direction": (1.0, 0.0, 0.0)})
+    again = turned("again", tmp_path / "axle")
+    for history, begin in ((along, 0.1), (again, 0.2)):
+        np.testing.assert_allclose(history["speed"], 2.0, rtol=1e-9)
+        np.testing.assert_allclose(history["turned"], np.sin(begin + history["time"]), rtol=1e-9)
+    for axle, why in (
+        ({"direction": (0.0, 1.0, 0.0)}, "is tilted by 0.2 rad from the axle"),
+        ({"direction": (1.0, 0.0, 0.0), "point": (0.0, 0.1, 5.0)}, "moves away from|stands .* off"),
+    ):
+        with pytest.raises(refweb.InputError, match=f'body "box" ({why})'):
+            turned("refused", tmp_path / "free", 1e-3, axle=axle, angular_velocity=(0.0, 0.0, 0.0))
+    turned("tumbling", "web", 1e-3, angular_velocity=(2.0, 0.0, 1e-4))
+    with pytest.raises(refweb.InputError, match="turns about an axis"):
+        turned("refused", tmp_path / "tumbling", 1e-3, axle={"direction": (1.0, 0.0, 0.0)})
+
+
 def test_a_velocity_of_the_scene_comes_instead(ended):
     """Of its nodes; the others go on as they did."""
     folder, before = ended
