@@ -36,7 +36,7 @@ CODES = {
     "mesh-file": "Lines of a file that lie on each other, or nodes that coincide.",
     "method-changed": 'Method = "auto" goes on with another method.',
     "monotone-loading": "± of statics is proven for lines that yield and do not turn back.",
-    "moved-at-start": "Nodes that are elsewhere at the start than their places.",
+    "moved-at-start": "Nodes or natural lengths that are elsewhere at the start than they were.",
     "never-touched": "A body with contact that nothing touches.",
     "no-error": "± of results is not known.",
     "no-stiffness": "Directions without stiffness, which have no frequency.",

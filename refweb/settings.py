@@ -170,8 +170,10 @@ class Dynamic(Table):
         State at t = 0: the web as it is, its equilibrium under what acts at t = 0, or the last state in a result
         folder. Bodies of that folder go on with its velocities, those of statics with the velocities of their tables; a
         ``[[velocity]]`` comes in place of that of its nodes. Lines that have yielded, have Maxwell arms or are on
-        winches need the same law. A free body takes part in the equilibrium where it has no velocity, and carries nodes
-        or touches a line where its table has it; others are held there meanwhile and feel nothing.
+        winches need the same law, arms or winch, and threads that have slipped or are wound the same name, nodes,
+        rings with friction and winch; others begin as new. A free body takes part in the equilibrium where it has no
+        velocity, and carries nodes or touches a line where its table has it; others are held there meanwhile and feel
+        nothing.
 
     Raises
     ------

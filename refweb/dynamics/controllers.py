@@ -118,6 +118,13 @@ class Controller:
             raise InputError('target = 0 must not be zero with law = "spin-up": it is the speed that is led to')
         self.reset()
 
+    @property
+    def axes(self) -> list[bool]:
+        """True for each of x, y and z along which its value may have a part."""
+        if self.vector and self._size_of_value == 1:
+            return [part != 0.0 for part in self.control.direction]
+        return [True, True, True]
+
     def reset(self) -> None:
         """Begin a run."""
         self._measured: list[Any] = []
@@ -272,7 +279,9 @@ def commands_of(scene: Scene, system: System, watch: Watch, schedule: Schedule, 
     for observe, probe in zip(probed, watch.probes, strict=False):
         for controller in controllers:
             if observe.control == controller.control.name:
-                probe.data[0, 3] = observe.observable.factor(load_of(scene, controller.control.sets), system)
+                probe.data[0, 3] = observe.observable.factor(
+                    load_of(scene, controller.control.sets), system, controller.axes
+                )
                 controller.meters.append(probe.data)
     return Commands(Inputs(system), schedule, given, controllers, watch.table)
 
@@ -291,7 +300,7 @@ def check(scene: Scene, system: System) -> None:
             made = next(made for made in controllers if made.control.name == observe.control)
             if made.plain(0.0)["unit"] != "N s":
                 raise InputError(f"control = {quote(observe.control)} sets {made.control.sets}, which is no force")
-            observe.observable.factor(load_of(scene, made.control.sets), system)
+            observe.observable.factor(load_of(scene, made.control.sets), system, made.axes)
 
 
 def load_of(scene: Scene, path: str) -> Any:

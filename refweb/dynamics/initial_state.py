@@ -6,7 +6,6 @@ writes, so that a renamed one breaks folders of users.
 
 from __future__ import annotations
 
-import re
 from typing import NamedTuple
 
 import numpy as np
@@ -81,8 +80,14 @@ def remarks_on(start, system):
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)
         by = "[[motion]]" if system.drives and not system.carried[moved[0]] else "[[attach]]"
-        text = f"{by} has moved {system.row_name(moved[0])} at t = 0 already: the web starts with {stored:.4g} J"
-        yield Finding("moved-at-start", text, by.strip("[]"))
+        text = f"{by} has moved {system.row_name(moved[0])} at t = 0 already"
+        for body in (body for body in system.net.bodies if body.fixed and moved[0] in body.carried):
+            away = np.linalg.norm((driven - before)[moved[0]])
+            by, text = (
+                "body",
+                f'body "{body.name}" is fixed, and its node {moved[0]} jumps by {away:.4g} m to it at t = 0',
+            )
+        yield Finding("moved-at-start", f"{text}: the web starts with {stored:.4g} J", by.strip("[]"))
     off = np.linalg.norm(np.where(system.fixed, driven, 0.0), axis=1)
     off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0
     if off.max() > OFF * np.ptp(system.net.points, axis=0).max():
@@ -174,33 +179,19 @@ def stored(system, folder):
         )
     if "lines" in given and not np.array_equal(given["lines"], net.web.lines):
         raise InputError(f"{name} holds other lines between its nodes than this scene: it must be the same web")
-    _refuse_other_variables(system, given, name)
+    known = _known_variables(system, given, name)
     broken = given.get("broken", np.zeros(0, dtype=np.int64))
     bearings = _bearings(system, given, bodies, name)
-    start = _start_at(system, positions, displacements, velocities, bodies, bearings)
+    start = _start_at(system, positions, displacements, velocities, bodies, bearings, known)
     start = start._replace(broken=broken if len(broken) else None, contact_shares=given.get("contact_shares"))
     _refuse_jumps(system, start.x, name)
+    _refuse_off_axles(system, start, name)
     if not velocities.any():  # statics has no steps
         return start, start
     x, v = (given.get(f"twin_{key}") for key in ("displacements", "velocities"))
     if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):
         return start, None
-    return start, _start_at(system, positions - displacements + x, x, v, bodies, bearings)
-
-
-def _refuse_other_variables(system, given, name):
-    """Refuse a folder whose lines have internal variables, such as plastic strains, that this scene has not."""
-    names = system.net.internal_names[: system.net.rows_of_elements]
-    of_lines = [i for i, row in enumerate(given["bodies"].tolist()) if re.fullmatch(r"\.\d+\.\d+", str(row))]
-    first = len(given["displacements"]) - len(given["bodies"])
-    same = [given["bodies"][i] for i in of_lines] == names
-    title = str(given.get("internal", "" if not same else system.internal_of_lines))
-    if given["displacements"][[first + i for i in of_lines]].any() and not (same and title == system.internal_of_lines):
-        present = f"those of {system.internal_of_lines}" if names else "none"
-        raise InputError(
-            f"{name} its lines have internal variables{f' of {title}' if title else ''}, such as plastic strains, and "
-            f"lines of this scene have {present}: without them natural lengths would be wrong; take the same law"
-        )
+    return start, _start_at(system, positions - displacements + x, x, v, bodies, bearings, known)
 
 
 def unused_velocities(system, start):
@@ -217,6 +208,21 @@ def unused_velocities(system, start):
             if given.any() and not np.allclose(given, now, rtol=SAME, atol=SAME * np.abs(given).max()):
                 text = f'{key} of body "{body.name}" has no effect: the folder that the run starts from has its motion'
                 yield Finding("left-out", text, "body", NOTE)
+
+
+def remarks_on_lengths(system, folder):
+    """Findings on natural lengths that tables of a scene have otherwise at t = 0 than the end of a folder."""
+    net, given = system.net, checkpoint(folder, "")
+    lengths = system.natural_length(0.0) / net.natural_length
+    before = given.get("length_factors", np.ones(len(lengths)))
+    if before.shape == lengths.shape and not np.allclose(lengths, before, rtol=SAME, atol=0.0):
+        ratio = lengths / before
+        worst = int(np.abs(ratio - 1.0).argmax())
+        text = (
+            f"the natural length of line {net.line[worst]} is {ratio[worst]:.6g} times that at the end of the folder: "
+            "[[reel]] and [temperature] are those of this scene alone; begin their tables where that run ended"
+        )
+        yield Finding("moved-at-start", text, "solve")
 
 
 def _refuse_jumps(system, x, name):
@@ -237,8 +243,31 @@ def _refuse_jumps(system, x, name):
             )
 
 
+def _refuse_off_axles(system, start, name):
+    """Refuse a start in which a body on an axle has a place, an orientation or a motion that the axle does not let."""
+    size = np.ptp(system.net.points, axis=0).max()
+    for body in (body for body in system.net.bodies if body.axle and not body.prescribed):
+        turned, along = body.rotation(start.x), body.axle.direction
+        spin, speed = start.v[body.spin], start.v[body.row]
+        off = np.linalg.norm(start.x[body.row] - (turned @ body.arm - body.arm)) / size
+        tilt = float(np.linalg.norm(turned @ along - along))
+        across = np.linalg.norm(spin - along * (along @ spin)) / max(np.linalg.norm(spin), 1e-300)
+        moves = np.linalg.norm(speed - np.cross(spin, turned @ body.arm)) / max(np.linalg.norm(speed), 1e-300)
+        for share, why in (
+            (off, f"stands {off * size:.3g} m off"),
+            (tilt, f"is tilted by {tilt:.3g} rad from"),
+            (across, f"turns about an axis {across:.3g} rad from"),
+            (moves, "moves away from"),
+        ):
+            if share > JUMP:
+                raise InputError(
+                    f'{name} body "{body.name}" {why} the axle that it has in this scene: give it the axle in that run '
+                    "too, or none here"
+                )
+
+
 def _bearings(system, given, bodies, name):
-    """(Axes, inertia, offset) of rotating bodies at the start of the run of a checkpoint, by name."""
+    """(Axes, inertia, offset, direction of an axle) of rotating bodies where the run of a checkpoint began, by name."""
     known, bearings = [str(body) for body in bodies], {}
     for body in system.net.bodies:
         spins = body.spin is not None and f"{body.name}.spin" in known
@@ -246,12 +275,19 @@ def _bearings(system, given, bodies, name):
             continue
         try:
             arrays = (given[f"body_{key}"][known.index(body.name)] for key in ("axes", "inertia", "offset"))
-            bearings[body.name] = tuple(arrays)
+            axles = given.get("body_axle")  # older folders have none: as in this scene
+            axle = _axle_of(body) if axles is None else axles[known.index(body.name)]
+            bearings[body.name] = (*arrays, axle)
         except (KeyError, IndexError):
             raise InputError(
                 f'{name} checkpoint.npz does not say which axes body "{body.name}" began with: run that again'
             ) from None
     return bearings
+
+
+def _axle_of(body):
+    """Direction of the axle of a body, 0 without one."""
+    return body.axle.direction if body.axle else np.zeros(3)
 
 
 def _turn(body, bearing, rows, x, v):
@@ -260,11 +296,11 @@ def _turn(body, bearing, rows, x, v):
     ``rows`` has (displacement, velocity) of the rows of rotation of that start; x and v of the row of the body are set
     already.
     """
-    axes, inertia, offset = bearing
+    axes, inertia, offset, axle = bearing
     (vector, spin), *last = rows
     if last:
         now = axes @ matrix_of((1.0 + last[0][0][0], *vector)).T
-        omega = now.T @ np.linalg.solve(inertia, now @ spin) * np.linalg.eigvalsh(inertia)[-1]
+        omega = spin if axle.any() else now.T @ np.linalg.solve(inertia, now @ spin) * np.linalg.eigvalsh(inertia)[-1]
     else:
         now, omega = axes, spin
     if body.turn is None:  # a sphere looks the same
@@ -272,10 +308,17 @@ def _turn(body, bearing, rows, x, v):
     else:
         quaternion = quaternion_of(now.T @ body.axes)
         x[body.turn, 0], x[body.spin] = quaternion[0] - 1.0, quaternion[1:]
-        v[body.turn], v[body.spin] = 0.0, now.T @ (body.inertia @ (now @ omega)) / body.moment
+        v[body.turn], v[body.spin] = 0.0, _spin(body, now, omega)
+        if not axle.any() or not body.axle:
+            x[body.turn, 1] = 2.0 * np.arctan2(quaternion[1:] @ _axle_of(body), quaternion[0])
     shift = (offset - body.offset) @ now
     x[body.row] += shift
     v[body.row] += np.cross(omega, shift)
+
+
+def _spin(body, now, omega):
+    """Velocity of the row of rotation of a body with axes ``now``, see `refweb.net.rotation`."""
+    return omega if body.axle else now.T @ (body.inertia @ (now @ omega)) / body.moment
 
 
 def _start_turning(body, x, v):
@@ -284,19 +327,32 @@ def _start_turning(body, x, v):
     v[body.spin] = omega
     if body.turn is not None:
         now = body.axes @ body.rotation(x).T
-        v[body.turn], v[body.spin] = 0.0, now.T @ (body.inertia @ (now @ omega)) / body.moment
+        v[body.turn], v[body.spin] = 0.0, _spin(body, now, omega)
         v[body.row] += np.cross(omega, built - body.offset @ now)
 
 
-def _start_at(system, positions, displacements, velocities, bodies, bearings):
-    """The `Start` of a system from the nodes of a checkpoint and, after them, from the bodies with their names."""
+def _known_variables(system, given, name):
+    """Names of rows of internal variables that go on, see `refweb.dynamics.internal_start`."""
+    if not any(str(row).startswith(".") for row in given["bodies"]):
+        return set()
+    from .internal_start import known_variables
+
+    return known_variables(system, given, name)
+
+
+def _start_at(system, positions, displacements, velocities, bodies, bearings, known):
+    """The `Start` of a system from the nodes of a checkpoint and, after them, from the rows with their names.
+
+    ``known`` are the names of internal variables that go on.
+    """
     net, nodes = system.net, len(positions) - len(bodies)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     names = [*row_names(net.bodies), *net.internal_names]
     row = {str(body): nodes + i for i, body in enumerate(bodies)}
     numbered = zip(names, range(net.nodes, system.rows), strict=True)
     fixed_names = [body.name for body in net.bodies if body.fixed]
-    pairs = [(row_here, row[name]) for name, row_here in numbered if name in row and name not in fixed_names]
+    new = {*fixed_names, *net.internal_names} - known
+    pairs = [(row_here, row[name]) for name, row_here in numbered if name in row and name not in new]
     row_here, rows_there = np.array([*((i, i) for i in range(nodes)), *pairs]).T
     reference = positions - displacements
     same = np.isclose(
@@ -311,7 +367,10 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
     for body in net.bodies:
         if body.name not in bearings:
             continue
-        numbered, rows = (body.axes, body.inertia, body.offset), (f"{body.name}.spin", f"{body.name}.turn")
+        numbered, rows = (
+            (body.axes, body.inertia, body.offset, _axle_of(body)),
+            (f"{body.name}.spin", f"{body.name}.turn"),
+        )
         rows_there = [(displacements[row[name]], velocities[row[name]]) for name in rows if name in row]
         alike = (
             np.array_equal(array, array_before)
@@ -321,10 +380,16 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
             _turn(body, bearings[body.name], rows_there, x, v)
         if not moving:
             _start_turning(body, x, v)
+        if body.pivot is not None and not moving:
+            v[body.row] = np.cross(v[body.spin], body.rotation(x) @ body.arm)
     for thread in net.threads:
         thread.rewind(x)
     if net.wound:
         from ..effects.wound_lines import rewind
 
         rewind(net, x)
-    return Start(x if set(net.internal_names) <= set(row) else system.settled(x), v)
+    if not set(net.internal_names) <= known:
+        going_on = [row_here for row_here, _ in pairs if row_here >= system.rows - net.internal]
+        before, x = x[going_on], system.settled(x)
+        x[going_on] = before
+    return Start(x, v)

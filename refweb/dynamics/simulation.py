@@ -20,7 +20,16 @@ from ..results.strength import strength_remark
 from .accuracy_loop import CLIMBS, AccuracyState, reach_digits, run_within_drift
 from .budget import Budget, check_budget
 from .history import Watch
-from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored, unused_velocities
+from .initial_state import (
+    Start,
+    equilibrium,
+    fields_of,
+    record_of,
+    remarks_on,
+    remarks_on_lengths,
+    stored,
+    unused_velocities,
+)
 from .integrators.crossings import APART, BESIDE, THROUGH
 from .integrators.integrator import MAX_STEPS_PER_ROW, IntegratorState
 from .schedule import FEW_CORNERS, Schedule, blocks, time_of
@@ -102,6 +111,7 @@ class Simulation:
         elif scene.start_folder is not None:
             self.begin, self.begin_of_twin = stored(system, scene.start_folder)
             solution.findings += unused_velocities(system, self.begin)
+            solution.findings += remarks_on_lengths(system, scene.start_folder)
             if self.begin_of_twin is None and self.begin.v is not None and self.begin.v.any():
                 solution.findings.append(Finding("no-error", NO_TWIN, "accuracy"))
         system = self.begin.torn(system)

@@ -320,10 +320,16 @@ class Folder:
             names = [*row_names(net.bodies), *net.internal_names]
             arrays |= {"supported": state.system.fixed, "bodies": np.array(names, dtype=str)}
             arrays |= {"lines": net.web.lines, "scene": self._scene}
-            if net.rows_of_elements:
-                arrays["internal"] = np.array(state.system.internal_of_lines)
+            if net.internal:
+                from ..system.internal_rows import kept
+
+                arrays |= kept(state.system)
+            if net.factors:
+                arrays["length_factors"] = state.system.natural_length(state.time) / net.natural_length
             for key in ("axes", "inertia", "offset") if net.bodies else ():
                 arrays[f"body_{key}"] = np.array([getattr(body, key) for body in net.bodies])
+            if net.bodies:
+                arrays["body_axle"] = np.array([b.axle.direction if b.axle else np.zeros(3) for b in net.bodies])
             if net.point_mass is not None:
                 arrays["point_masses"] = net.point_mass
             if state.system.weakness is not None:

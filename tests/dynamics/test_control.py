@@ -422,7 +422,10 @@ def test_fuel_of_nodes_that_nothing_flies_is_refused():
     with pytest.raises(InputError, match=r"node 0 is supported .* leave it out of node = \[0, 1\]"):
         scene(observe=SPENT, load=both).build()
     rail = [{"nodes": [0], "components": ["y", "z"]}]
-    scene(observe=SPENT, load=both, web={**nets.SLACK_LINE["web"], "supports": []}, support=rail).build()
+    free = {**nets.SLACK_LINE["web"], "supports": []}
+    scene(observe=SPENT, load=both, web=free, support=rail).build()
+    with pytest.raises(InputError, match="node 0 is supported or moved by a table along x, so that no thrust flies"):
+        scene(observe=SPENT, load=both, web=free, support=[{"nodes": [0], "components": ["x"]}]).build()
     ship = {"name": "ship", "shape": "box", "size": [1, 1, 1], "mass": 8.0, "position": [0.5, 0, 0]}
     carried = dict(body=[ship], attach=[{"body": "ship", "node": 1}], point_mass=[{"node": 1, "mass": 1.0}])
     with pytest.raises(InputError, match='"delta_v" has no meaning for node = 1, which a body carries'):

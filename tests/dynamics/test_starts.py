@@ -313,12 +313,67 @@ def test_lines_that_have_yielded_keep_their_law(tmp_path):
 
     refweb.run(pulled(**law), out=tmp_path / "yielded")
     for keys in ({}, {"viscous": refweb.Viscous(arms=[(1e6, 1.0)])}):
-        with pytest.raises(refweb.InputError, match='internal variables of law = "elastic-plastic", .* same law'):
+        with pytest.raises(refweb.InputError, match='internal variables of law = "elastic-plastic" .* same law'):
             refweb.run(pulled(tmp_path / "yielded", **keys))
     solution = refweb.run(pulled(tmp_path / "yielded", **law))
     plastic = solution.frames[0][1].x[-1]
     assert plastic.any()
     np.testing.assert_array_equal(plastic, refweb.load(tmp_path / "yielded").state.x[-1])
+
+
+def test_natural_lengths_that_jump_are_said(tmp_path):
+    """Not where the table goes on; else by the factor at t = 0 over that at the end of the folder."""
+
+    def reeled(start, *factors):
+        reel = [refweb.Reel(lines=[3], factor=[(0.0, factors[0]), (0.02, factors[1])])] if factors else []
+        return refweb.run(scene(start, [*PULLED, *reel], duration=1e-3))
+
+    refweb.run(scene(effects=[*PULLED, refweb.Reel(lines=[3], factor=[(0.0, 1.0), (0.02, 0.9)])]), out=tmp_path / "cut")
+    for factors, ratio in (((0.9, 0.9), None), ((1.0, 0.9), 1.0 / 0.9), ((), 1.0 / 0.9), ((0.45, 0.9), 0.5)):
+        said = [f.text for f in reeled(tmp_path / "cut", *factors).findings if f.code == "moved-at-start"]
+        expected = [] if ratio is None else [f"the natural length of line 3 is {ratio:.6g} times that at the end"]
+        assert [text[: len(begins)] for text, begins in zip(said, expected, strict=True)] == expected
+
+
+def test_a_body_that_is_fixed_elsewhere_than_before_is_named(tmp_path):
+    """Its node jumps with it, which no `[[motion]]` of the scene does."""
+    chain = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0])
+    box = dict(name="box", shape="box", size=(0.2, 0.2, 0.2), position=(1.1, 0.0, 0.0))
+    carries = refweb.Attach(body="box", node=1)
+    free = refweb.Body(mass=1.0, velocity=(-1.0, 0.0, 0.0), **box)
+    refweb.run(scene(web=chain, effects=[free, carries], duration=5e-3), out=tmp_path / "free")
+    fixed = scene(tmp_path / "free", web=chain, effects=[refweb.Body(fixed=True, **box), carries], duration=1e-3)
+    said = [finding.text for finding in refweb.run(fixed).findings if finding.code == "moved-at-start"]
+    assert len(said) == 1 and said[0].startswith('body "box" is fixed, and its node 1 jumps by 0.005 m to it at t = 0')
+
+
+def test_an_axle_takes_what_turns_about_it(tmp_path):
+    """A box that turns about x goes on at its speed, on an axle along x and free again; other axles refuse it."""
+    chain = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1])
+    observed = [refweb.Observe(name="speed", quantity="angular_velocity", body="box", component="x")]
+    observed += [refweb.Observe(name="turned", quantity="orientation", body="box", component="x")]
+
+    def turned(name, start, duration=0.1, **keys):
+        box = dict(name="box", shape="box", size=(0.3, 0.2, 0.1), position=(0.0, 0.0, 5.0), mass=1.0)
+        body = refweb.Body(**{**box, "angular_velocity": (2.0, 0.0, 0.0), **keys})
+        given = scene(start, [CALM, body], duration, web=chain, observe=observed)
+        return refweb.run(given, out=tmp_path / name).history
+
+    turned("free", "web")
+    along = turned("axle", tmp_path / "free", axle={"direction": (1.0, 0.0, 0.0)})
+    again = turned("again", tmp_path / "axle")
+    for history, begin in ((along, 0.1), (again, 0.2)):
+        np.testing.assert_allclose(history["speed"], 2.0, rtol=1e-9)
+        np.testing.assert_allclose(history["turned"], np.sin(begin + history["time"]), rtol=1e-9)
+    for axle, why in (
+        ({"direction": (0.0, 1.0, 0.0)}, "is tilted by 0.2 rad from the axle"),
+        ({"direction": (1.0, 0.0, 0.0), "point": (0.0, 0.1, 5.0)}, "moves away from|stands .* off"),
+    ):
+        with pytest.raises(refweb.InputError, match=f'body "box" ({why})'):
+            turned("refused", tmp_path / "free", 1e-3, axle=axle, angular_velocity=(0.0, 0.0, 0.0))
+    turned("tumbling", "web", 1e-3, angular_velocity=(2.0, 0.0, 1e-4))
+    with pytest.raises(refweb.InputError, match="turns about an axis"):
+        turned("refused", tmp_path / "tumbling", 1e-3, axle={"direction": (1.0, 0.0, 0.0)})
 
 
 def test_a_velocity_of_the_scene_comes_instead(ended):

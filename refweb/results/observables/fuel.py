@@ -6,6 +6,7 @@ of the probes: integral [N s] at a time, size of the force [N], and that time [s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,9 +44,12 @@ class Fuel(Observable):
         """No number: a state alone does not tell what was spent."""
         return Value(float("nan"), None)
 
-    def factor(self, load: Any, system: System) -> float:
-        """Factor on ∫ abs(F) dt of the force of a ``[[load]]`` or ``[[thrust]]`` on one node or body: their number."""
-        return float(len(_nodes(load, system))) if load.node is not None else 1.0
+    def factor(self, load: Any, system: System, axes: Sequence[bool] = (True,) * 3) -> float:
+        """Factor on ∫ abs(F) dt of the force of a ``[[load]]`` or ``[[thrust]]`` on one node or body: their number.
+
+        ``axes`` are True for those in which the force acts.
+        """
+        return float(len(_nodes(load, system, axes))) if load.node is not None else 1.0
 
     def probe(self, system: System) -> Probe:
         """Make the probe, whose data a control writes."""
@@ -57,12 +61,12 @@ class DeltaV(Fuel):
 
     unit = "m/s"
 
-    def factor(self, load: Any, system: System) -> float:
+    def factor(self, load: Any, system: System, axes: Sequence[bool] = (True,) * 3) -> float:
         """Factor on ∫ abs(F) dt of the force on one node or body: their number over their mass [1/kg]."""
         net = system.net
         if load.node is None:
             return 1.0 / float(net.mass[next(body.row for body in net.bodies if body.name == load.body)])
-        nodes = _nodes(load, system)
+        nodes = _nodes(load, system, axes)
         if system.carried[nodes].any():
             raise InputError(
                 f'quantity = "delta_v" has no meaning for node = {quote(load.node)}, which a body carries: load the '
@@ -76,14 +80,15 @@ class DeltaV(Fuel):
         return len(nodes) / mass
 
 
-def _nodes(load, system):
-    """Nodes of a load; `InputError` for one that cannot move, which no fuel flies."""
-    nodes = system.net.web.find(load.node)
-    still = nodes[system.fixed[nodes].all(axis=1)]
+def _nodes(load, system, axes):
+    """Nodes of a load; `InputError` for one that cannot move along axes of its force, which no fuel flies."""
+    nodes, pushed = system.net.web.find(load.node), np.array(axes)
+    still = nodes[system.fixed[nodes][:, pushed].all(axis=1)]
     if len(still):
+        along = "" if pushed.all() else f" along {' and '.join(np.array(['x', 'y', 'z'])[pushed])}"
         raise InputError(
-            f"node {still[0]} is supported or moved by a table, so that no thrust flies it: leave it out of node = "
-            f"{quote(load.node)} of the load"
+            f"node {still[0]} is supported or moved by a table{along}, so that no thrust flies it: leave it out of "
+            f"node = {quote(load.node)} of the load"
         )
     return nodes
 
