@@ -90,7 +90,8 @@ class WoundFlow(NamedTuple):
         """Numbers of its cells at present, shape (cells, columns)."""
         if self.thread is None:
             return system.net.line_data.matrix[self.lines]
-        return next(system.terms[n].data for n, thread in system.threads.items() if thread.name == self.thread)
+        data: Any = next(system.terms[n].data for n, thread in system.threads.items() if thread.name == self.thread)
+        return data
 
     def passing(self, net: Net) -> tuple[Any, NDArray[np.int32], int]:
         """(Kernel of slips and their rates, cells, rings of each)."""
@@ -199,8 +200,9 @@ def write_numbers(system: System, thread: str | None, lines: Any, numbers: tuple
             continue
         if thread is None and not np.array_equal(term.flow.lines, lines):
             continue
-        end = term.data.shape[1] - OF_FIELD - OF_NODE * term.cells.shape[1]
-        changed = term.data.copy()
+        data: Any = term.data
+        end = data.shape[1] - OF_FIELD - OF_NODE * term.cells.shape[1]
+        changed = data.copy()
         if thread is None:
             from .wound_lines import FIRST, NUMBERS
 
