@@ -369,7 +369,6 @@ def refuse_keys(cls: type, given: dict[str, Any]) -> None:
         component,
         components,
         by_group,
-        part,
         dataclasses.field,
     ),
 )

@@ -474,7 +474,7 @@ MUTANTS = [
     ),
     Mutant("sweeps/episodes", "parameter[int(share * len(parameter))]", "parameter[0]"),
     Mutant("sweeps/expressions", '_call("_known", side)', "side"),
-    Mutant("sweeps/episodes", "formulas[-1].check_types(typical)", "pass"),
+    Mutant("sweeps/episodes", "formula.check_types(typical)", "pass"),
     Mutant("sweeps/episodes", "for value in bounds.tolist():", "for value in bounds[1:].tolist():"),
     Mutant("effects/viscous", "time * (1.0 - decay * decay)", "time * (1.0 - decay)"),
     Mutant("effects/viscous", "pull + max(by_law, 0.0) >= 0.0:", "pull + by_law >= 0.0 or e > 0.0:"),

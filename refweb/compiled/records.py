@@ -153,13 +153,14 @@ class Record:
 
     def without_kernels(self) -> typing.Self:
         """Copy of it with empty tables of kernels, which needs no machine code; arrays are shared."""
+        record: Any = self
         empty: dict[str, Any] = {}
         for name, value in self.by_name().items():
             if isinstance(value, Functions):
                 empty[name] = Functions(value.signature, ())
             elif isinstance(value, Record):
                 empty[name] = value.without_kernels()
-        return dataclasses.replace(self, **empty)
+        return dataclasses.replace(record, **empty)
 
 
 Vector = Annotated[np.ndarray, types.Array(types.float64, 1, "C")]

@@ -83,7 +83,8 @@ def not_negative(path: str) -> bool:
 
 def widened(scene: Scene) -> Scene:
     """The scene with tables of reels and motions of two rows or more, which begin at 0: values are the same."""
-    end, effects = scene.solve.duration, []
+    solve: Any = scene.solve
+    end, effects = solve.duration, []
     for effect in scene.effects:
         tables = {table: columns for table, columns in RATES.get(str(name_of(EFFECTS, effect)), {}).values()}
         changed = {}
@@ -361,7 +362,7 @@ class Inputs:
     def _writes_of_torque(self, given, body):
         rigid = next(rigid for rigid in self._system.net.bodies if rigid.name == given.name)
         for term in self._system.terms:
-            if term.name == "axle" and term.cells[0, 0] == rigid.spin:
+            if rigid.axle is not None and term.name == "axle" and term.cells[0, 0] == rigid.spin:
                 table = body.axle.at(body.position).torque
                 return [(term.data, ..., np.array([[*rigid.axle.direction, *flattened(table)]]))]
         raise InputError(f"body {quote(given.name)} does not turn freely")

@@ -128,8 +128,8 @@ class Gradients:
                 "large ones are not: take a result of an earlier time, add damping, or vary the number by refweb sweep"
             )
         unit = f"{observe.unit} per {BY_LINE[path]}" if path in BY_LINE else observe.unit
-        arrays = [None if part is None else np.array([part]) for part in (value, error, left)]
-        return Gradient(result, path, "", ("",), *arrays, unit, number.number)
+        arrays: list[Any] = [None if part is None else np.array([part]) for part in (value, error, left)]
+        return Gradient(result, path, "", ("",), *arrays, unit=unit, number=number.number)
 
     def refuse(self, result):
         """Refuse a result without a gradient, and one behind the horizon; return its `refweb.Observe`."""

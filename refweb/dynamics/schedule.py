@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from .commands import Commands
     from .integrators.integrator import History
 
@@ -92,11 +94,11 @@ class Counts(NamedTuple):
         return frames + (self.rows + self.refined_rows) * (ROW + ROW_CELL * cells)
 
 
-def row_times(scene):
+def row_times(scene) -> NDArray[np.float64]:
     """Times of the history rows [s]: multiples of the interval, and the end."""
     interval, duration = scene.output.interval, scene.solve.duration
     count = int(math.floor(duration / interval * (1.0 + 1e-12)))
-    times = interval * np.arange(count + 1)
+    times: NDArray[np.float64] = interval * np.arange(count + 1)
     if duration - times[-1] > 1e-9 * interval:
         return np.append(times, duration)
     times[-1] = duration

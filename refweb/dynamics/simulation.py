@@ -6,7 +6,7 @@ Keys of a checkpoint are a file format, which `runner._before` checks; `accuracy
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -125,7 +125,8 @@ class Simulation:
             self.schedule = self.schedule._replace(commands=acting)
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
         self._lines, self._through = None, _through_of(system)
-        self._tables, self._compared, self._share_rows, self._kept = [], [], [], kept
+        self._tables, self._compared, self._share_rows = [], [], []
+        self._kept: Any = kept
         self._jumps, self._coincident = None, False
         frames = self.schedule.frames[::-1]
         self._looks = set(frames[:: -(-len(frames) // LOOKS)].tolist())
@@ -325,7 +326,7 @@ class Simulation:
         self._share_rows = [self._kept["share_rows"]] if "share_rows" in self._kept else []
         if self._silent is not None:
             self._silent.restore(self._kept.get("silent", np.zeros((0, 3))))
-        if "edges" in self._kept:
+        if self.overlaps is not None and "edges" in self._kept:
             self.overlaps.restore_edges(self._kept["edges"])
         self._resume_controls(course, row, folder.last_row())
         self._kept, self._tables = None, [np.array([folder.last_row()])]
@@ -417,7 +418,7 @@ class Simulation:
 
             text = coincident_nodes(self.system.net, state.x, self.system.supported)
             self._coincident = text is not None
-            if self._coincident:
+            if text is not None:
                 text += f", or expect short steps (at t = {state.time:.6g} s)"
                 self.solution.findings.append(Finding("coincident-nodes", text, "thread"))
         if self.overlaps is not None and (number in self._looks or course.stopped):

@@ -337,8 +337,8 @@ class SteppedRun:
         arrays = self._simulation.integrator.save(self._course)
         if (commands := self._schedule.commands) is None:
             copy._inputs.restore(self._inputs.present)
-        else:
-            copy._schedule.commands.load(commands.save())
+        elif (copied := copy._schedule.commands) is not None:
+            copied.load(commands.save())
         copy._course = copy._simulation.integrator.load({name: np.array(value) for name, value in arrays.items()})
         copy._tables, copy._row, copy._pending, copy._end = list(self._tables), self._row, [], self._end
         return copy

@@ -6,7 +6,7 @@ Keys of `Around` are the scene format, and its docstring is help; `winding` read
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -85,7 +85,8 @@ class Around(Table):
                 f"around.body = {quote(self.body)} is a {name.lower()}, must be a sphere, a cylinder or a ring: let a "
                 "chain of lines touch it by [contact]"
             )
-        ends, axes, radius = net.points[[first, second]] - centre, body.axes, body.shape.radius
+        shape: Any = body.shape
+        ends, axes, radius = net.points[[first, second]] - centre, body.axes, shape.radius
         across = ends - np.outer(ends @ axes[2], axes[2]) if KINDS[name] == CYLINDER else ends
         for node, away in zip((first, second), np.linalg.norm(across, axis=1), strict=True):
             if away < radius * (1.0 - INSIDE):
@@ -199,10 +200,11 @@ def steady(net: Net, name: str) -> tuple[RigidBody, NDArray[np.float64]]:
         For a body whose axis turns, or whose middle is not its centre of mass.
     """
     body = body_of(net, name)
-    shape, axis = type(body.shape).__name__.lower(), body.axes[2]
+    given: Any = body.shape
+    shape, axis = type(given).__name__.lower(), body.axes[2]
     off = net.points[body.row] + body.offset @ body.axes - net.points[body.base]
     aside = off - (off @ body.axle.direction) * body.axle.direction if body.axle else off
-    if np.linalg.norm(aside) > EVEN * body.shape.radius:
+    if np.linalg.norm(aside) > EVEN * given.radius:
         why = "an axle beside its middle" if body.axle else "nodes whose mass moves its centre of mass"
         raise InputError(f"around.body = {quote(name)} has {why}, which a thread over it does not take")
     if KINDS[type(body.shape).__name__] == CYLINDER and not body.fixed and not body.shape.planar:

@@ -319,7 +319,7 @@ def with_internal(net: Net, name: str, each: int, length_force: Callable[[Net], 
     of the net, internal variables included.
     """
     count, width = len(net.cells), -(-each // 3)
-    first = float(len(net.points)) + width * np.arange(count)
+    first = float(len(net.points)) + width * np.arange(count, dtype=float)
     return replace(with_rows(net.with_column(name, first), width * count), length_force=length_force)
 
 

@@ -123,7 +123,7 @@ def terms_of(
     """
     terms = []
     if force is not None and not turned:
-        terms.append(nodal_load(net, "load", [body.row], np.array([force]), factor))
+        terms.append(nodal_load(net, "load", np.array([body.row]), np.array([force]), factor))
     for value, kernel_of, moment in ((force if turned else None, push, False), (torque, twist, True)):
         if value is not None:
             tangent = tangent_of(moment) if turned else Tangent()

@@ -7,7 +7,7 @@ length by a whole turn. `statics` refuses an equilibrium near there, and `dynami
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def ends_of(net: Net) -> list[End]:
     """Ends of all segments of threads that are on cylinders."""
     ends = []
     for thread in net.threads:
-        segments = segments_of(net, thread)[0] if thread.wraps else None
+        segments: Any = segments_of(net, thread)[0] if thread.wraps else None
         for wrap in thread.wraps:
             body, segment = body_of(net, wrap.body), segments[wrap.segment]
             for n, key in enumerate(("first", "second") if segment["kind"] == CYLINDER else ()):

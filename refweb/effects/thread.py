@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -227,7 +227,12 @@ class Thread(Table):
     """
 
     several = True
-    either = ("modulus", "density"), ("material",), ("stress", "density"), ("tension", "density")
+    either: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("modulus", "density"),
+        ("material",),
+        ("stress", "density"),
+        ("tension", "density"),
+    )
 
     name: str = text(limit=80)
     nodes: Several = nodes()
@@ -245,7 +250,7 @@ class Thread(Table):
     smoothing: float | None = real(default=None, at_least=0, unit="1")
     stress: Any = points(unit="Pa")
     tension: Any = points(unit="N")
-    parameters: dict | None = numbers_by_name()
+    parameters: dict[str, Any] | None = numbers_by_name()
 
     def check(self) -> None:
         """Refuse fewer than two nodes, a node that follows itself, two lengths, and what a cable refuses."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -124,7 +124,7 @@ class Winch(Table):
     """
 
     several = True
-    either = (
+    either: ClassVar[tuple[tuple[str, ...], ...]] = (
         *(
             (kind, *keys)
             for kind in ("thread", "lines")
@@ -334,7 +334,7 @@ class Winch(Table):
                 )
             return [*write_numbers(net, lines, numbers), *others]
         number = next(number for number, thread in system.threads.items() if thread.name == self.thread)
-        array = system.terms[number].data
+        array: Any = system.terms[number].data
         return [(array, np.s_[:, -len(numbers) :], numbers), *others]
 
     def settled(self, net: Net, x: Any) -> Any:

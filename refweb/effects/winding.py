@@ -421,12 +421,13 @@ def segments_of(net: Net, thread: ThreadLine) -> tuple[Any, list[int], bool]:
     segments["second"], segments["length"], segments["spin"] = thread.vectors, thread.distances, -1.0
     for wrap in thread.wraps:
         body, off = steady(net, wrap.body)
+        shape: Any = body.shape
         segment, ends = segments[wrap.segment], rows[wrap.segment : wrap.segment + 2]
-        segment["kind"], segment["body"] = KINDS[type(body.shape).__name__], len(rows) + len(bases)
+        segment["kind"], segment["body"] = KINDS[type(shape).__name__], len(rows) + len(bases)
         bases.append(body.base)
         middle = net.points[body.base] + off
         segment["first"], segment["second"] = net.points[ends] - middle
-        segment["radius"], segment["axes"], segment["off"] = body.shape.radius, body.axes.ravel(), off
+        segment["radius"], segment["axes"], segment["off"] = shape.radius, body.axes.ravel(), off
         segment["angles"] = wrap.angles
         segment["spin"] = -1 if body.turn is None else body.spin
         segment["turns"] = [body.turn if body.axle and end in body.carried else -1 for end in ends]

@@ -90,7 +90,8 @@ class WoundFlow(NamedTuple):
         """Numbers of its cells at present, shape (cells, columns)."""
         if self.thread is None:
             return system.net.line_data.matrix[self.lines]
-        return next(system.terms[n].data for n, thread in system.threads.items() if thread.name == self.thread)
+        data: Any = next(system.terms[n].data for n, thread in system.threads.items() if thread.name == self.thread)
+        return data
 
     def passing(self, net: Net) -> tuple[Any, NDArray[np.int32], int]:
         """(Kernel of slips and their rates, cells, rings of each)."""

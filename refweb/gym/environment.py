@@ -240,7 +240,7 @@ class SceneEnv(gymnasium.Env):
         with in_file(self.scene.file), refused_at(f"[gym] {key}:"):
             value = formula(self._numbers)
         if not math.isfinite(value):
-            raise SolverError(f"{key} = {quote(getattr(self.gym, key))} is {value} at t = {self.run.time:.6g} s")
+            raise SolverError(f"{key} = {quote(getattr(self.gym, key))} is {value} at t = {self._numbers[TIME]:.6g} s")
         return value
 
     def _holds(self, key, condition):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import os
+from typing import Any
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def plotter_of(size, off_screen=False):
     """A plotter of pyvista of a size [pixel], white, with the lights of pictures."""
     import pyvista
 
-    plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), lighting="none")
+    plotter: Any = pyvista.Plotter(off_screen=off_screen, window_size=list(size), lighting="none")
     plotter.set_background("white")
     for position, intensity in LIGHTS:
         plotter.add_light(pyvista.Light(position=position, intensity=intensity, light_type="camera light"))

@@ -232,7 +232,7 @@ def _table(folder):
             )  # a run that is alive may be writing the last
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # that there are no rows
-                named = {columns.index("node [1]"): _node} if path.name == "modes.csv" else None
+                named: Any = {columns.index("node [1]"): _node} if path.name == "modes.csv" else None
                 rows = np.loadtxt(complete_lines, delimiter=",", ndmin=2, converters=named)
         return columns, as_history(columns, rows)
     except (OSError, ValueError) as error:

@@ -56,7 +56,7 @@ class State:
         lines = [i for i, term in enumerate(self.system.terms) if term.contact.with_lines]
         contact = {i: records_of(TOUCH, per_cell[i])["value"] for i in lines}
         pressed = any(f.contact.felt for f in self.system.terms) or any(t.wraps for t in self.system.net.threads)
-        felt = self.system.contact_forces.of(per_cell) if pressed else None
+        felt: Any = self.system.contact_forces.of(per_cell) if pressed else None
         threads = {thread.name: per_cell[i][0] for i, thread in self.system.threads.items()}
         return force, per_cell.tension, contact, felt, threads, per_cell.lines[:, STRAIN]
 

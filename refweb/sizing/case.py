@@ -149,15 +149,12 @@ def _parts_of(name, kind, observe, numbers, values, factors=None):
 
     order = np.argsort(-values, kind="stable")[:MOST]
     order = order[values[order] >= values.max() - NEAR * abs(values.max())]
-    kept = {"quantity": observe.quantity, "component": observe.component}
-    return [
-        Part(
-            float(values[n]),
-            1.0 if factors is None else float(factors[n]),
-            Observe(name=part_of(name, kind, numbers[n]), **kept, **{kind: int(numbers[n])}),
-        )
-        for n in order
-    ]
+    parts = []
+    for n in order:
+        keys: dict[str, Any] = {kind: int(numbers[n]), "quantity": observe.quantity, "component": observe.component}
+        factor = 1.0 if factors is None else float(factors[n])
+        parts.append(Part(float(values[n]), factor, Observe(name=part_of(name, kind, numbers[n]), **keys)))
+    return parts
 
 
 def _of_lines(name, solution):
@@ -230,7 +227,8 @@ def _of_strength(name, summary):
 
 def _number(name):
     """Number of the mode of a natural frequency."""
-    return int(FREQUENCY.fullmatch(name)[1])
+    match: Any = FREQUENCY.fullmatch(name)
+    return int(match[1])
 
 
 def _modes(scene, names):

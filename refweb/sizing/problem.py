@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import math
+from typing import Any
 
 from ..errors import InputError, in_file
 from ..messages import quote, short
@@ -57,7 +58,8 @@ class Problem:
         first = Design(tuple(self.space.starts(1, 0)[0]) if self.space.free else (), (0,) * len(self.space.listed))
         for design in self._beside(first):
             self.space.scene(design, self.drawn[0])  # each end and option makes a scene
-        names, scenes = None, []
+        names: Any = None
+        scenes = []
         for design in self._each_scene(first):
             *_, scene = self.space.scene(design, self.drawn[0])
             scene.build()

@@ -326,7 +326,7 @@ class Sizing(Table):
         for name, requirement in self.requirements.items():
             if requirement.probability is None:
                 continue
-            if not self.draws:
+            if self.count is None:
                 raise InputError(f"requirements: {name}: probability has no meaning without [draws]")
             needed = math.ceil(math.log(0.5 * (1.0 - self.confidence)) / math.log(requirement.probability))
             if self.count <= needed:

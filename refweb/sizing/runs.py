@@ -11,6 +11,7 @@ import json
 import math
 import pathlib
 import statistics
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ..errors import InputError
@@ -115,7 +116,8 @@ class Runs:
     """
 
     def __init__(self, problem, out, crew):
-        self.problem, self.crew, self.tell = problem, crew, lambda text, share: None
+        self.problem, self.crew = problem, crew
+        self.tell: Callable[..., object] = lambda text, share: None
         self.path = None if out is None else pathlib.Path(out).absolute()
         self.rows, self.judged, self.fresh, self.ends = {}, {}, 0, []
         self.asked, self._files, self._table = set(), {}, None
@@ -230,7 +232,14 @@ class Runs:
             names = [item.name for item in case_rows.results_among(lacking)]
             message = lacking["message"] or f"no value of {', '.join(sorted(problem.used.difference(names)))}"
         pairs = [self._of_requirement(name, values) for name in problem.requirements]
-        return Judged(design, rows, Interval(*ends), *map(tuple, zip(*pairs, strict=True)), one_line(message), spread)
+        return Judged(
+            design,
+            rows,
+            Interval(*ends),
+            *map(tuple, zip(*pairs, strict=True)),
+            message=one_line(message),
+            spread=spread,
+        )
 
     def _values(self, design, row):
         """Values by name for formulas; None where the row has no results."""

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -94,7 +94,8 @@ class Smooth:
 
     def __init__(self, runs, options):
         self.runs, self.options, self.problem = runs, options, runs.problem
-        self.count, self.size, self.coarse, self._points = len(self.problem.space.free), None, False, {}
+        self.count, self.coarse, self._points = len(self.problem.space.free), False, {}
+        self.size: Any = None
         self.parts = [name for name, f in self.problem.requirements.items() for _ in f.parts]
         self._keys = {(n, None): n for n in range(len(self.parts))}
 
@@ -113,7 +114,9 @@ class Smooth:
         (judged,) = self.runs.of([design], slopes=True)
         if not math.isfinite(judged.value):
             none, count = np.zeros(self.count), len(self.parts)
-            rows = {(n, None): (-1.0, none) for n in range(count)}
+            rows: dict[tuple[int, int | None], tuple[float, np.ndarray]] = {
+                (n, None): (-1.0, none) for n in range(count)
+            }
             return Point(math.inf, none, -np.ones(count), np.zeros(count), rows)
         values, row = self.runs.values_of(judged), judged.rows[0]
         numbers = {name: middle(v) if isinstance(v, tuple) else v for name, v in values.items()}
@@ -153,8 +156,8 @@ class Smooth:
     def _lines(self, row, design):
         """{Line or node: (value, gradient)} by result, of those whose value is close to the largest."""
         lines = {}
-        for key in filter(PART.fullmatch, row):
-            name, kind, n = PART.fullmatch(key).groups()
+        for match in filter(None, map(PART.fullmatch, row)):
+            key, (name, kind, n) = match[0], match.groups()
             if name in self.problem.results and row[key] is not None:
                 at = part_of(name, kind, n)
                 lines.setdefault(name, {})[int(n)] = (row[at], self._slope(at, row, design))

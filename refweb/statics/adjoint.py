@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -177,7 +177,8 @@ class Adjoint:
 
     def _refined(self, b):
         """(Solution of Kᵀ λ = b, its last correction), None where the factorization does not lead to one."""
-        factor, follows = self.newton.factor, self.newton.follows
+        factor: Any = self.newton.factor
+        follows = self.newton.follows
         down = self._matrix.T if follows else self._matrix
         solution, change = np.zeros_like(b), np.zeros_like(b)
         for _ in range(ROUNDS):

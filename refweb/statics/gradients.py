@@ -341,7 +341,8 @@ class Gradients:
 
     def _by_line(self, solved, path):
         """(Derivative, ±) by a number of each line, both of shape (lines,)."""
-        return _with_error([(self._line_values(*item[:3], path), item[3]) for item in solved])
+        values = self._line_values
+        return _with_error([(values(linear, response, rows, path), share) for linear, response, rows, share in solved])
 
     def _line_values(self, linear, response, rows, path):
         """Derivatives by a number of each line at one state."""
@@ -423,7 +424,8 @@ class Gradients:
         if number is None:
             raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(given))}")
         size = abs(number) or self._size_beside(given, path)
-        best = before = None
+        best: Any = None
+        before = None
         for attempt in range(STEPS):
             step = LARGEST_STEP * size / SHRINKS**attempt
             value, error, rounding = self._differences(solved, path, number, step)

@@ -10,6 +10,8 @@ method is used.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..system.static_system import at_rest
@@ -56,7 +58,7 @@ def solve(system, load_steps, progress=None):
         solver, shared = newton, bool(states) and states[-1].contact_shares is not None
         newton.start_path()
         try:
-            state = None if shared else _equilibrium(newton, t, x, warm=bool(states))
+            state: Any = None if shared else _equilibrium(newton, t, x, warm=bool(states))
         except NotFound as not_found:
             if not _may_share(system):
                 raise with_reason(system, t, not_found) from None

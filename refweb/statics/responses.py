@@ -227,7 +227,7 @@ def _energy(name, linear):
     """The response of an energy of the net."""
     system, net, (explicit, reacting) = linear.system, linear.net, _nothing(linear)
     shares = [(term, _share(name, term.balance.column)) for term in system.terms if term.energy is not None]
-    slope = -sum((share * system.force_of(term, linear.t, linear.x) for term, share in shares if share), reacting)
+    slope: Any = -sum((share * system.force_of(term, linear.t, linear.x) for term, share in shares if share), reacting)
     if _share(name, "strain_energy"):
         energy, ea = system.energy_of(system.lines, linear.t, linear.x), net.line_data.ea
         explicit.axial[:] = energy / np.where(ea != 0.0, ea, 1.0)

@@ -282,14 +282,15 @@ class SharedPush:
 
     def _balanced(self, t, x, warm, stats):
         """Equilibrium with φ, from x; ``stats`` grow by what the parts before the last have spent."""
-        for part in range(PARTS):
+        for _ in range(PARTS - 1):
             try:
                 return self.newton.solve(t, x, warm=warm, limit=PART)
             except NotFound as error:
-                if part == PARTS - 1 or error.x is None or gone(self._plain, error.x) is not None:
+                if error.x is None or gone(self._plain, error.x) is not None:
                     raise
                 add_spent(stats, error.stats)
                 x = error.x
+        return self.newton.solve(t, x, warm=warm, limit=PART)
 
     def _polish(self, t, state):
         """Take two more steps, as long as the residual falls; with a large w, that rounding changes shares little."""

@@ -29,7 +29,7 @@ References
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -227,7 +227,8 @@ class FrequencyGradients(Gradients):
 
     def _equal_to(self, result):
         """Numbers of the first and of the one behind the last mode whose frequency is that of a result within ±."""
-        number, linear, more, complete = int(NAME.fullmatch(result)[1]), self.linear, 1, False
+        match: Any = NAME.fullmatch(result)
+        number, linear, more, complete = int(match[1]), self.linear, 1, False
         while number not in self._groups:
             known, count = self._spectrum, len(self._spectrum.frequency)
             apart = np.diff(known.frequency) > known.error[1:] + known.error[:-1]
@@ -256,10 +257,10 @@ class FrequencyGradients(Gradients):
             raise InputError("by line and group mass beside [[attach]] is not taken: name one number of the scene")
 
     def _sides(self, result, every, errors):
-        if NAME.fullmatch(result) is None:
+        if (match := NAME.fullmatch(result)) is None:
             return super()._sides(result, every, errors)
         first, last = self._equal_to(result)
-        at, count = int(NAME.fullmatch(result)[1]) - 1 - first, last - first
+        at, count = int(match[1]) - 1 - first, last - first
         matrix = np.zeros((*every.shape[1:], count, count), dtype=complex)
         error = np.zeros(matrix.shape)
         for i in range(count):
@@ -463,7 +464,8 @@ def _slope_of_unknowns(mode, linear):
 
 def _derivative(function, size):
     """(Derivative at 0, its possible error) of a function of a number, by differences of order 4 of the best step."""
-    best = before = None
+    best: Any = None
+    before = None
     for attempt in range(STEPS):
         step = FIRST * size / SHRINKS**attempt
         values = [function(k * step) for k in (-2.0, -1.0, 1.0, 2.0)]

@@ -206,9 +206,10 @@ class Gym(Table):
         for key in ("reward", "terminated", "truncated"):
             given = getattr(self, key)
             with refused_at(f"{key}:"):
-                formulas.append(None if given is None else Formula(given, names, None if key == "reward" else True))
-                if given is not None:
-                    formulas[-1].check_types(typical)
+                formula = None if given is None else Formula(given, names, None if key == "reward" else True)
+                if formula is not None:
+                    formula.check_types(typical)
+                formulas.append(formula)
         return formulas
 
     def drawn(self, generator: np.random.Generator, draws: dict[str, Any] | None = None) -> dict[str, Any]:

@@ -125,7 +125,7 @@ class Expression:
         For a text that is no condition, and for an unknown name, with the nearest known one.
     """
 
-    def __init__(self, text, names, compares=True):
+    def __init__(self, text, names, compares: bool | None = True):
         self.text, self._aliases = text, {}
         if len(text) > LONGEST:
             raise InputError(f"a condition must have at most {LONGEST} characters, not {len(text)}")
@@ -225,7 +225,7 @@ class Expression:
             raise TypeError
         return value
 
-    def _value(self, node: Any, values):
+    def _value(self, node: Any, values) -> Any:
         if isinstance(node, ast.Constant):
             return _read(node.value)
         if isinstance(node, ast.Name):
@@ -260,7 +260,7 @@ class Formula(Expression):
         As `Expression`.
     """
 
-    def __init__(self, text, names, compares=True):
+    def __init__(self, text, names, compares: bool | None = True):
         super().__init__(text, names, compares)
         tree = ast.fix_missing_locations(ast.Expression(_Plain().visit(copy.deepcopy(self.tree))))
         self._code = compile(tree, "<formula>", "eval")
@@ -298,7 +298,9 @@ class Formula(Expression):
             value = node.value if isinstance(node, ast.Constant) else values[self._aliases[node.id]]
             return _kind_of(value)
         if isinstance(node, ast.Subscript):
-            entries, index = values[self._aliases[node.value.id]], node.slice.value
+            vector: Any = node.value
+            number: Any = node.slice
+            entries, index = values[self._aliases[vector.id]], number.value
             if not isinstance(entries, list | tuple) or index >= len(entries):
                 raise InputError(
                     f"{quote(self.text)}: {self._written(node.value)} is {_kind_of(entries)}: no [{index}]"
@@ -335,7 +337,7 @@ class _Plain(ast.NodeTransformer):
     def visit_Compare(self, node):
         """Compare what is not NaN."""
         self.generic_visit(node)
-        sides = [_call("_known", side) for side in (node.left, *node.comparators)]
+        sides: list[ast.expr] = [_call("_known", side) for side in (node.left, *node.comparators)]
         return ast.Compare(sides[0], node.ops, sides[1:])
 
     def visit_Subscript(self, node):

@@ -70,8 +70,9 @@ def _check(part, net, title):
             )
     else:
         _check_array(part, "data", np.float64, title)
-        if len(part.data) != len(cells):
-            raise InputError(f"{title}: data has {len(part.data)} rows for {len(cells)} cells: give one row a cell")
+        data: Any = part.data
+        if len(data) != len(cells):
+            raise InputError(f"{title}: data has {len(data)} rows for {len(cells)} cells: give one row a cell")
     if isinstance(part, ForceTerm):
         _check_kernels(part, title)
 

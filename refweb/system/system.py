@@ -183,8 +183,9 @@ class System:
     @property
     def internal_of_lines(self) -> str:
         """Table or key that gives lines internal variables; empty without any."""
-        known = (term for term in self.terms if term.internal and np.array_equal(term.cells, self.net.cells))
-        return next((term.internal.title for term in known), "") if self.net.rows_of_elements else ""
+        cells = self.net.cells
+        titles = (term.internal.title for term in self.terms if term.internal and np.array_equal(term.cells, cells))
+        return next(titles, "") if self.net.rows_of_elements else ""
 
     def resistance(self, t: float) -> NDArray[np.float64]:
         """c of each internal variable at time t, in the order of their components, see `InternalVariables`."""

@@ -20,6 +20,7 @@ import functools
 import math
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -116,7 +117,8 @@ class CentralDifference(Integrator):
         self._observed = Observed.of(probes, sums, len(outs), outs, self.model.contacts)
         self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])
         self._events, self._least_energy = event_rows(events), least_energy(net)
-        self._taken, self._prepared, self._kept = None, False, ()
+        self._taken, self._prepared = None, False
+        self._kept: Any = ()
         self._history = History.empty(0, len(probes), system.terms)
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
@@ -212,7 +214,7 @@ class CentralDifference(Integrator):
         self.system.forces(course.time, course.x, course.v, self._outs)
         return course
 
-    def renew(self, course, change):
+    def renew(self, course: ExplicitState, change):
         """Go on with forces that have changed, see `refweb.dynamics.integrators.integrator.Integrator.renew`."""
         course.force += change
 

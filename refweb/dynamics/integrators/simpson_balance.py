@@ -51,7 +51,8 @@ class Sample:
     """
 
     def __init__(self, system, time, x, v):
-        self._system, self.time, self.x, self.v, self.rates = system, time, x, v, None
+        self._system, self.time, self.x, self.v = system, time, x, v
+        self.rates: Rates | None = None
         self.force, self.per_cell = system.balance(time, x, v)
         refuse_endless(system, time, self.force)
 
@@ -75,8 +76,8 @@ class Rates(NamedTuple):
     """
 
     flow: np.ndarray
-    lengths: np.ndarray | None = None
-    length_force: np.ndarray | None = None
+    lengths: Any = None
+    length_force: Any = None
 
 
 class Piece(NamedTuple):

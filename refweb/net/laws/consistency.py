@@ -11,6 +11,8 @@ too, so that the smoothness of a law does not matter. The intervals have no gaps
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...errors import InputError
@@ -71,11 +73,12 @@ def _compare(law, line, number):
             for name in ("energy_density", "stress", "tangent")
         }
         for name, value in values.items():  # a law may end at a strain, without numbers beyond
-            known = np.isfinite(value).all(axis=0)
+            known: Any = np.isfinite(value).all(axis=0)
             for at in np.flatnonzero(~known[: np.flatnonzero(known).max(initial=-1)])[:1]:
                 raise InputError(
                     f"{title} at a strain of {line.slackness[0] + offset[at]:g} {name} is no finite number"
                 )
+        low = rise = allowed = np.zeros(0)  # of the last kind behind the loop
         for (above, below, words), scale in zip(KINDS, (ea * np.abs(offset), ea), strict=True):
             rise = (values[above][-1] - values[above][0]) / (2.0 * width)
             low, high = values[below].min(axis=0), values[below].max(axis=0)

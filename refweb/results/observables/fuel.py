@@ -26,7 +26,7 @@ class Fuel(Observable):
     """Impulse that a control has spent: ∫ abs(F) dt of its force, on all nodes of its load together."""
 
     unit = "N s"
-    keys = ("control",)
+    keys: tuple[str, ...] = ("control",)
     dynamic = True
 
     def bounds(self, system: System | None) -> tuple[float, float]:

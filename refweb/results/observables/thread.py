@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -86,13 +86,14 @@ class OfThread(Observable):
 
         None if the thread may be slack within the bound and the value is no tension, which then is not unique.
         """
-        net, line, bound = state.system.net, self._thread(state.system)[1].line, equilibrium.duality_bound
+        thread, bound = self._thread(state.system)[1], equilibrium.duality_bound
+        line = thread.line
         if bound is None:
             error = super().error(state, equilibrium)
             return None if error is None else error + ROUNDING * self.scale(line)
-        names = [thread.name for thread in net.threads]
-        error = float(bound.threads[names.index(self.observe.thread)])
-        if not self.pull and state.threads[self.observe.thread][0] <= error:
+        names = [each.name for each in state.system.net.threads]
+        error = float(bound.threads[names.index(thread.name)])
+        if not self.pull and state.threads[thread.name][0] <= error:
             return None
         return (error / float(line.axial[0]) + ROUNDING) * self.scale(line)
 
@@ -104,7 +105,7 @@ class OfThread(Observable):
 class Tension(OfThread):
     """Tension of a thread, with friction the largest, or that of a segment."""
 
-    keys = "thread", "segment"
+    keys: tuple[str, ...] = ("thread", "segment")
     unit = "N"
     pull = True
 
@@ -127,7 +128,8 @@ class Tension(OfThread):
 class Stress(OfThread):
     """Nominal stress of a thread, tension over area."""
 
-    unit, column = "Pa", 1
+    unit = "Pa"
+    column = 1
     pull = True
 
     def scale(self, line: Net) -> float:
@@ -144,7 +146,7 @@ class Strain(OfThread):
 class Slip(OfThread):
     """Length of a thread that has gone over a ring with friction, or a winch, in the order of its nodes."""
 
-    keys = "thread", "ring"
+    keys: tuple[str, ...] = ("thread", "ring")
     unit = "m"
 
     def on(self, system: System) -> None:
@@ -161,7 +163,8 @@ class Slip(OfThread):
 
     def column_in(self, thread: ThreadLine) -> int:
         """Column of the slip."""
-        return COLUMNS + len(thread.distances) + (self.observe.ring - 1) % thread.rings
+        ring: Any = self.observe.ring
+        return COLUMNS + len(thread.distances) + (ring - 1) % thread.rings
 
     def scale(self, line: Net) -> float:
         """Natural length."""
@@ -171,7 +174,8 @@ class Slip(OfThread):
 class Length(OfThread):
     """Current length of a thread, from its first node to its last through all others."""
 
-    unit, column = "m", 3
+    unit = "m"
+    column = 3
 
     def bounds(self, system: System | None) -> tuple[float, float]:
         """Bounds of the value: a length is not negative."""
