@@ -217,7 +217,12 @@ def on_a_rail(duration, step, contact, velocity, height, observe):
             contact,
             refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
         ),
-        observe=[refweb.Observe(name="place", quantity="position", body="ball", component=axis) for axis in observe],
+        observe=[
+            refweb.Observe(
+                name="place" if len(observe) == 1 else axis, quantity="position", body="ball", component=axis
+            )
+            for axis in observe
+        ],
         solve=refweb.Dynamic(duration=duration, step_size=step),
         output=refweb.Output(interval=5e-3),
     )
@@ -258,6 +263,19 @@ def test_friction(duration):
             off[-1].append(abs(float(gradient) - exact))
             assert off[-1][-1] <= gradient.error[0] + 1e-8
     assert 3.0 < np.linalg.norm(off[0]) / np.linalg.norm(off[1]) < 5.0
+
+
+def test_a_flight_before_a_rubbing_contact():
+    """A ball with friction and damping of contact flies 1 cm before it touches: no cell acts, and x = x0 + v t."""
+    contact = refweb.Contact(stiffness=1e4, friction=0.3, damping=0.1)
+    solution = refweb.run(on_a_rail(0.02, 2e-4, contact, (0.5, 0.0, -0.6), 0.11, "xz"), progress=False)
+    flying = refweb.run(on_a_rail(0.01, 2e-4, contact, (0.5, 0.0, -0.6), 0.11, "xz"), progress=False)
+    assert float(flying.gradient("x", "body.0.velocity.0")) == pytest.approx(0.01, rel=1e-6)
+    assert float(flying.gradient("z", "body.0.velocity.2")) == pytest.approx(0.01, rel=1e-6)
+    gradient, step = solution.gradient("z", "body.0.velocity.2"), 1e-4
+    scene = on_a_rail(0.02, 2e-4, contact, (0.5, 0.0, -0.6), 0.11, "xz")
+    ends = [again(scene, "body.0.velocity.2", -0.6 + sign * step).results["z"].value for sign in (-1, 1)]
+    assert abs((ends[1] - ends[0]) / (2.0 * step) - float(gradient)) <= gradient.error[0]
 
 
 def test_damping_of_contact():
