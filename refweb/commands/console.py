@@ -398,7 +398,7 @@ def print_size(summary):
 def print_gradients(solution, result, gradients, refused, limit):
     """Print the box of gradients of a result, at most so many entries of each; ``refused`` are texts."""
     computed, numbers = solution.results[result], [gradient for gradient in gradients if not gradient.by]
-    idle = [gradient.path for gradient in numbers if not float(gradient) and gradient.left is None]
+    idle = [g.path for g in numbers if not float(g) and g.left is None and not g.error.any()]
     numbers = [gradient for gradient in numbers if gradient.path not in idle]
     rows: list = [("by", _of_numbers(numbers, computed.unit))] if numbers else []
     rows += [("no effect", ", ".join(idle))] if idle else []

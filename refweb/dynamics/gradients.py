@@ -5,6 +5,9 @@ The run is repeated with the same steps, and derivatives of its motion go beside
 at the time t* of its largest value, has the derivative of its value there: dJ/dp = ∂J/∂x δx + ∂J/∂v δv + ∂J/∂p. t*
 changes as well, but J is stationary there.
 
+Peaks in time that ± does not tell apart count as lines that share a largest value, see `refweb.dynamics.peaks`. A size
+that is 0 has a derivative to each side; a largest value that is kept for a time in which derivatives differ has none.
+
 ± is the difference from the gradient of the step-refinement run, with the factors of the results themselves, see
 `refweb.dynamics.twin_error`. At a kink of the force, of a first contact or a line that snaps taut, derivatives have
 errors of order 1 in the step, which may agree by chance; so ± takes the differences at all times before as well.
@@ -24,13 +27,16 @@ from ..errors import InputError, SolverError
 from ..messages import nearest, quote, short
 from ..registry import load
 from ..results.observables.fuel import Fuel
+from ..results.observables.observe import SIGN
 from ..results.observables.slack_fraction import SlackFraction
+from ..results.state import State
 from ..statics.gradients import BY_LINE, Gradient
 from .divergence import divergence, lost_before
 from .history import SPREAD
 from .integrators.tangent import Steps, Tangent
 from .parameters import Parameter
-from .responses import Instant, between, rates_of, slopes_of
+from .peaks import Peak, Peaks, kept, pooled
+from .responses import Instant, between, rates_of, slopes_of, value_of
 from .schedule import blocks, times_of
 from .simulation import Simulation
 from .twin_error import largest_mean
@@ -87,6 +93,7 @@ class Gradients:
         _refuse(scene, system, solution)
         self._simulation = Simulation(scene, system, load("refweb.solution:Solution")(scene))
         self._observed, self._known = {o.name: o for o in scene.observables}, {}
+        self._given = {name: result.error or 0.0 for name, result in solution.results.items()}
         self._simulation.settle(lambda text, share: None)
         integrator = self._simulation.integrator
         self._methods = integrator, integrator.refined()
@@ -117,9 +124,12 @@ class Gradients:
         observe = self.refuse(result)
         self.follow([path])
         number, by_name = self._known[path]
-        value, left, error, times, errors = by_name[result]
+        known = by_name[result]
+        value, left, error, times, errors = known[:5]
         size, moved = abs(self._runs[0].results[result].value), abs(number.number) or number.size
         limit = max(abs(value), AMPLIFIED * size / moved)
+        if known.kept is not None or size > 0.0 and error > limit and known.rivals is not None:
+            raise InputError(f'gradient of "{result}" by {path}: {known.kept or known.rivals}')
         if size > 0.0 and error > limit:
             lost = times[errors > limit].min(initial=self._runs[0].results[result].time)
             raise InputError(
@@ -184,13 +194,18 @@ class Gradients:
         first, finer = (
             self._linear(method, run, numbers) for method, run in zip(self._methods, self._runs, strict=True)
         )
-        factor = SPREAD / (1.0 - (self._runs[0].nsteps / self._runs[1].nsteps) ** 2)
-        every = {name: _with_errors(name, first, finer, factor, self._runs[0].results) for name in first.slopes}
+        sizes = np.array([number.size for number in numbers])
+        every = {
+            name: _with_errors(self._observed[name], first, finer, self._factor, self._runs[0].results[name], sizes)
+            for name in first.peaks
+        }
         for n, number in enumerate(numbers):
-            by_name = {
-                name: tuple(part if part is None else part[n] for part in parts) for name, parts in every.items()
-            }
-            self._known[number.path] = number, by_name
+            self._known[number.path] = number, {name: parts[n] for name, parts in every.items()}
+
+    @property
+    def _factor(self):
+        """± over the difference of run and step refinement."""
+        return SPREAD / (1.0 - (self._runs[0].nsteps / self._runs[1].nsteps) ** 2)
 
     def _linear(self, integrator, run, numbers):
         """The `Linear` run of a method."""
@@ -202,15 +217,23 @@ class Gradients:
         results = {o.name: run.results[o.name] for o in observed}
         waiting = sorted({*sampled, *(result.time for result in results.values())})
         steps = Steps(integrator, simulation.begin.motion)
-        course, linear = steps.course, Linear([], {name: [] for name in results}, {})
+        course, linear = steps.course, Linear([], {name: [] for name in results}, {o.name: [] for o in observed}, {})
         tangent = Tangent(integrator, numbers, 0.0, course.x, course.v, course.force)
+        errors = {o.name: self._error_of(o.name) for o in observed}
+        reduced = [o for o in observed if SIGN[o.reduce]]
+        linear.samples.update({o.name: [] for o in reduced})
+        searches = {
+            o.name: Peaks(SIGN[o.reduce], results[o.name].value - SIGN[o.reduce] * errors[o.name]) for o in reduced
+        }
 
         def instant():
             inverse = integrator.model.inertia.inverse
             return Instant(course.x, course.v, inverse * course.force, tangent.x, tangent.v, tangent.a).copied()
 
-        def error_of(name):
-            return abs(self._runs[0].results[name].value - self._runs[1].results[name].value) * SPREAD
+        def at(time):
+            """The instant at a time of the last two steps."""
+            (t0, before), (t1, now) = trail[:2] if time <= trail[1][0] else trail[-2:]
+            return now if time == t1 else between((time - t0) / (t1 - t0), t1 - t0, before, now)
 
         def record(time, now):
             rates = rates_of(observed, numbers, system, time, now)
@@ -218,48 +241,111 @@ class Gradients:
                 linear.times.append(time)
             for o in observed:
                 if time in sampled:
-                    linear.rows[o.name].append(slopes_of(o, *rates[o.name], 0.0).value)
+                    linear.rows[o.name].append(slopes_of(o, rates[o.name], 0.0).value)
                 if time == results[o.name].time:
-                    linear.slopes[o.name] = slopes_of(o, *rates[o.name], error_of(o.name))
+                    linear.peaks[o.name].append(_peak(o, time, rates[o.name], errors[o.name]))
+                elif time in sampled and o in reduced:
+                    linear.samples[o.name].append(_peak(o, time, rates[o.name], 0.0))
+
+        def search(t, h):
+            state = State(system, t, trail[-1][1].x, trail[-1][1].v)
+            for o in reduced:
+                beside(o, searches[o.name].step(t, value_of(o, state)), h)
+
+        def beside(o, time, h):
+            if time is not None and abs(time - results[o.name].time) > 2.0 * h:
+                rates = rates_of([o], numbers, system, time, at(time))[o.name]
+                linear.peaks[o.name].append(_peak(o, time, rates, errors[o.name]))
 
         def on_step(t, h):
             tangent.step(t, h, course.x, course.v, course.force)
-            now = instant()
+            trail[:] = [*trail[-2:], (t, instant())]
             while waiting and waiting[0] <= t:
                 time = waiting.pop(0)
-                record(time, now if time == t else between(1.0 - (t - time) / h, h, before[0], now))
-            before[0] = now
+                record(time, at(time))
+            search(t, h)
 
-        before = [instant()]
+        trail = [(0.0, instant())]
         while waiting and waiting[0] <= 0.0:
-            record(waiting.pop(0), before[0])
+            record(waiting.pop(0), trail[0][1])
+        search(0.0, 0.0)
         steps.follow(times, on_step)
         for time in waiting:  # that of the end, but for rounding
-            record(time, before[0])
+            record(time, trail[-1][1])
+        for o in reduced:
+            beside(o, searches[o.name].end(), trail[-1][0] - trail[-2][0])
         return linear
+
+    def _error_of(self, name):
+        """± of a result, of the solution where it has one."""
+        first, finer = (run.results[name].value for run in self._runs)
+        return max(self._given[name], self._factor * abs(first - finer))
 
 
 class Linear(NamedTuple):
-    """Derivatives of a run: at times (k,), rows by name (k, numbers), and `Slopes` of results by name."""
+    """Derivatives of a run: at times (k,), rows by name (k, numbers), and `Peak` of results and samples by name."""
 
     times: list[float]
     rows: dict[str, list[np.ndarray]]
-    slopes: dict[str, Any]
+    peaks: dict[str, list[Peak]]
+    samples: dict[str, list[Peak]]
 
 
-def _with_errors(name, first, finer, factor, results):
-    """(Value, left or None, ±, times, ± there) of a result by some numbers, each a list of as many."""
-    slopes, others, end = first.slopes[name], finer.slopes[name], results[name].time
+class Known(NamedTuple):
+    """Derivative of a result by a number for one that rises, for one that falls or None, ±, times, and ± there.
+
+    ``rivals`` and ``kept`` are the reasons by which it may, or does, have none; None where there is no such reason.
+    """
+
+    value: float
+    left: float | None
+    error: float
+    times: np.ndarray
+    errors: np.ndarray
+    rivals: str | None
+    kept: str | None
+
+
+def _peak(observe, time, rates, error):
+    """The `Peak` of `refweb.dynamics.responses.Rates`."""
+    return Peak(time, observe.observable.selected(rates.values)[0], slopes_of(observe, rates, error))
+
+
+def _with_errors(observe, first, finer, factor, result, sizes):
+    """The `Known` of a result by each of some numbers of these sizes, a list."""
+    name, end, sign, unit = observe.name, result.time, SIGN[observe.reduce], observe.unit
+    pool = pooled(first.peaks[name], end, sign)
+    peaks, main = first.peaks[name], first.peaks[name][pool.at]
+    refined = pooled(finer.peaks[name], end, sign)
     count = min(len(first.times), len(finer.times))
     times, rows, beside = (np.array(part[:count]) for part in (first.times, first.rows[name], finer.rows[name]))
-    apart = np.maximum(np.abs(slopes.value - others.value), np.abs(slopes.left - others.left))
+    apart = np.maximum(np.abs(pool.value - refined.value), np.abs(pool.left - refined.left))
     if count:
         apart = np.maximum(apart, [largest_mean(times, column, end) for column in np.abs(rows - beside).T])
-    one_sided = (slopes.left != slopes.value).any()
-    spread = 0.0 if one_sided else slopes.spread
-    error = factor * apart + spread + LEAST * np.maximum(np.abs(slopes.value), np.abs(slopes.left))
-    errors = factor * np.abs(rows - beside)[times <= end].T
-    return slopes.value, slopes.left if one_sided else None, error, [times[times <= end]] * len(errors), errors
+    error = factor * apart + LEAST * np.maximum(np.abs(pool.value), np.abs(pool.left))
+    errors, before, known = factor * np.abs(rows - beside)[times <= end].T, times[times <= end], []
+    low, high = kept(first.samples.get(name, []), main.value, sizes)
+    for n in range(len(sizes)):
+        value, left = pool.value[n], pool.left[n]
+        if abs(value - left) <= error[n]:
+            value = left = main.slopes.value[n]
+        spread = max(0.0, pool.high[n] - max(value, left), min(value, left) - pool.low[n])
+        far = max(peaks, key=lambda peak: abs(peak.slopes.value[n] - value))
+        rivals = stays = None
+        if spread > error[n] and far is not main:
+            rivals = (
+                f"it is {main.value:.6g} {unit} at {main.time:.4g} s and {far.value:.6g} {unit} at {far.time:.4g} s, "
+                f"which its ± does not tell apart, with derivatives of {value:.3g} and {far.slopes.value[n]:.3g}: take "
+                "a result of an instant, or smaller steps"
+            )
+        total = error[n] + spread
+        if high[n] > max(value, left) + total or low[n] < min(value, left) - total:
+            stays = (
+                f"it keeps {main.value:.6g} {unit} for a time, in which its derivatives are from {low[n]:.3g} to "
+                f"{high[n]:.3g}: take a result of an instant, or another start"
+            )
+        known.append(Known(value, left if left != value else None, total, before, errors[n], rivals, stays))
+    return known
 
 
 def _is_smooth(observe):

@@ -21,6 +21,9 @@ MOVED = 1e-7
 TIED = 1e-6
 """Relative difference below which lines or nodes share the largest value, as symmetric ones do."""
 
+KINK = 1e-9
+"""Change over its size of a number that makes up for a size, or a difference of values, that counts as 0."""
+
 
 class Instant(NamedTuple):
     """A state of a motion and its derivatives: x, v, a of shape (rows, 3), and theirs of shape (numbers, rows, 3)."""
@@ -49,8 +52,8 @@ def between(share, h, before, now):
     return Instant(*parts)
 
 
-def values_of(observe, state):
-    """Value of each line or node of an observable, or of the whole of it, shape (k,)."""
+def parts_of(observe, state):
+    """Value of each line or node of an observable, or of the whole of it, shape (k,); vectors (k, 3) of magnitudes."""
     observable, system = observe.observable, state.system
     if isinstance(observable, Booked):
         energies = [system.energy_of(term, state.time, state.x).sum() for term in system.terms]
@@ -58,23 +61,51 @@ def values_of(observe, state):
         return np.array([weights(system, observe.quantity)[:-2] @ [*energies, kinetic]])
     if isinstance(observable, Line):
         return observable.values(state)[observable.elements(system.net)]
-    summed = isinstance(observable, Reaction) and observe.select is None
-    if type(observable).of in (Nodal.of, Reaction.of) and not summed:
-        return observable.sizes(observable.vectors(state)[observable.rows(system)])
+    if type(observable).of in (Nodal.of, Reaction.of):
+        vectors = observable.vectors(state)[observable.rows(system)]
+        if isinstance(observable, Reaction) and observe.select is None:
+            vectors = vectors.sum(axis=0, keepdims=True)
+        return vectors if observe.component is None else observable.sizes(vectors)
     return np.array([observable.of(state).value])
 
 
-def rates_of(observed, numbers, system, t, instant):
-    """Values of observables, and their derivatives, at an instant.
+def value_of(observe, state):
+    """Value of an observable in a state: that of the line or node that counts."""
+    part = parts_of(observe, state)
+    return observe.observable.selected(np.linalg.norm(part, axis=1) if part.ndim == 2 else part)[0]
 
-    Returns
-    -------
-    dict of str to (ndarray of shape (k,), ndarray of shape (numbers, k))
+
+class Rates(NamedTuple):
+    """Values of the lines or nodes of an observable, shape (k,), and derivatives for numbers that rise and that fall.
+
+    ``right`` and ``left``, shape (numbers, k), differ where a size is 0.
     """
+
+    values: np.ndarray
+    right: np.ndarray
+    left: np.ndarray
+
+
+def _sided(observe, part, rates, sizes):
+    """The `Rates` of parts with smooth derivatives, shape (numbers, k) or (numbers, k, 3): a size has a kink at 0."""
+    if part.ndim == 1 and observe.select != "abs":
+        return Rates(part, rates, rates)
+    if part.ndim == 1:
+        size, change, along, values = np.abs(part), np.abs(rates), np.sign(part) * rates, part
+    else:
+        size = values = np.linalg.norm(part, axis=1)
+        change = np.linalg.norm(rates, axis=2)
+        along = (rates * part).sum(axis=2) / np.where(size > 0.0, size, 1.0)
+    still = size <= KINK * change * sizes[:, None]
+    return Rates(values, np.where(still, change, along), np.where(still, -change, along))
+
+
+def rates_of(observed, numbers, system, t, instant):
+    """The `Rates` of observables at an instant, a dict by name."""
     x, v, shortest = instant.x, instant.v, system.net.natural_length.min()
     state = State(system, t, x, v)
-    values = {o.name: values_of(o, state) for o in observed}
-    rates = {name: np.zeros((len(numbers), len(value))) for name, value in values.items()}
+    parts = {o.name: parts_of(o, state) for o in observed}
+    rates = {name: np.zeros((len(numbers), *part.shape)) for name, part in parts.items()}
     for n, (number, dx, dv) in enumerate(zip(numbers, instant.dx, instant.dv, strict=True)):
         low, high = number.systems
         pairs = [((low, x, v), (high, x, v), number.step)]
@@ -87,8 +118,9 @@ def rates_of(observed, numbers, system, t, instant):
         for first, second, step in pairs:
             states = [State(changed, t, *moved) for changed, *moved in (first, second)]
             for o in observed:
-                rates[o.name][n] += (values_of(o, states[1]) - values_of(o, states[0])) / (2.0 * step)
-    return {name: (value, rates[name]) for name, value in values.items()}
+                rates[o.name][n] += (parts_of(o, states[1]) - parts_of(o, states[0])) / (2.0 * step)
+    sizes = np.array([number.size for number in numbers])
+    return {o.name: _sided(o, parts[o.name], rates[o.name], sizes) for o in observed}
 
 
 class Slopes(NamedTuple):
@@ -99,7 +131,7 @@ class Slopes(NamedTuple):
     value, left : ndarray
         Derivatives for numbers that rise and that fall.
     spread : ndarray
-        Difference of the derivatives of lines or nodes that may be those of the largest value, within its ±.
+        Largest excess over these of the derivatives of lines or nodes that may have the largest value, within its ±.
     """
 
     value: np.ndarray
@@ -107,18 +139,21 @@ class Slopes(NamedTuple):
     spread: np.ndarray
 
 
-def slopes_of(observe, values, rates, error):
-    """The `Slopes` of an observable from `rates_of`, whose value is known to an ``error``."""
-    scores, sign = observe.observable.scores(values), 1.0
-    if observe.select == "abs":
-        sign = np.sign(values)
-    rates = sign * rates
+def slopes_of(observe, rates, error):
+    """The `Slopes` of an observable from its `Rates`, whose value is known to an ``error``."""
+    scores = observe.observable.scores(rates.values)
     best = int(scores.argmax())
     tied = scores >= scores[best] - TIED * abs(scores[best])
-    near = scores >= scores[best] - max(error or 0.0, 0.0)
-    right, left = rates[:, tied].max(axis=1), rates[:, tied].min(axis=1)
+    near = tied | (scores >= scores[best] - error)
+    right, left = rates.right[:, tied].max(axis=1), rates.left[:, tied].min(axis=1)
     if observe.select == "min":
-        right, left = left, right
-    if tied.sum() == 1 or not (np.abs(right - left) > 1e-6 * np.abs(rates[:, tied]).max()).any():
-        right = left = rates[:, best]
-    return Slopes(right, left, np.ptp(rates[:, near | tied], axis=1) if near.any() else np.zeros(len(rates)))
+        right, left = rates.right[:, tied].min(axis=1), rates.left[:, tied].max(axis=1)
+    equal = np.abs(right - left) <= 1e-6 * np.maximum(np.abs(right), np.abs(left))
+    right, left = (np.where(equal, rates.right[:, best], side) for side in (right, left))
+    every = np.concatenate([rates.right[:, near], rates.left[:, near]], axis=1)
+    return Slopes(right, left, excess(every.min(axis=1), every.max(axis=1), right, left))
+
+
+def excess(low, high, right, left):
+    """Largest excess of a range of derivatives, from ``low`` to ``high``, over that from one side to the other."""
+    return np.maximum(0.0, np.maximum(high - np.maximum(right, left), np.minimum(right, left) - low))

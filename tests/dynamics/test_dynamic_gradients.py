@@ -217,7 +217,12 @@ def on_a_rail(duration, step, contact, velocity, height, observe):
             contact,
             refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
         ),
-        observe=[refweb.Observe(name="place", quantity="position", body="ball", component=axis) for axis in observe],
+        observe=[
+            refweb.Observe(
+                name="place" if len(observe) == 1 else axis, quantity="position", body="ball", component=axis
+            )
+            for axis in observe
+        ],
         solve=refweb.Dynamic(duration=duration, step_size=step),
         output=refweb.Output(interval=5e-3),
     )
@@ -258,6 +263,19 @@ def test_friction(duration):
             off[-1].append(abs(float(gradient) - exact))
             assert off[-1][-1] <= gradient.error[0] + 1e-8
     assert 3.0 < np.linalg.norm(off[0]) / np.linalg.norm(off[1]) < 5.0
+
+
+def test_a_flight_before_a_rubbing_contact():
+    """A ball with friction and damping of contact flies 1 cm before it touches: no cell acts, and x = x0 + v t."""
+    contact = refweb.Contact(stiffness=1e4, friction=0.3, damping=0.1)
+    solution = refweb.run(on_a_rail(0.02, 2e-4, contact, (0.5, 0.0, -0.6), 0.11, "xz"), progress=False)
+    flying = refweb.run(on_a_rail(0.01, 2e-4, contact, (0.5, 0.0, -0.6), 0.11, "xz"), progress=False)
+    assert float(flying.gradient("x", "body.0.velocity.0")) == pytest.approx(0.01, rel=1e-6)
+    assert float(flying.gradient("z", "body.0.velocity.2")) == pytest.approx(0.01, rel=1e-6)
+    gradient, step = solution.gradient("z", "body.0.velocity.2"), 1e-4
+    scene = on_a_rail(0.02, 2e-4, contact, (0.5, 0.0, -0.6), 0.11, "xz")
+    ends = [again(scene, "body.0.velocity.2", -0.6 + sign * step).results["z"].value for sign in (-1, 1)]
+    assert abs((ends[1] - ends[0]) / (2.0 * step) - float(gradient)) <= gradient.error[0]
 
 
 def test_damping_of_contact():
@@ -365,6 +383,92 @@ def test_one_sided_where_lines_share_the_largest_value():
     assert float(aside) > 0.0 and aside.left[0] == pytest.approx(-float(aside))  # by symmetry
     gained = again(scene, "load.0.force.0", 1e-4).results["top"].value - solution.results["top"].value
     assert gained == pytest.approx(1e-4 * float(aside), rel=0.02)  # the second order of a large sag
+
+
+def pushed_spring(step_size, *effects):
+    """The oscillator of two largest excursions, and a load of p t/0.4 up to 0.4 s and of p behind, with p = 0."""
+    load = refweb.Load(node=[1], force=(0.0, 0.0, 0.0), factor=[(0.0, 0.0), (0.4, 1.0)])
+    scene = spring(duration=2.2, step_size=step_size)
+    observe = refweb.Observe(name="far", quantity="displacement", node=1, component="x", reduce="max")
+    return scene.replace(effects=(*scene.effects, load, *effects), observe=[observe])
+
+
+def changes_of_peaks():
+    """Derivatives of x at its two peaks, sin(ωt) = 1, by the size of the load of `pushed_spring`."""
+    w = np.sqrt(20.0)
+    first, second = 0.5 * np.pi / w, 2.5 * np.pi / w
+    ramp = (first - np.sin(w * first) / w) / (0.4 * 10.0)
+    return ramp, (1.0 - (np.sin(w * second) - np.sin(w * (second - 0.4))) / (0.4 * w)) / 10.0
+
+
+def test_one_sided_where_two_peaks_are_equal():
+    """Without damping each peak is the largest: a load that rises takes the one that it moves more, else the other."""
+    gradient = refweb.run(pushed_spring(1e-3), progress=False).gradient("far", "load.0.force.0")
+    low, high = sorted(changes_of_peaks())
+    assert abs(float(gradient) - high) <= gradient.error[0] < 1e-3 * high
+    assert abs(gradient.left[0] - low) <= gradient.error[0]
+
+
+def test_peaks_that_are_not_told_apart():
+    """With damping the first peak is larger by 7e-5, within ± of long steps: ± of its derivative has the second."""
+    solution = refweb.run(pushed_spring(1e-2, refweb.Damping(rate=1e-4)), progress=False)
+    gradient, result = solution.gradient("far", "load.0.force.0"), solution.results["far"]
+    assert 7e-5 * result.value < result.error < 2e-3 * result.value
+    first, second = changes_of_peaks()
+    assert gradient.left is None and abs(float(gradient) - first) < 0.02 * first
+    assert abs(second - float(gradient)) <= 1.02 * gradient.error[0]
+
+
+def between_two_lines(velocity, duration=1.0):
+    """A mass between two lines of 1 m and 1 N, of groups a and b, whose small motion across them has ω = 2/s."""
+    return refweb.Scene(
+        web=refweb.Inline(
+            points=[[-1, 0, 0], [0, 0, 0], [1, 0, 0]],
+            lines=[[0, 1], [1, 2]],
+            supports=[0, 2],
+            groups={"a": [0], "b": [1]},
+        ),
+        cable=refweb.Cable(
+            law="linear", modulus=1e6, area=1e-4, density=0.0, prestrain=0.01, groups={"a": refweb.Group(area=1e-4)}
+        ),
+        effects=(refweb.PointMass(node=[1], mass=0.5), refweb.Velocity(node=[1], value=velocity)),
+        observe=[
+            refweb.Observe(name="stress", quantity="stress", reduce="max"),
+            refweb.Observe(name="moved", quantity="displacement", node=1),
+            refweb.Observe(name="speed", quantity="velocity", node=1),
+            refweb.Observe(name="farthest", quantity="displacement", node=1, reduce="max"),
+            refweb.Observe(name="aside", quantity="displacement", node=1, component="y", reduce="max"),
+            refweb.Observe(name="across", quantity="displacement", node=[1], component="y", select="abs"),
+        ],
+        solve=refweb.Dynamic(duration=duration, step_size=1e-3),
+        output=refweb.Output(interval=0.01),
+    )
+
+
+def test_sizes_that_are_0():
+    """At rest |x| and |v| have the derivatives ± sin(ωt)/ω and ± cos(ωt); a largest value of 0 all along is refused."""
+    solution = refweb.run(between_two_lines((0.0, 0.0, 0.0)), progress=False)
+    exact = {"moved": np.sin(2.0) / 2.0, "speed": -np.cos(2.0), "across": np.sin(2.0) / 2.0}
+    for name, value in exact.items():
+        gradient = solution.gradient(name, "velocity.0.value.1")
+        assert abs(float(gradient) - value) <= gradient.error[0] < 1e-4 and gradient.left[0] == -float(gradient)
+    for name in ("farthest", "aside"):
+        with pytest.raises(InputError, match=f'"{name}" by velocity.0.value.1: it keeps 0 m for a time, in which its'):
+            solution.gradient(name, "velocity.0.value.1")
+    for name, path in (("stress", "velocity.0.value.1"), ("farthest", "point_mass.0.mass")):  # of order 2, and none
+        gradient = solution.gradient(name, path)
+        assert float(gradient) == gradient.error[0] == 0.0
+
+
+def test_run_and_step_refinement_of_different_peaks():
+    """Peaks of two equal lines, of which the run takes one and its step refinement another: sides by differences."""
+    scene, step = between_two_lines((0.0, 0.0, 0.3), duration=2.2), 1e-8
+    solution = refweb.run(scene, progress=False)
+    gradient = solution.gradient("stress", "cable.groups.a.area")
+    value = solution.results["stress"].value
+    ends = [again(scene, "cable.groups.a.area", 1e-4 + s * step).results["stress"].value for s in (-1.0, 1.0)]
+    assert float(gradient) == pytest.approx((ends[1] - value) / step, rel=0.01)
+    assert gradient.left[0] == pytest.approx((value - ends[0]) / step, rel=0.01)
 
 
 def chain(duration):

@@ -122,7 +122,7 @@ class Matrices:
         for term in self.terms:
             cells = term.blocks.any(axis=(1, 2))
             acting.append((term.cells[cells], term.blocks[cells]))
-        parts = [(3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1) for rows, _ in acting]
+        parts = [(3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), 3 * rows.shape[1]) for rows, _ in acting]
         places = np.unique(np.concatenate([np.zeros(0, dtype=int), *(part.ravel() for part in parts)]))
         matrix = np.zeros((len(places), len(places)))
         for part, (_, blocks) in zip(parts, acting, strict=True):
