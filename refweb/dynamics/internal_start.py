@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from typing import Any
 
 import numpy as np
 
@@ -64,6 +65,7 @@ def _of_threads(system, given, name):
     of_folder = json.loads(str(given["threads"])) if "threads" in given else {}
     for thread in sorted({row[7:].rpartition(".")[0] for row in _rows(given, r"\.slips\..*")[0]}):
         names, numbers = _rows(given, rf"\.slips\.{re.escape(thread)}\.\d+")
+        before: Any
         now = of_scene.get(thread)
         if thread in of_folder:
             before = of_folder[thread]

@@ -29,7 +29,7 @@ def of_lines(system: System) -> tuple[str, NDArray[np.int64]]:
     elif net.law_is("plastic").any():
         elements = net.law_is("plastic")
     else:
-        times = [net.line_data[name] for name in net.line_data.dtype.names if name.startswith("arm_time_")]
+        times = [net.line_data[name] for name in net.line_data.dtype.names or () if name.startswith("arm_time_")]
         title += f" arms of {', '.join(f'{time[0]:.6g}' for time in times)} s"
         elements = net.line_data["arm_ea_0"] > 0.0
     return title, np.unique(net.line[elements])
