@@ -451,6 +451,7 @@ def test_commands():
         taken = run.history["winch_energy"]
         assert taken[-1] == pytest.approx(-0.2 * 20.0 - 0.2 * 40.0, rel=1e-9)
         closed(run.history, 1e-3)
+    run = refweb.start(lifted_scene({"power": 20.0, "speed_limit": 9.0}, solve, pull=2.0 * G))
     for path, value, text in (
         ("winch.0.tension", 3.0, "tension is not a key of this winch in the scene, which has power"),
         ("winch.0.power", "much", "must be a finite number"),
