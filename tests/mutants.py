@@ -431,7 +431,11 @@ MUTANTS = [
     Mutant("dynamics/gradients", "kept(first.samples.get(name, []), main.value", "kept([], main.value"),
     Mutant("dynamics/responses", "np.where(still, -change, along)", "along"),
     Mutant("dynamics/peaks", "if not s0 <= s1 > s2:", "if True:"),
-    Mutant("dynamics/divergence", "np.flatnonzero(np.sqrt(off[: last + 1]) < LOST * size)", "np.arange(last + 1)"),
+    Mutant(
+        "dynamics/divergence",
+        "np.flatnonzero(_means(times, values - refined)[: last + 1] < LOST * size)",
+        "np.arange(last + 1)",
+    ),
     Mutant("net/laws/curve", "np.ones(len(begin)), 0.5 * begin**2", "np.ones(len(begin)), begin**2"),
     Mutant("net/laws/curve", "if curve.first > 0.0:", "if curve.first < 0.0:"),
     Mutant("net/law_keys", 'if curves[line].unit == "N" else 1.0', 'if curves[line].unit == "Pa" else 1.0'),

@@ -62,8 +62,7 @@ def divergence(rows, refined):
     if not (size > 0.0).any() or not times[-1] > 0.0:
         return None
     apart = np.abs(values - refined[:count, 1:-1][same])[:, size > 0.0] / size[size > 0.0]
-    part = np.minimum((times / times[-1] * WINDOWS).astype(int), WINDOWS - 1)
-    means = np.array([np.sqrt(np.mean(apart[part == k] ** 2)) if (part == k).any() else 0.0 for k in range(WINDOWS)])
+    means = _means(times, apart)
     ratios = means[1:] / np.maximum(means[:-1], 1e-300)
     grows = ratios >= FACTOR
     for last in range(len(ratios) - 1, IN_TURN - 2, -1):
@@ -73,6 +72,12 @@ def divergence(rows, refined):
             behind = np.flatnonzero(means >= LOST)
             return Divergence(float(rate), float(times[-1] * behind[0] / WINDOWS) if len(behind) else np.inf)
     return None
+
+
+def _means(times, apart):
+    """Root mean squares of differences in each part of the time, 0 in one without rows."""
+    part = np.minimum((times / times[-1] * WINDOWS).astype(int), WINDOWS - 1)
+    return np.array([np.sqrt(np.mean(apart[part == k] ** 2)) if (part == k).any() else 0.0 for k in range(WINDOWS)])
 
 
 def lost_before(times, values, refined, end):
@@ -93,9 +98,7 @@ def lost_before(times, values, refined, end):
     size = np.abs(values).max(initial=0.0)
     if len(times) < WINDOWS or not size > 0.0:
         return np.inf
-    part = np.minimum((times / times[-1] * WINDOWS).astype(int), WINDOWS - 1)
-    off = np.bincount(part, (values - refined) ** 2, WINDOWS) / np.maximum(np.bincount(part, minlength=WINDOWS), 1)
     last = min(int(end / times[-1] * WINDOWS), WINDOWS - 1)
-    common = np.flatnonzero(np.sqrt(off[: last + 1]) < LOST * size)
+    common = np.flatnonzero(_means(times, values - refined)[: last + 1] < LOST * size)
     first = common[-1] + 1 if len(common) else 0
     return float(times[-1] * first / WINDOWS) if first <= last else np.inf

@@ -83,10 +83,8 @@ def remarks_on(start, system):
         text = f"{by} has moved {system.row_name(moved[0])} at t = 0 already"
         for body in (body for body in system.net.bodies if body.fixed and moved[0] in body.carried):
             away = np.linalg.norm((driven - before)[moved[0]])
-            by, text = (
-                "body",
-                f'body "{body.name}" is fixed, and its node {moved[0]} jumps by {away:.4g} m to it at t = 0',
-            )
+            by = "body"
+            text = f'body "{body.name}" is fixed, and its node {moved[0]} jumps by {away:.4g} m to it at t = 0'
         yield Finding("moved-at-start", f"{text}: the web starts with {stored:.4g} J", by.strip("[]"))
     off = np.linalg.norm(np.where(system.fixed, driven, 0.0), axis=1)
     off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0

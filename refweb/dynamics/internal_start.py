@@ -62,14 +62,11 @@ def _of_lines(system, given, name):
 def _of_threads(system, given, name):
     """Names of rows of threads that have the same nodes, rings and winch in a checkpoint and in the scene."""
     of_scene, known = of_threads(system), set()
-    of_folder = json.loads(str(given["threads"])) if "threads" in given else {}
+    of_folder: dict[str, Any] = json.loads(str(given["threads"])) if "threads" in given else {}
     for thread in sorted({row[7:].rpartition(".")[0] for row in _rows(given, r"\.slips\..*")[0]}):
         names, numbers = _rows(given, rf"\.slips\.{re.escape(thread)}\.\d+")
-        before: Any
-        now = of_scene.get(thread)
-        if thread in of_folder:
-            before = of_folder[thread]
-        else:  # an older folder has the number of rows alone
+        now, before = of_scene.get(thread), of_folder.get(thread)
+        if before is None:  # an older folder has the number of rows alone
             rows = next((line.rows_of_slips for line in system.net.threads if line.name == thread), 0)
             before = now if len(names) == rows else {"slips": "other slips", "rings": numbers.size}
         if before == now:

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, quote
+from ..messages import quote
 from ..reference.paths import with_value
-from ..statics.gradients import number_at, numbers_of
+from ..statics.gradients import number_and_size
 from ..system.static_system import at_rest
 
 CHANGE = 3e-7
@@ -60,12 +60,9 @@ class Parameter:
 
     def __init__(self, scene, system, path, equilibrium=None):
         self.path, self._scene, self._system, self._given = path, scene, system, scene.to_dict()
-        number = number_at(self._given, path)
         if path.partition(".")[0] in FIXED:
             raise InputError(f"path {quote(path)} is no number of the motion: it sets what is computed of it, or how")
-        if number is None:
-            raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(self._given))}")
-        self.number, self.size = number, abs(number) or self._size_beside()
+        self.number, self.size = number_and_size(self._given, path)
         self.step, self.systems = self._changed()
         low, high = self.systems
         self.start = (_start_of(high) - _start_of(low)) / (2.0 * self.step)
@@ -77,11 +74,6 @@ class Parameter:
             self._differing = sorted({*self._differing, *over})
         self._lighter = self._inverse_of(high) - self._inverse_of(low)
         self._outs = system.per_cell()
-
-    def _size_beside(self):
-        head, _, last = self.path.rpartition(".")
-        beside = [number_at(self._given, f"{head}.{k}") for k in range(10)] if last.isdecimal() else []
-        return max([abs(number) for number in beside if number is not None], default=0.0) or 1.0
 
     def _changed(self):
         """(Step, systems) for a change of data by `CHANGE`."""

@@ -420,11 +420,7 @@ class Gradients:
 
     def _of_number(self, solved, path):
         """Solve as `_by_number`, by the multipliers of responses of some results."""
-        given = self._given
-        number = number_at(given, path)
-        if number is None:
-            raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(given))}")
-        size = abs(number) or self._size_beside(given, path)
+        number, size = number_and_size(self._given, path)
         best: Any = None
         before = None
         for attempt in range(STEPS):
@@ -448,12 +444,6 @@ class Gradients:
     def _given(self):
         """The dict of the scene."""
         return self.scene.to_dict()
-
-    def _size_beside(self, given, path):
-        """Size by which a number that is 0 is changed: that of its list, else 1."""
-        head, _, last = path.rpartition(".")
-        beside = [number_at(given, f"{head}.{k}") for k in range(10)] if last.isdecimal() else []
-        return max([abs(number) for number in beside if number is not None], default=0.0) or 1.0
 
     def _differences(self, solved, path, number, step):
         """Derivatives by differences of two steps, (responses, states), and errors by the step and by rounding."""
@@ -508,6 +498,17 @@ def _with_error(parts):
     (value, _), (change, _), *beside = parts
     error = np.abs(change) + sum((share * np.abs(changed - value) for changed, share in beside), 0.0)
     return value, error + 8.0 * np.finfo(float).eps * np.abs(value)
+
+
+def number_and_size(given, path):
+    """The number at a path in the dict of a scene, and its size: of a number that is 0 that of its list, else 1."""
+    number = number_at(given, path)
+    if number is None:
+        raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(given))}")
+    head, _, last = path.rpartition(".")
+    beside = [number_at(given, f"{head}.{k}") for k in range(10)] if last.isdecimal() else []
+    largest = max([abs(each) for each in beside if each is not None], default=0.0)
+    return number, abs(number) or largest or 1.0
 
 
 def number_at(given, path):

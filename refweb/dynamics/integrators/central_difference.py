@@ -16,7 +16,6 @@ position, and `SHARED` is the first part of `CLOCK`. `budget.steps_with_twin` re
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import replace
 from functools import cached_property
@@ -139,7 +138,7 @@ class CentralDifference(Integrator):
         x = rest if x is None else x
         return safe_step.call(0.0, np.inf, len(model.lengths.elements) > 0, float(reach), 0.0, x, rest, model)
 
-    @functools.cached_property
+    @cached_property
     def _bounded(self):
         """The model with the kernels of bounds alone, for a scene whose step is asked for and that does not run."""
         terms, bare = self.model.terms, self.model.without_kernels()
