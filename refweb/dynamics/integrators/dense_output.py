@@ -16,8 +16,6 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numba import types
 
-from ...effects.mass_flow import set_masses_by_slips
-from ...effects.natural_lengths import set_lengths
 from ...kernels import (
     MATRIX,
     Arrays,
@@ -35,7 +33,7 @@ from ...kernels import (
 from ...net.rotation import add_forces_to_bodies, advance_rotation, note_turns, turns_within
 from .averages import PARTS, look_for_means
 from .contacts import feel
-from .energy_balance import book_energies, own_energy
+from .energy_balance import book_energies, own_energy, set_lines
 from .extremes import (
     EDGE,
     Extremes,
@@ -154,10 +152,7 @@ def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: M
     forces, cells, data, outs = terms.forces, terms.cells, terms.data, terms.outs
     for i in range(len(motions.kernels)):
         motions.kernels[i](t, x, v, f, motions.cells[i], motions.data[i], motions.outs[i])
-    if model.lengths.elements.size:
-        set_lengths(t, model.lengths, data[0])
-    if model.lengths.masses.slips.size:
-        set_masses_by_slips(t, x, model.lengths.masses)
+    set_lines(t, x, model)
     f[:] = 0.0
     forces[0](t, x, v, f, cells[0], data[0], lines)
     for some in (terms.still, terms.viscous):
@@ -232,10 +227,7 @@ def show_again(now: float, inside: Inside, model: Model, observed: Observed, run
     Losses that kicks are solved for are those of the step, see `exchange_losses`.
     """
     terms = model.terms
-    if model.lengths.elements.size:
-        set_lengths(now, model.lengths, terms.data[0])
-    if model.lengths.masses.slips.size:
-        set_masses_by_slips(now, running.x, model.lengths.masses)
+    set_lines(now, running.x, model)
     for i in observed.terms:
         if not among(model.implicit_contacts.terms, i):
             terms.forces[i](

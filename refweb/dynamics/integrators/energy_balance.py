@@ -14,7 +14,7 @@ import numpy as np
 
 from ...compiled.rows import record_at
 from ...effects.line_kernels import LINE
-from ...effects.mass_flow import exchange_by_slips, exchange_masses
+from ...effects.mass_flow import exchange_by_slips, exchange_masses, set_masses_by_slips
 from ...effects.natural_lengths import NaturalLengths, set_growth, set_lengths
 from ...errors import EnergyDriftError
 from ...kernels import (
@@ -245,6 +245,15 @@ def change_lengths(t: float, h: float, model: Model, was: Vector, running: Runni
         change = record_at(LINE, lines, lengths.elements[c], 0).natural_length - was[c]
         work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * change
         length_force[0, c] = length_force[1, c]
+
+
+@kernel(forceinline=True)
+def set_lines(t, x, model):
+    """Set natural lengths at time t, and masses by the slips of x, where any change."""
+    if model.lengths.elements.size:
+        set_lengths(t, model.lengths, model.terms.data[0])
+    if model.lengths.masses.slips.size:
+        set_masses_by_slips(t, x, model.lengths.masses)
 
 
 @kernel(forceinline=True)

@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...effects.mass_flow import set_masses_by_slips
-from ...effects.natural_lengths import set_lengths
 from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import add_forces_to_bodies
 from ...net.rotation_bounds import fastest_point, hardest_push
@@ -36,6 +34,7 @@ from .energy_balance import (
     drifts_away,
     note_motion,
     relax,
+    set_lines,
     write_length_force,
 )
 from .events import ended_by, note_events
@@ -298,10 +297,8 @@ def advance_rows(
     clock, events, lengths, left = running.clock[0], running.events, model.lengths, breath
     total, stopped = space.total, ended_by(events)
     for n in range(times.size):
-        if lengths.elements.size and not clock.begun:
-            set_lengths(clock.time, lengths, model.terms.data[0])
-        if lengths.masses.slips.size and not clock.begun:
-            set_masses_by_slips(clock.time, running.x, lengths.masses)
+        if not clock.begun:
+            set_lines(clock.time, running.x, model)
         while clock.time < times[n] and not stopped:
             end, begun = end_of_steps(model.corners, clock.time, times[n]), clock.begun
             changing = lengths.corners.size > 2 and lengths.corners[0] < end and lengths.corners[-3] > clock.time
@@ -359,10 +356,7 @@ def begin(
 ) -> None:
     """Write forces, values of probes with their places, and energies at t = 0."""
     terms = model.terms
-    if model.lengths.elements.size:
-        set_lengths(0.0, model.lengths, terms.data[0])
-    if model.lengths.masses.slips.size:
-        set_masses_by_slips(0.0, x, model.lengths.masses)
+    set_lines(0.0, x, model)
     for i in range(len(terms.forces)):
         terms.forces[i](0.0, x, v, f, terms.cells[i], terms.data[i], terms.outs[i])
     add_forces_to_bodies(x, f, model.inertia.turns)
