@@ -1,1 +1,5 @@
-"""M v' = f of a net: forces, tangent, mass, links and factorizations; it knows no scene, method or file."""
+"""M v' = f of a net: forces, tangent, mass, links and factorizations; it knows no scene, method or file.
+
+Room: it imports net, effects and the files below them, and results, statics and dynamics import it; `ROOMS` in
+``tests/test_architecture.py`` has this order and the first sentence above. This file stays without code.
+"""

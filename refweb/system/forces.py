@@ -1,6 +1,8 @@
 """Result of an evaluation of all forces: their sum on every row, and the values of each term per cell.
 
-Arrays stand in the order of `System.terms`, and terms over the lines share one array.
+May change freely: the insides of `PerCell`. Must stay: `Forces` is a pair (force, per_cell), which callers unpack;
+``per_cell[i]`` belongs to ``System.terms[i]``, and all terms over the lines have the one array ``lines``. Must follow a
+change: `System.per_cell`, which makes these arrays, and all kernels that write to them as ``out``.
 """
 
 from __future__ import annotations

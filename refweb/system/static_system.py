@@ -1,6 +1,9 @@
 """The system of statics: bodies that wait are fixed, and forces that need velocity are left out.
 
-`at_rest` drops cached properties of `System` by name; its list needs new ones that depend on supports or terms.
+May change freely: `NEAR`, private functions, the text of the refusal. Must stay: `at_rest` changes a copy, never the
+given system, and returns the system itself where nothing differs. It drops cached properties of `System` by name: a new
+one that depends on supports or terms belongs in its list. Tests: ``tests/dynamics/test_starts.py``,
+``test_bodies_come_to_rest.py``.
 """
 
 from __future__ import annotations

@@ -9,8 +9,9 @@ net itself keeps its lengths as built. A loop of kernels cannot call Python, and
 
 Values are written to arrays of the caller, by default new ones, so that threads may share a system.
 
-Solvers and plug-ins use all public names; `at`, `with_line_data`, `static_system` and `broken_lines` drop cached
-properties by name, so that a new one may belong into their lists.
+Public names stay: solvers and plug-ins use all of them. Private ones are free. A new cached property belongs in the
+lists of names that `at`, `with_line_data`, `static_system`, `broken_lines`, `statics.shared_push` and
+`monotone_loading` drop, if it depends on what these change. Tests: ``tests/system/test_system.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Parts of a net without support along an axis, which no force along that axis may act on in statics.
 
-Contact is found by the names "contact" and "self_contact" of terms.
+`System.unsupported_parts` and `statics.equilibrium` call `find_parts`. May change freely: how parts are found, and
+their order, by which a message names the first. Must stay: fields of `Part`, which statics reads; terms of contact are
+known by their names "contact" and "self_contact": a renamed or further one belongs in `find_parts`. Test:
+``tests/statics/test_statics.py``.
 """
 
 from __future__ import annotations
