@@ -1,1 +1,6 @@
-"""Equilibria and their bounds; it knows no time and no events."""
+"""Equilibria and their bounds; it knows no time and no events.
+
+Room: it imports results, system and what stands below them; solution, studies and, for starts and gradients, dynamics
+import it; `ROOMS` in ``tests/test_architecture.py`` has this order and the first sentence above. This file stays
+without code.
+"""

@@ -3,7 +3,10 @@
 Differences of the energy become smaller than rounding near the end. Then the slope, force times step, is compared
 instead.
 
-`newton` calls `along` as it calls that of `residual_search`; constants decide how many steps it takes.
+May change freely: constants and the rule of the search: they decide how many steps `newton` takes; what counts as an
+equilibrium, the residual decides. Must stay: arguments and answer of `along`, the same as those of
+`residual_search.ResidualSearch.along`, since `newton` calls either; each step goes down in energy. Test:
+``tests/statics/test_statics.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,10 @@ then along the slope of hardening over the elastic and the plastic strain togeth
 equilibrium is that of lines with a curve, whatever the path has been, and `refweb.statics.duality_bound` proves it. It
 has no bound where a line yields without hardening, since its tension then tells nothing of its strain.
 
-`load_steps` and `dynamic_relaxation` add its bounds, and `gradients` differentiates its system. `of_curves` drops
-cached properties of `System` by name, all that follow from terms or numbers of lines.
+May change freely: private names and `CLOSE`. Must stay: `turned_back` finds each line that was let go, else a bound is
+wrong; functions that `load_steps`, `dynamic_relaxation` and `gradients` call. `of_curves` drops cached properties of
+`System` by the names in `KEPT_BY_LINES`: a new one that follows from terms or numbers of lines belongs there. Test:
+``tests/statics/test_monotone_loading.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
 The state after a break depends on the motion of the web; that is dynamics. Brent's method finds the load step of the
 break. It searches equilibria between the last load step without a break and the first with one.
 
-`statics.simulation` calls `refuse_break` after each load step; `FINE` and `TRIALS` change digits of a message alone.
+May change freely: `FINE` and `TRIALS`, which change digits of a message alone, and its words. Must stay: arguments of
+`refuse_break`, which `statics.simulation` calls after each load step, and that every break up to that step is refused.
+Test: ``tests/effects/test_rupture.py``.
 """
 
 from __future__ import annotations

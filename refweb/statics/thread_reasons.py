@@ -1,6 +1,8 @@
 """Reasons why a net with threads may have no equilibrium: a load that pulls a thread through, or rings together.
 
-`equilibrium.with_reason` asks for them where an iteration has failed.
+May change freely: `ABOUT`, the order of reasons and their words. Must stay: name and arguments of `reason_of`, which
+`equilibrium.with_reason` calls where an iteration has failed. No number of a result depends on this file. Tests:
+``tests/effects/test_thread.py``, ``test_thread_friction.py``.
 """
 
 from __future__ import annotations
