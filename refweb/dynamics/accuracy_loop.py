@@ -3,8 +3,10 @@
 The accuracy parameter of an integrator, ``safety`` or ``rtol``, trades accuracy for time; the code calls it the knob.
 Each run has a value of it.
 
-Runs fill ``reduced``, ``findings``, ``throw`` and ``twin_end`` of the solution; names in `arrays` are keys of
-``checkpoint.npz``, and codes of findings stand in `findings.CODES`.
+May change freely: constants (number and size of repeated runs) and words of messages. Must stay: keys of
+`AccuracyState.arrays`, which stand in ``checkpoint.npz`` and which `runner._before` checks; codes of findings, those of
+`findings.CODES`. Runs fill ``reduced``, ``findings``, ``throw`` and ``twin_end`` of the solution, which `runner` and
+`results` read. Tests: ``tests/dynamics/test_budget.py``, ``test_accuracy.py``.
 """
 
 from __future__ import annotations

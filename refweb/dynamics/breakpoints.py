@@ -1,6 +1,8 @@
 """Cost of the breakpoints of tables: steps end at each, and more breakpoints than steps set the step.
 
-Integrators whose steps have a bound give `steps_in`; `TOLD` and the text are free.
+May change freely: `TOLD` and the words of the finding. Must stay: `remarks_on_corners`, which `simulation` and ``refweb
+check`` call; integrators whose steps have a bound bring `steps_in`, others get no remark. No number of a result depends
+on this file. Test: ``tests/dynamics/test_corners.py``.
 """
 
 from __future__ import annotations

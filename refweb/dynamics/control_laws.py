@@ -1,7 +1,10 @@
 """Laws of controls: from an error and its rate to the value that is set, component by component.
 
-A law has ``reset()``, ``act(measurement, time)``, and for runs that go on ``save()`` and ``restore(numbers)``. Its
-fields are its parameters in scenes. `LAWS` names the shipped ones; one of one's own needs no entry there.
+A law has ``reset()``, ``act(measurement, time)``, and for runs that go on ``save()`` and ``restore(numbers)``.
+
+May change freely: how a law computes its value. Must stay: fields of laws, which are parameters in scenes; keys of
+`LAWS`, names in scenes; fields of `Measurement`, which laws of users read; numbers of `save`, which stand in
+checkpoints. A law of one's own needs no entry in `LAWS`. Test: ``tests/dynamics/test_control.py``.
 """
 
 from __future__ import annotations

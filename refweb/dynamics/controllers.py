@@ -1,7 +1,9 @@
 """Controls of a run: each measures at its period, and gives a command, see `refweb.dynamics.commands`.
 
-A `Controller` reads its measurements from the columns of a history row. Its state, `Controller.arrays`, is part of
-checkpoints: names of its entries are their format.
+May change freely: private functions and words of messages. Must stay: keys and order in `Controller.arrays`, which
+checkpoints keep, and of `plain`, which stand in ``run.json``; a `Controller` measures in the columns of a history row,
+so that it sees what ``history.csv`` has. `simulation`, `commands` and `sweeps.episodes` use the public names. Tests:
+``tests/dynamics/test_control.py``, ``test_attitude.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Fallback of ``method = "auto"``: other methods, if the chosen one cannot finish.
 
-Names in `arrays` are keys of ``checkpoint.npz``, and `record` stands in ``run.json``; the order of `OTHERS` is free.
+May change freely: the order of `OTHERS` and words of texts. Must stay: keys of `arrays`, which stand in
+``checkpoint.npz``, and of `record`, which stand in ``run.json``; `simulation` calls the public methods. A new method of
+dynamics that may stand in for others belongs in `OTHERS`. Test: ``tests/dynamics/test_fallback.py``.
 """
 
 from __future__ import annotations

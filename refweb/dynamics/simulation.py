@@ -1,7 +1,9 @@
 """Dynamic run of a scene: from its start through rows and frames to results, with checkpoints.
 
-Keys of a checkpoint are a file format, which `runner._before` checks; `accuracy_loop`, `twin_error` and
-`studies.predictability` use attributes of `Simulation` by name.
+May change freely: private methods, words of findings. Must stay: public names, which `runner` uses of this `Simulation`
+and of that of statics alike, and `accuracy_loop`, `twin_error`, `stepped_run`, `gradients` and `studies.predictability`
+too; keys that `_frame` writes to ``checkpoint.npz``: `_set_off` and `runner._before` read them. Tests:
+``tests/dynamics/test_dynamics.py``, ``tests/test_faults.py``, ``tests/dynamics/test_starts.py``.
 """
 
 from __future__ import annotations
@@ -85,7 +87,7 @@ class Simulation:
         Initial state; an equilibrium is known after the start of the run.
     begin_of_twin : refweb.dynamics.initial_state.Start, optional
         Initial state of the step refinement, if it differs: the end of the step refinement of an earlier run.
-    standing : refweb.dynamics.accuracy_loop.Standing
+    standing : refweb.dynamics.accuracy_loop.AccuracyState
         Present accuracy, and number of repeated runs.
     budget : refweb.dynamics.budget.Budget
         Budget of all runs.

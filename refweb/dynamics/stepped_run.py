@@ -1,7 +1,10 @@
 """A run that is taken ahead step by step, for feedback: it is asked for results, and values of effects are set.
 
-The loop, its records and tables are those of `refweb.run`, and are kept between calls: a run to which nothing is set
-has its bits. `SteppedRun` is public; `refweb.dynamics.commands` has what may be set.
+The loop, its records and tables are those of `refweb.run`, and are kept between calls.
+
+May change freely: private methods. Must stay: public names of `SteppedRun` and `start`, which users and
+`gym.environment` call; a run to which nothing is set has the bits of `refweb.run`. `refweb.dynamics.commands` has what
+may be set. Tests: ``tests/dynamics/test_stepped_run.py``, ``tests/gym/test_environment.py``.
 """
 
 from __future__ import annotations

@@ -71,11 +71,11 @@ class System:
         One per effect that adds forces.
     acting : list of (effect, list)
         Effects, and what each gives.
-    drives : list of refweb.effects.base.Drive
+    drives : list of refweb.effects.base.PrescribedMotion
         One per effect that prescribes motion; its rows are supported as well.
     constraints : list of refweb.effects.base.Constraint
         One per effect that keeps distances; no force of the system holds them.
-    weakness : refweb.effects.base.Weakness or None
+    weakness : refweb.effects.base.BreakLimits or None
         Limits of elements that may break; None if none may.
     carried : ndarray of bool, shape (rows,)
         True for nodes that free bodies carry and that move with them.
