@@ -1,6 +1,9 @@
 """State of an explicit run.
 
-Fields go into checkpoints unless their metadata says ``saved=False``; `CentralDifference` passes them by position.
+May change freely: nothing. Must stay: names of fields, which are keys of checkpoints unless their metadata says
+``saved=False``. A further field that must survive a step, or a stop, belongs here, with a default for older folders;
+`CentralDifference` hands its array to `Running` by position. Tests: ``tests/dynamics/integrators/test_records.py``,
+``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

@@ -19,7 +19,10 @@ A step solves J z = r with J = ∂F/∂y + c ∂F/∂y'. Eliminating displacemen
 
 for every node alike, with r_x = 0 for one without mass.
 
-Unknowns stand in the order x, v, λ, μ, also for `system.links`; callbacks have the signatures of sksundae.
+May change freely: private methods. Must stay: unknowns stand in the order x, v, λ, μ, also for `system.links`;
+arguments of `residual`, `set_up`, `precondition`, `jacobian_times` and `jacobian`, by which sksundae calls them; the
+Jacobian is the derivative of `residual`. Keys of ``[solve]`` are those of `registry.INTEGRATORS`. Test:
+``tests/dynamics/integrators/test_ida.py``.
 
 References
 ----------

@@ -1,6 +1,9 @@
 """Monitors of a run: probes and sums as a record, and their extremes, means and events where no step has been taken.
 
-Kernels read fields of `Observed` by name; `measurements` puts other arrays into ``data`` for probes that read a term.
+May change freely: how `Observed.of` fills the record. Must stay: names of the fields of `Observed`, which kernels of
+`extremes`, `averages`, `events` and `rows` read; the order of probes, then sums, in ``signs`` and ``sums``;
+`measurements` puts other arrays into ``data`` for probes that read a term. Test: ``tests/dynamics/test_averages.py``,
+``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Limits of a step: the next corner of a table, and the distance to a passage through bodies or lines.
 
-A limit may be too near and never too far; `step_observer` asks for one before each step.
+May change freely: how distances are bounded. Must stay: a limit may be too near and never too far, else a step passes
+over a corner of a table or through a body; `stop` and `at_corner`, which `step_observer` calls before each step. Test:
+``tests/dynamics/integrators/test_step_observer.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Scales of the tolerances of displacements and velocities where the state itself is near zero.
 
-Default tolerances follow from these scales: another scale changes steps and results of all methods with rtol.
+May change freely: nothing without a reason: default tolerances follow from these scales, so that others change steps
+and digits of all methods with rtol, within ±. Must stay: `scales` gives (displacement [m], velocity [m/s]) to `ida`,
+`step_observer` and `studies.dop853`. The help of ``atol_position`` in `settings.Dynamic` says the same in words. Test:
+``tests/dynamics/integrators/test_cvode.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Spread of rows of vectors: no two differ by more.
 
-`ccd` and `neighbour_list` rely on these bounds, which may be too large and never too small.
+May change freely: how the bound is computed. Must stay: it may be too large and never too small, since `ccd`,
+`neighbour_list` and `explicit_loop` bound motion by it; arguments of both kernels. Test:
+``tests/dynamics/integrators/test_nearby.py``.
 """
 
 from __future__ import annotations
