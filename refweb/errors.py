@@ -1,7 +1,9 @@
 """Errors: refused input, and failures of solvers.
 
-``code`` is a key of `refweb.findings.CODES`, `runner` reads ``stiffness`` and `accuracy_loop` reads ``drift``; the
-command line shows errors of refweb's classes without their type.
+May change freely: docstrings. Must stay: names of classes, which users catch, and their bases; ``code``, a key of
+`refweb.findings.CODES`; ``stiffness``, which `runner` reads to repeat a run, and ``drift``, which `accuracy_loop`
+reads. The command line shows errors of refweb's classes without their type; of others it says "internal error". Tests:
+``tests/test_findings.py``, ``tests/commands/test_cli.py``.
 """
 
 from __future__ import annotations

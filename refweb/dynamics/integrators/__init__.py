@@ -59,6 +59,6 @@ by ``restarts`` that it is to begin anew at corners. `refweb.dynamics.integrator
 attributes of an integrator, also of one that chooses steps by another key than rtol.
 """
 
-# This docstring is a page of the site and of ``refweb help own-integrator``: words may change freely, its first sentence
-# stays as in tests/test_architecture.py, and the names in it are those of `step_observer` and `integrator`;
+# This docstring is a page of the site and of ``refweb help own-integrator``. Its words may change freely; its first
+# sentence stays as in tests/test_architecture.py, and the names in it are those of `step_observer` and `integrator`;
 # tests/how_to/test_integrator.py runs its example. This file stays without code.
