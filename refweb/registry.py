@@ -169,7 +169,7 @@ class Method(NamedTuple):
         return self.keys[0]
 
     def integrator_of(self, solve: Dynamic, system: System, *looked_at: Any, **keys: Any) -> Any:
-        """Its integrator with those of its keys that a `refweb.Dynamic` gives, or with others in their place.
+        """Make its integrator with the keys that a `refweb.Dynamic` gives; ``keys`` take their place.
 
         ``looked_at`` are probes, sums and events, see `refweb.dynamics.integrators.integrator.Integrator`.
         """

@@ -127,7 +127,8 @@ def trust(
     Returns
     -------
     Solution
-        Its ``results`` have ``parts``, ``error`` and ``verdict``; ``further`` are the runs that have told.
+        Its ``results`` have ``parts``, ``error`` and ``verdict``; its ``further`` are the further runs
+        by which the parts were found.
 
     Raises
     ------

@@ -285,7 +285,7 @@ class Scene:
         return with_files(given, lambda path: str((self.folder or pathlib.Path()).joinpath(path).resolve()))
 
     def _tables(self):
-        """Its tables but the web."""
+        """All tables of the scene but the web."""
         given: dict = {"cable": self.cable.to_dict()}
         if self.supports is not None:
             given["supports"] = _axes(self.supports.to_dict())
@@ -347,7 +347,7 @@ class Scene:
 
     @property
     def contact(self) -> Any:
-        """Its ``[contact]``, None where there is none."""
+        """The ``[contact]`` of the scene, None without one."""
         return next((effect for effect in self.effects if name_of(EFFECTS, effect) == "contact"), None)
 
     def with_stiffness(self, stiffness: dict[str, float]) -> Scene:

@@ -337,7 +337,7 @@ class Simulation:
         return course, len(times) if course.stopped else row + 1
 
     def _resume_controls(self, course, row, values):
-        """Let the controls of a checkpoint go on, with what they do at its row."""
+        """Restore the controls of a checkpoint, and apply their commands at its row."""
         commands = self.schedule.commands
         if commands is not None:
             commands.load(str(self._kept["controls"]))

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class SteppedRun:
-    """A dynamic run that goes ahead when it is told, and whose loads and rates may be set meanwhile.
+    """A dynamic run that goes ahead by calls, between which its loads and rates may be set.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class SteppedRun:
             prepare()
 
     def _go_to_row(self, stop):
-        """Go on to the row before ``stop``."""
+        """Advance to the row before ``stop``."""
         simulation, commands = self._simulation, self._schedule.commands
         while self._row < stop and not self._course.stopped:
             end = stop if commands is None else min(stop, commands.until(self._row) + 1)
@@ -272,7 +272,7 @@ class SteppedRun:
             raise InputError(f"the run has ended at t = {self.time:.6g} s: start it again, or give a longer duration")
 
     def _go_in_time(self, stop, budget):
-        """Go on to the row before ``stop`` within a CPU time [s]."""
+        """Advance to the row before ``stop`` within a CPU time [s]."""
         integrator, began, since = self._simulation.integrator, time.process_time(), self.time
 
         def check(t):

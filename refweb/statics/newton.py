@@ -287,7 +287,7 @@ class Newton:
         )
 
     def _step_by_factor_at_hand(self, t, iterate, r, shift, error, stats, ahead):
-        """The same step by the factorization of an earlier tangent; None if that takes long or leads uphill."""
+        """Newton step by the factorization of an earlier tangent; None if that takes long or leads uphill."""
         if not self._can_use_again(iterate.tension):
             return None
         stats["njev"] += 1
@@ -386,7 +386,7 @@ class Newton:
         return None if any(p is None for p in deviations) else np.array([system.rows_of(p) for p in deviations])
 
     def _deviations_by_factor_at_hand(self, state):
-        """The same with the last factorization, if the duality bound proves that no part floats; else None."""
+        """Deviations by the last factorization, if the duality bound proves that no part floats; else None."""
         if state.duality_bound is None or state.floating is not None or not self._can_use_again(state.tension):
             return None
         forces = np.column_stack(self.disturbing(state))

@@ -180,7 +180,7 @@ class LineShares:
         return forces.reshape(*cells.shape, 3)
 
     def terms(self):
-        """This contact and the change of its shares, two `ForceTerm`."""
+        """Two `ForceTerm`: this contact, and the change of its shares."""
         term, nodes = self.term, self.term.contact.felt[0]
         cells = term.cells.reshape(-1, self.pieces, term.cells.shape[1])
         rows = [cells[:, 0, :1], *(cells[:, c, 1:nodes] for c in range(self.pieces)), cells[:, 0, nodes:]]
@@ -251,7 +251,7 @@ class SharedPush:
         raise with_reason(self._plain, t, error)
 
     def _solve(self, t, x, spent):
-        """The same from x; counts of ``spent`` are added."""
+        """Equilibrium at load step t from x; counts of ``spent`` are added to its stats."""
         scale, difference = force_scale(self._plain, t, x, self._plain.forces(t, x).per_cell.tension), np.inf
         for lines in self._lines:
             lines.begin(t, x, scale)

@@ -71,7 +71,7 @@ class Weighed:
         return self._root * self.soft(self.M @ (u / self._root))
 
     def once_transposed(self, u):
-        """Its transpose."""
+        """Transpose of `once`, times u."""
         return (self.M @ self.soft(self._root * u, True)) / self._root
 
     def twice(self, u):
@@ -81,7 +81,7 @@ class Weighed:
         return np.concatenate([-self.omega * self._root * self.soft(force), a])
 
     def twice_transposed(self, u):
-        """Its transpose."""
+        """Transpose of `twice`, times u."""
         p, q = np.split(u, 2)
         pull = -self.omega * self.soft(self._root * p, True)
         return np.concatenate([(self.C.T @ pull) / self._root + q, self.omega * (self.M @ pull) / self._root])

@@ -246,7 +246,7 @@ class Question:
         return Stability(0 if loose else 1, loose=loose)
 
     def _of_many(self, solver):
-        """The same of more unknowns than have all their s found."""
+        """Stability with more unknowns than `DENSE`, of which not all s are found."""
         M, C = self.rest.pattern.matrix(self.rest.mass_at(self.x)), self._velocity()
         if not self._massive().any() and self.definite >= 0:
             return by_pivot(self.definite)

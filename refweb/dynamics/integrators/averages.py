@@ -69,7 +69,7 @@ class Windows(Record):
 
     @classmethod
     def of(cls, probes: Sequence[Probe]) -> Self:
-        """Those of probes that have a window."""
+        """Make the record of probes, of which those with a window are averaged."""
         slots = np.array([i for i, probe in enumerate(probes) if probe.average], dtype=np.int64)
         widths = np.array([float(probes[i].average) for i in slots])
         return cls(slots, widths, np.array([float(probes[i].sign) for i in slots]))
@@ -111,7 +111,7 @@ class Averages(Record):
 
     @classmethod
     def at_start(cls, values: Sequence[float] | NDArray[np.float64] = ()) -> Self:
-        """Those of the values at t = 0; by default none."""
+        """Make the record for values at t = 0; by default of no means."""
         count, values = len(values), np.asarray(values, dtype=float)
         kept, within = np.zeros((count, CELLS + 1)), np.zeros((count, PARTS + 1))
         kept[:, 0] = within[:, 0] = values
@@ -129,7 +129,7 @@ def begin_averages(windows, extremes):
 
 @kernel()
 def coefficients(values, smooth):
-    """Those of the polynomial over the share of a step through values at its ends or, ``smooth``, its parts."""
+    """Find the coefficients of the polynomial through values at the ends of a step or, if ``smooth``, of its parts."""
     if not smooth:
         return values[0], values[4] - values[0], 0.0, 0.0, 0.0
     d1, d2 = values[1] - values[0], values[2] - 2.0 * values[1] + values[0]

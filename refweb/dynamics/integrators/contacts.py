@@ -43,7 +43,7 @@ class Contacts(Record):
 
     @classmethod
     def of(cls, system):
-        """Those of a system; numbers of cells that are near stand as `refweb.dynamics.integrators.records` says."""
+        """Make the record of a system; numbers of near cells stand as `refweb.dynamics.integrators.records` says."""
         forces, near = system.contact_forces, near_of(system)
         terms = forces.terms.copy()
         for term in terms:

@@ -136,7 +136,7 @@ def act(i, t, x, v, f, terms):
 def book_powers(
     t: float, h: float, x: Matrix, v: Matrix, extra: Matrix, power: Vector, work: Vector, terms: ForceTerms
 ) -> None:
-    """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` takes forces nobody needs."""
+    """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` is space for forces."""
     powers = terms.powers
     for n in range(powers.shape[0]):
         i, column = powers[n, 0], powers[n, 1]

@@ -65,7 +65,7 @@ class Extremes(Record):
 
     @classmethod
     def at_start(cls, values: NDArray[np.float64], places: NDArray[np.int64] | None = None) -> Self:
-        """Those of the values at t = 0."""
+        """Make the record for values at t = 0."""
         places = np.full(len(values), -1) if places is None else places
         recent = np.full((len(values), 3), np.nan)
         recent[:, 2] = values

@@ -72,7 +72,7 @@ class ImplicitContacts(Record):
 
     @classmethod
     def of(cls, system, turns):
-        """Those of a system; ``turns`` are its `refweb.net.rotation.RigidRotations`."""
+        """Make the record of a system; ``turns`` are its `refweb.net.rotation.RigidRotations`."""
         numbers = [i for i, term in enumerate(system.terms) if term.velocity.implicit is not None]
         terms = [system.terms[i] for i in numbers]
         depths = [depths_of(system, term) for term in terms]

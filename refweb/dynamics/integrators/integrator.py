@@ -312,7 +312,7 @@ class Integrator(Protocol):
 
         Returns
         -------
-        Course
+        IntegratorState
             With the supports where motion has them, the values of probes and sums there as extremes, the events that
             have happened by being there, and the energy at the start.
         """

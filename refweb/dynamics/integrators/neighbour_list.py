@@ -134,7 +134,7 @@ class NeighbourList(Record):
 
     @classmethod
     def of(cls, system):
-        """Those of a system."""
+        """Make the record of a system."""
         near, skin = near_of(system), np.zeros(1, dtype=SKIN)
         skin["depth"], skin["lasts"] = np.inf, MANY
         swaps = Functions(SWAP, [swap_for(system.terms[i]) for i in near])

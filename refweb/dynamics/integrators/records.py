@@ -210,7 +210,7 @@ class ForceTerms(Record):
 
     @classmethod
     def of(cls, system, outs):
-        """Those of a system, which write to ``outs``; natural lengths that change do so in a copy of their own."""
+        """Make the record of a system, whose terms write to ``outs``; natural lengths that change get a copy."""
         terms, net = system.terms, system.net
         lines = (net.line_data.copy() if net.factors else net.line_data).matrix
         numbers = [lines if term.over_lines else term.data for term in terms]

@@ -88,7 +88,7 @@ class Rupturing:
         return inner
 
     def refined(self, by=None):
-        """The same with a smaller error."""
+        """Make the integrator of the system without breaks, with a smaller error."""
         return Rupturing(lambda *parts: self._make(*parts).refined(by), self._intact, self._probes, *self._rest)
 
     def start(self, x=None, v=None):
@@ -264,7 +264,7 @@ def unstrained(probe, broken):
 
 
 def _accept(course, accepted):
-    """Let a course be another."""
+    """Copy all fields of the accepted state to ``course``."""
     course.__dict__.update(accepted.__dict__)
 
 

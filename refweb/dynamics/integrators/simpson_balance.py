@@ -261,7 +261,7 @@ class SimpsonBalance:
         return total
 
     def energies_within(self, piece, sample):
-        """The same at a sample of a piece."""
+        """Energies as of `energies`, at a sample within a piece."""
         return self.energies(sample, piece.booked(sample.time)[:-6], piece.step)
 
     def open(self, course, energies):

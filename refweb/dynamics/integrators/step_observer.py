@@ -1,4 +1,4 @@
-"""A method of somebody's own steps: rows, books of energy and momentum, extremes and events around them.
+"""Base of methods that choose their steps: rows, balances of energy and momentum, extremes and events around them.
 
 A method takes steps of its own choice and knows its state anywhere within the last one. Each step, cut at the history
 rows, is looked at in its middle and at its end: for extremes and events, and for the integrals of power and of the
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 PATIENCE = 1000
 """Number of steps in turn of which a row would take more than `MAX_STEPS_PER_ROW`; at a start they are short."""
 BREATH = 100
-"""Number of steps after each of which it is told how far a run is, and it may be ended."""
+"""Number of steps between two calls of ``on_progress``, which may end the run."""
 HALVINGS, HALVINGS_BY_PATH = 8, 14
 """Number of times that a piece of a step is halved where powers change too much in it, and where lines yield while
 their natural lengths change: the energy that they lose depends on the path."""
@@ -78,7 +78,7 @@ class ObservedState(IntegratorState):
 
 
 class StepObserver(Integrator):
-    """A method of somebody's own steps on one system.
+    """Base of methods that choose their steps, on one system.
 
     A subclass has ``method``, its name, and ``order``, and brings `begin`, `step` and `interpolated`; how to write one
     says `refweb.dynamics.integrators`. Its ``keys`` are those of ``[solve]`` that it takes.

@@ -29,7 +29,7 @@ def spread_of(rows):
 
 @kernel()
 def spread_since(x, at):
-    """The same of how far rows have come from where they were [m]."""
+    """Spread, as of `spread_of`, of the displacements of rows since they were ``at`` [m]."""
     difference = np.empty(at.shape)
     for r in range(at.shape[0]):
         for k in range(3):

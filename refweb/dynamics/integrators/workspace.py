@@ -26,7 +26,7 @@ class Workspace(Record):
     before : ndarray, shape (driven, 7)
         State of rows whose motion is prescribed, ahead of a step.
     aside, extra, half, momenta : ndarray, shape (rows, 3)
-        Velocities and forces that nobody needs, velocities at half a step [m/s], and momenta [N s].
+        Space for velocities and forces that are not used, velocities at half a step [m/s], and momenta [N s].
     was : ndarray, shape (changing,)
         Natural lengths ahead of a step [m].
     total : ndarray, shape (terms + 3,)

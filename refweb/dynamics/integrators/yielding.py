@@ -41,7 +41,7 @@ class Yielding:
         course.x[:] = self._system.taken_on(course.time, course.x)
 
     def turned_back(self):
-        """True if one has turned back at the end of the last step; it is told once."""
+        """True if one has turned back at the end of the last step; the second call returns False."""
         turned, self._turned = self._turned, False
         return turned
 
