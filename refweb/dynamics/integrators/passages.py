@@ -13,7 +13,7 @@ middle to its surface, or if the approach is less than the distance of the spher
 
 May change freely: `HALVINGS`, upwards, and how pieces are halved. Must stay: bounds of motion may be too large, never
 too small; checks are those of `crossings.checks_of`, and rows of ``crossings`` its kinds; `step_limits` calls `soon`,
-`step_observer` `inspect`. `TRAVEL` bounds the steps of all methods with tolerances. Tests:
+and `step_observer` calls `inspect`. `TRAVEL` bounds the steps of all methods with tolerances. Tests:
 ``tests/effects/test_passage.py``, ``test_between_bodies.py``.
 """
 
