@@ -2,9 +2,9 @@
 
 Names are imported when they are used: ``import refweb`` loads nothing that a scene does not need.
 
-May change freely: nothing but `__version__` at a release, which ``CITATION.cff`` has as well. Must stay: nothing is
-imported at the head of this file (``tests/test_architecture.py``); names for editors, under ``TYPE_CHECKING``, are
-those of `refweb.registry.exports`: a new public name stands in both (``tests/test_tables.py``).
+May change: nothing but `__version__` at a release, which ``CITATION.cff`` has as well. Must stay: nothing is imported
+at the head of this file (``tests/test_architecture.py``); names for editors, under ``TYPE_CHECKING``, are those of
+`refweb.registry.exports`: a new public name stands in both (``tests/test_tables.py``).
 """
 
 __version__ = "0.2.0"

@@ -3,10 +3,10 @@
 Exit status: 0 solved, 1 the solver failed, 2 wrong input, 130 interrupted. Nothing heavy is imported before a verb
 needs it.
 
-May change freely: words of messages, `THRESHOLDS`. Must stay: `alone`, which ``pyproject.toml`` names as the program;
-the exit status, on which scripts of users rely; a verb is a module of `registry.COMMANDS` with `add_arguments`, `run`
-and its help as docstring; what stands at the head of this file is loaded by every verb. Tests:
-``tests/commands/test_cli.py``, ``tests/test_pay_for_what_you_call.py``.
+May change: words of messages, `THRESHOLDS`. Must stay: `alone`, which ``pyproject.toml`` names as the program; the exit
+status, on which scripts of users rely; a verb is a module of `registry.COMMANDS` with `add_arguments`, `run` and its
+help as docstring; what stands at the head of this file is loaded by every verb. Tests: ``tests/commands/test_cli.py``,
+``tests/test_pay_for_what_you_call.py``.
 """
 
 from __future__ import annotations

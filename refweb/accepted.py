@@ -1,8 +1,8 @@
 """Accepted values of readers, as JSON Schema of draft 4 has them; a reader carries them as ``accepts``.
 
-May change freely: the insides of functions. Must stay: ``accepts`` says the same as the reader that carries it, in JSON
-Schema of draft 4: `refweb.reference` makes the schema of scenes and the help of it, and plug-ins with readers of their
-own call the functions here. Tests: ``tests/reference/test_schema.py``, ``tests/reference/test_help.py``.
+May change: the insides of functions. Must stay: ``accepts`` says the same as the reader that carries it, in JSON Schema
+of draft 4: `refweb.reference` makes the schema of scenes and the help of it, and plug-ins with readers of their own
+call the functions here. Tests: ``tests/reference/test_schema.py``, ``tests/reference/test_help.py``.
 """
 
 from __future__ import annotations

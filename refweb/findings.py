@@ -1,8 +1,8 @@
 """Findings: remarks, warnings and refusals of a run, each with a code that programs can ask for.
 
-May change freely: meanings in `CODES`, which are words of the reference, to be written anew (CONTRIBUTING). Must stay:
-codes, severities and fields of `Finding`, which stand in ``run.json`` and are read back; programs of users ask for
-them. A new code needs a row in `CODES` and a `Finding` that has it, and a row whose code nothing uses has to go:
+May change: meanings in `CODES`, which are words of the reference, to be written anew (CONTRIBUTING). Must stay: codes,
+severities and fields of `Finding`, which stand in ``run.json`` and are read back; programs of users ask for them. A new
+code needs a row in `CODES` and a `Finding` that has it, and a row whose code nothing uses has to go:
 ``tests/test_findings.py``.
 """
 

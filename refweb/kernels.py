@@ -35,9 +35,9 @@ all its digits, which it loses when positions are the unknowns.
 
 `refweb.compiled` says what a kernel is, where its machine code is kept and how records reach it.
 
-May change freely: insides of the small kernels at the end. Must stay: signatures, and names and order in dtypes: a
-changed one changes every kernel that has it, in `effects`, `integrators` and effects of users, and all their callers. A
-further field of a dtype compiles these kernels again and needs a value wherever its rows are filled. Tests:
+May change: insides of the small kernels at the end. Must stay: signatures, and names and order in dtypes: a changed one
+changes every kernel that has it, in `effects`, `integrators` and effects of users, and all their callers. A further
+field of a dtype compiles these kernels again and needs a value wherever its rows are filled. Tests:
 ``tests/test_contract.py``, ``tests/how_to/test_effect.py``.
 """
 

@@ -4,9 +4,9 @@ Measured on webs of 760 to 2 million lines, beside some 200 MB of libraries: sta
 80 000, factors included, which grow a little faster, 6.4 kB of 750 000 in hexagons and 6.2 kB of 2 million in squares;
 explicit steps below 1 kB.
 
-May change freely: constants, which are measured and decide only what is refused. Must stay: functions and units [byte],
-which `build`, `runner`, `effects.self_contact`, `net.mesh_readers` and `net.boundary` use; the estimate comes before
-anything large is made. ``tests/net/test_bad_files.py`` and ``tests/results/test_frames.py`` quote messages.
+May change: constants, which are measured and decide only what is refused. Must stay: functions and units [byte], which
+`build`, `runner`, `effects.self_contact`, `net.mesh_readers` and `net.boundary` use; the estimate comes before anything
+large is made. ``tests/net/test_bad_files.py`` and ``tests/results/test_frames.py`` quote messages.
 """
 
 from __future__ import annotations

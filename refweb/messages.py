@@ -1,8 +1,8 @@
 """The words of messages: values as one line shows them, and the valid name nearest to one that is not.
 
-May change freely: the insides of functions, if messages stay on one line. Must stay: no import of refweb at the head,
-since `errors` and the package itself import this file; phrases such as "did you mean" and the cuts at 60 and 150
-characters, which tests quote. Tests: ``tests/test_tables.py``, ``tests/commands/test_cli.py``.
+May change: the insides of functions, if messages stay on one line. Must stay: no import of refweb at the head, since
+`errors` and the package itself import this file; phrases such as "did you mean" and the cuts at 60 and 150 characters,
+which tests quote. Tests: ``tests/test_tables.py``, ``tests/commands/test_cli.py``.
 """
 
 from __future__ import annotations

@@ -8,10 +8,10 @@ entry point of the groups ``refweb.effects``, ``refweb.shapes``, ``refweb.laws``
 ``refweb.integrators`` and ``refweb.verbs``. Entry points are read when a scene, or the command line, names what no
 table has, and for help.
 
-May change freely: private functions. Must stay: names in these tables, the format of scenes and of the command line; no
-module of refweb is imported at the head. A class that moves needs its new ``"module:name"`` here; a further effect,
-shape, law, observable, integrator or verb is one line. `LINE_COLUMNS` has the names that no parameter of a law may
-take: a new column of lines belongs there. Tests: ``tests/test_plugins.py``, ``tests/test_pay_for_what_you_call.py``,
+May change: private functions. Must stay: names in these tables, the format of scenes and of the command line; no module
+of refweb is imported at the head. A class that moves needs its new ``"module:name"`` here; a further effect, shape,
+law, observable, integrator or verb is one line. `LINE_COLUMNS` has the names that no parameter of a law may take: a new
+column of lines belongs there. Tests: ``tests/test_plugins.py``, ``tests/test_pay_for_what_you_call.py``,
 ``tests/reference/test_schema.py``.
 """
 

@@ -1,6 +1,6 @@
 """Solutions: the results of a run, the fields of its last state as arrays, and its result folder.
 
-May change freely: private functions. Must stay: public names, which users call; `load` reads the keys that
+May change: private functions. Must stay: public names, which users call; `load` reads the keys that
 `results.solution.SolutionData.summary` and `results.folder` write to ``run.json`` and ``checkpoint.npz``: a renamed key
 changes both sides, and older folders are still read. Tests: ``tests/results/test_loaded.py``,
 ``tests/results/test_results.py``.

@@ -3,7 +3,7 @@
 The accuracy parameter of an integrator, ``safety`` or ``rtol``, trades accuracy for time; the code calls it the knob.
 Each run has a value of it.
 
-May change freely: constants (number and size of repeated runs) and words of messages. Must stay: keys of
+May change: constants (number and size of repeated runs) and words of messages. Must stay: keys of
 `AccuracyState.arrays`, which stand in ``checkpoint.npz`` and which `runner._before` checks; codes of findings, those of
 `findings.CODES`. Runs fill ``reduced``, ``findings``, ``throw`` and ``twin_end`` of the solution, which `runner` and
 `results` read. Tests: ``tests/dynamics/test_budget.py``, ``test_accuracy.py``.

@@ -1,8 +1,8 @@
 """± of the times of breaks, and the time until which their order is known.
 
-May change freely: words of warnings and private functions. Must stay: `add_errors_of_breaks` writes to ``error`` of the
-breaks of `Watch.breaks`, whose keys stand in ``run.json``, and returns the time after which `twin_error` gives no ±.
-Test: ``tests/effects/test_rupture.py``.
+May change: words of warnings and private functions. Must stay: `add_errors_of_breaks` writes to ``error`` of the breaks
+of `Watch.breaks`, whose keys stand in ``run.json``, and returns the time after which `twin_error` gives no ±. Tests:
+``tests/effects/test_rupture.py``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Cost of the breakpoints of tables: steps end at each, and more breakpoints than steps set the step.
 
-May change freely: `TOLD` and the words of the finding. Must stay: `remarks_on_corners`, which `simulation` and ``refweb
+May change: `TOLD` and the words of the finding. Must stay: `remarks_on_corners`, which `simulation` and ``refweb
 check`` call; integrators whose steps have a bound bring `steps_in`, others get no remark. No number of a result depends
-on this file. Test: ``tests/dynamics/test_corners.py``.
+on this file. Tests: ``tests/dynamics/test_corners.py``.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
 The first run is always completed, since there is no result before. A further run is not begun if it is expected to
 exceed the remaining budget, and it is ended if it will exceed it.
 
-May change freely: `SEEN`, `SURE` and `SLOWEST`, which decide when a run counts as too dear. Must stay: `clock`, which
-tests replace by a count of steps; names that `simulation`, `accuracy_loop`, `twin_error`, `expected_cost`, `runner` and
+May change: `SEEN`, `SURE` and `SLOWEST`, which decide when a run counts as too dear. Must stay: `clock`, which tests
+replace by a count of steps; names that `simulation`, `accuracy_loop`, `twin_error`, `expected_cost`, `runner` and
 `studies.further_runs` import. With `LEAST` or `RUNS` the help text of `settings.Accuracy` changes, which has them in
-words. Test: ``tests/dynamics/test_budget.py``.
+words. Tests: ``tests/dynamics/test_budget.py``.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 A law has ``reset()``, ``act(measurement, time)``, and for runs that go on ``save()`` and ``restore(numbers)``.
 
-May change freely: how a law computes its value. Must stay: fields of laws, which are parameters in scenes; keys of
-`LAWS`, names in scenes; fields of `Measurement`, which laws of users read; numbers of `save`, which stand in
-checkpoints. A law of one's own needs no entry in `LAWS`. Test: ``tests/dynamics/test_control.py``.
+May change: how a law computes its value. Must stay: fields of laws, which are parameters in scenes; keys of `LAWS`,
+names in scenes; fields of `Measurement`, which laws of users read; numbers of `save`, which stand in checkpoints. A law
+of one's own needs no entry in `LAWS`. Tests: ``tests/dynamics/test_control.py``.
 """
 
 from __future__ import annotations

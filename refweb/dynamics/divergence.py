@@ -3,7 +3,7 @@
 Errors of time steps grow with a low power of time. In a chaotic motion any difference grows by the same factor in equal
 times, until no digit is left. The run and its step-refinement run are two such motions.
 
-May change freely: constants; they decide from which growth on results have no ±. Must stay: rows are those of
+May change: constants; they decide from which growth on results have no ±. Must stay: rows are those of
 `Watch.compared`, time first and the balance of energy last; fields of `Divergence`, which `twin_error` and `gradients`
 read. Tests: ``tests/results/test_error_budget.py``, ``tests/dynamics/test_dynamic_gradients.py``.
 """

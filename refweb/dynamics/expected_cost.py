@@ -1,8 +1,8 @@
 """Expected cost of an explicit run: its step, the cause of that step, and the CPU time.
 
-May change freely: words of the text, `TELLING`. Must stay: the step of `ruling` is that of `integrators.step_bound`,
-whose kernels it calls: change both together. ``refweb check`` prints the text of `expected_cost`, and ``refweb warm``
-calls it to compile its kernels. Test: ``tests/dynamics/test_expected_cost.py``.
+May change: words of the text, `TELLING`. Must stay: the step of `ruling` is that of `integrators.step_bound`, whose
+kernels it calls: change both together. ``refweb check`` prints the text of `expected_cost`, and ``refweb warm`` calls
+it to compile its kernels. Tests: ``tests/dynamics/test_expected_cost.py``.
 """
 
 from __future__ import annotations

@@ -15,10 +15,10 @@ errors of order 1 in the step, which may agree by chance; so ± takes the differ
 From the time on at which run and step refinement have no digit of a result in common, it has no gradient, see
 `refweb.dynamics.divergence`.
 
-May change freely: private functions, and constants, which decide what is refused and how wide ± is. Must stay:
+May change: private functions, and constants, which decide what is refused and how wide ± is. Must stay:
 `Gradients.gradient` and ``follow``, which `solution.gradient` and ``refweb gradient`` call; answers are
 `statics.gradients.Gradient`; steps are those of the run itself. An effect that gains a derivative leaves the list of
-`_refuse` and enters the text `SUPPORTED`. Test: ``tests/dynamics/test_dynamic_gradients.py``.
+`_refuse` and enters the text `SUPPORTED`. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
 An end that goes by more than half a turn changes the length of its thread by a turn, see `refweb.effects.half_turns`.
 Where the thread is taut energy tells of that; where it is slack nothing else does.
 
-May change freely: `DOUBT` and words of the text. Must stay: the signature of the kernel `farthest`,
-`results.probes.PROBE`, since the compiled loop calls it by address; `probe_of` and `half_turn_remark`, which `history`
-calls; turns are counted as in `effects.half_turns`. Test: ``tests/effects/test_around.py``.
+May change: `DOUBT` and words of the text. Must stay: the signature of the kernel `farthest`, `results.probes.PROBE`,
+since the compiled loop calls it by address; `probe_of` and `half_turn_remark`, which `history` calls; turns are counted
+as in `effects.half_turns`. Tests: ``tests/effects/test_around.py``.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
 Observables of a state are probes. Those of energies, work and step size are weighted sums of the integrator's balances.
 After the probes of observables follow those for warnings, and those for events without an observable.
 
-May change freely: private functions. Must stay: probes stand in the order of observables, warnings and events, since
-results are found by number; the break of lines is the last event, as `integrators.rupture` expects; columns of `table`,
-the format of ``history.csv``, and of `compared`, which `twin_error`, `divergence` and `gradients` read by position;
-keys of `breaks`, which stand in ``run.json``. `SPREAD` widens ± of all dynamic results. Test:
+May change: private functions. Must stay: probes stand in the order of observables, warnings and events, since results
+are found by number; the break of lines is the last event, as `integrators.rupture` expects; columns of `table`, the
+format of ``history.csv``, and of `compared`, which `twin_error`, `divergence` and `gradients` read by position; keys of
+`breaks`, which stand in ``run.json``. `SPREAD` widens ± of all dynamic results. Tests:
 ``tests/dynamics/test_dynamics.py``.
 """
 

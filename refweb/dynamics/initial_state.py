@@ -1,6 +1,6 @@
 """Initial states of dynamics: the initial web, its equilibrium, or the last state of another run.
 
-May change freely: private functions and words of messages. Must stay: fields of `Start`, keys ``begin_…`` of
+May change: private functions and words of messages. Must stay: fields of `Start`, keys ``begin_…`` of
 ``checkpoint.npz``; the keys in `_STATE` and ``body_…``, which `results.folder` writes: a renamed one breaks folders of
 users. `simulation`, `runner` and `studies` call the public functions. Tests: ``tests/dynamics/test_starts.py``,
 ``test_internal_start.py``.

@@ -1,8 +1,8 @@
 """Internal variables of a start from a folder: those that go on, and a refusal of those that the scene would lose.
 
-May change freely: words of refusals. Must stay: `known_variables`, which `initial_state` calls; what it compares are
-the keys ``internal``, ``internal_lines`` and ``threads`` of `system.internal_rows.kept`, and folders without the last
-two are still read. Test: ``tests/dynamics/test_internal_start.py``.
+May change: words of refusals. Must stay: `known_variables`, which `initial_state` calls; what it compares are the keys
+``internal``, ``internal_lines`` and ``threads`` of `system.internal_rows.kept`, and folders without the last two are
+still read. Tests: ``tests/dynamics/test_internal_start.py``.
 """
 
 from __future__ import annotations

@@ -16,9 +16,9 @@ taut steel net, loaded over 8 s            1.3 s                0.11 s     over 
 web that settles, damped by its material   3.2 s                1.0 s      0.67 s       1.2 s
 =========================================  ===================  =========  ===========  ========
 
-May change freely: constants, which are measured, and words of reasons: another choice changes digits of a result within
-its ±. Must stay: `decided`, `Choice`, `given_to` and `step_price`, which `method_fallback`, `expected_cost`, `studies`
-and ``refweb check`` use; a chosen method takes the scene. Reasons stand in ``run.json``. Tests:
+May change: constants, which are measured, and words of reasons: another choice changes digits of a result within its ±.
+Must stay: `decided`, `Choice`, `given_to` and `step_price`, which `method_fallback`, `expected_cost`, `studies` and
+``refweb check`` use; a chosen method takes the scene. Reasons stand in ``run.json``. Tests:
 ``tests/dynamics/test_fallback.py``, ``tests/studies/test_cost.py``.
 """
 

@@ -1,8 +1,8 @@
 """Fallback of ``method = "auto"``: other methods, if the chosen one cannot finish.
 
-May change freely: the order of `OTHERS` and words of texts. Must stay: keys of `arrays`, which stand in
-``checkpoint.npz``, and of `record`, which stand in ``run.json``; `simulation` calls the public methods. A new method of
-dynamics that may stand in for others belongs in `OTHERS`. Test: ``tests/dynamics/test_fallback.py``.
+May change: the order of `OTHERS` and words of texts. Must stay: keys of `arrays`, which stand in ``checkpoint.npz``,
+and of `record`, which stand in ``run.json``; `simulation` calls the public methods. A new method of dynamics that may
+stand in for others belongs in `OTHERS`. Tests: ``tests/dynamics/test_fallback.py``.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ has a derivative: data of the cells of each term, masses, prescribed motion and 
 forces may have kinks in them. So the step is so small that data change by `CHANGE`, and forces, at the state of the
 motion, are differences of order 2 of those terms alone whose data differ.
 
-May change freely: how steps are sought (`PROBED`, `SHRINKS`, `TRIES`). `CHANGE` balances two errors, of its square and
-of rounding. Must stay: public attributes and methods of `Parameter`, which `integrators.tangent`, `gradients` and
+May change: how steps are sought (`PROBED`, `SHRINKS`, `TRIES`). `CHANGE` balances two errors, of its square and of
+rounding. Must stay: public attributes and methods of `Parameter`, which `integrators.tangent`, `gradients` and
 `responses` use; a number that changes the net or times of steps is refused. ``refweb gradient`` leaves out the tables
-in `FIXED`. Test: ``tests/dynamics/test_dynamic_gradients.py``.
+in `FIXED`. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

@@ -4,9 +4,9 @@ A largest value of a motion is that of a peak in time, or of an end. Peaks that 
 each. Where they are equal, the result has the largest of them for a number that rises, and the least for one that
 falls, as lines that share a largest value; where they are not, ± covers all.
 
-May change freely: the insides of functions, if answers stay. Must stay: `Peaks.step` is called with the value at each
-step in turn, and `end` after the last; fields of `Peak` and `Pool`, which `gradients` reads. `TIED` and `KINK` are
-those of `responses`. Test: ``tests/dynamics/test_dynamic_gradients.py``.
+May change: the insides of functions, if answers stay. Must stay: `Peaks.step` is called with the value at each step in
+turn, and `end` after the last; fields of `Peak` and `Pool`, which `gradients` reads. `TIED` and `KINK` are those of
+`responses`. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

@@ -3,10 +3,9 @@
 An observable of several lines or nodes has the value of each; which of them counts is decided behind the derivatives,
 so that a difference passes no kink of a largest value.
 
-May change freely: `MOVED`, private functions. Must stay: values are those that ``history.csv`` and results have for the
-same observable; fields of `Instant`, `Rates` and `Slopes`, which `gradients` and `peaks` read. `between` is the
-polynomial of `integrators.step.interpolate_kicks`: change both together. Test:
-``tests/dynamics/test_dynamic_gradients.py``.
+May change: `MOVED`, private functions. Must stay: values are those that ``history.csv`` and results have for the same
+observable; fields of `Instant`, `Rates` and `Slopes`, which `gradients` and `peaks` read. `between` is the polynomial
+of `integrators.step.interpolate_kicks`: change both together. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

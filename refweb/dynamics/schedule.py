@@ -1,8 +1,8 @@
 """Times of a run: its history rows, the rows with frames, and blocks of rows.
 
-May change freely: `BLOCK`, `MOST_ROWS` and the measured costs, which change no result. Must stay: times of rows and
-numbers of frames of a scene, since a resumed run finds its row by number, and frames of folders are named by it; with
-`COMPARED` and `FEW` ± changes, and the last digits of runs of few rows, whose steps end at more times. Tests:
+May change: `BLOCK`, `MOST_ROWS` and the measured costs, which change no result. Must stay: times of rows and numbers of
+frames of a scene, since a resumed run finds its row by number, and frames of folders are named by it; with `COMPARED`
+and `FEW` ± changes, and the last digits of runs of few rows, whose steps end at more times. Tests:
 ``tests/dynamics/test_default_rows.py``, ``test_one_row.py``.
 """
 

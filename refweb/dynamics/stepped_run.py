@@ -2,9 +2,9 @@
 
 The loop, its records and tables are those of `refweb.run`, and are kept between calls.
 
-May change freely: private methods. Must stay: public names of `SteppedRun` and `start`, which users and
-`gym.environment` call; a run to which nothing is set has the bits of `refweb.run`. `refweb.dynamics.commands` has what
-may be set. Tests: ``tests/dynamics/test_stepped_run.py``, ``tests/gym/test_environment.py``.
+May change: private methods. Must stay: public names of `SteppedRun` and `start`, which users and `gym.environment`
+call; a run to which nothing is set has the bits of `refweb.run`. `refweb.dynamics.commands` has what may be set. Tests:
+``tests/dynamics/test_stepped_run.py``, ``tests/gym/test_environment.py``.
 """
 
 from __future__ import annotations

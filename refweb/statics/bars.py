@@ -1,8 +1,8 @@
 """The lines of a net as bars: a straight line is one bar, a curved line has a bar at each quadrature point.
 
-May change freely: how the arrays are computed. Must stay: names, units and meaning of all attributes and methods of
-`Bars`: `duality_bound` proves errors by them, `newton`, `floating` and `thread_bars`, which derives from it, use them.
-Bars stand in the order of `refweb.net.net.Net.bars`. Tests: ``tests/statics/test_statics.py``,
+May change: how the arrays are computed. Must stay: names, units and meaning of all attributes and methods of `Bars`:
+`duality_bound` proves errors by them, `newton`, `floating` and `thread_bars`, which derives from it, use them. Bars
+stand in the order of `refweb.net.net.Net.bars`. Tests: ``tests/statics/test_statics.py``,
 ``test_reused_factorization.py``.
 """
 

@@ -5,9 +5,9 @@ through the core of a body in this way has passed through the body or has slid a
 iterates of Newton's method between the two, as far as they are kept, in which no body moves by more than half its
 thickness at once; otherwise smaller load steps would.
 
-May change freely: `PARTS` and `MOST`, upwards: fewer positions may miss a passage. Must stay: `Passage.record` takes
+May change: `PARTS` and `MOST`, upwards: fewer positions may miss a passage. Must stay: `Passage.record` takes
 equilibria in their order, from `statics.simulation` and, for a start at an equilibrium, `dynamics.simulation`; both
-read ``overlaps``. Test: ``tests/effects/test_overlap.py``.
+read ``overlaps``. Tests: ``tests/effects/test_overlap.py``.
 """
 
 from __future__ import annotations

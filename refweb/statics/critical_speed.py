@@ -15,9 +15,9 @@ Counts of negative pivots (Sylvester's law of inertia) compare A with Ω²C. Tra
 across the axis are an exception, since A does not resist them. In the inertial frame such a part moves in a straight
 line; it rotates steadily if its centre of mass is on the axis.
 
-May change freely: private functions and words of the message. `ANCHOR` and `HELD` may change as long as no count of
-pivots does. Must stay: `drifting`, since `newton` and `stability` allow as many negative pivots in a stable
-equilibrium; `check_speed`, which `equilibrium` calls before it solves. Test: ``tests/effects/test_frame.py``.
+May change: private functions and words of the message. `ANCHOR` and `HELD` may change as long as no count of pivots
+does. Must stay: `drifting`, since `newton` and `stability` allow as many negative pivots in a stable equilibrium;
+`check_speed`, which `equilibrium` calls before it solves. Tests: ``tests/effects/test_frame.py``.
 """
 
 from __future__ import annotations

@@ -29,10 +29,10 @@ correction does not reach rounding, another one does: D = k on taut lines and ne
 factorization. Any solution p proves a bound, and the smaller bound is taken. The correction is kept in extended
 precision where the platform has it, because the remaining unbalanced force enters the gap times a displacement.
 
-May change freely: the three constants, and how forces are corrected: any correction proves a bound, a better one a
-smaller bound. Must stay: each term of the gap is at least 0 and holds its rounding, else nothing is proven; names of
-the fields of `DualityBound`, which `simulation`, `floating` and `results.observables` read. `thread_bars` brings the
-same arrays for threads. Tests: ``tests/statics/test_statics.py``, ``tests/net/test_curves.py``.
+May change: the three constants, and how forces are corrected: any correction proves a bound, a better one a smaller
+bound. Must stay: each term of the gap is at least 0 and holds its rounding, else nothing is proven; names of the fields
+of `DualityBound`, which `simulation`, `floating` and `results.observables` read. `thread_bars` brings the same arrays
+for threads. Tests: ``tests/statics/test_statics.py``, ``tests/net/test_curves.py``.
 """
 
 from __future__ import annotations

@@ -8,10 +8,10 @@ step, a rotation vector. A node that it carries at the arm a moves by δ + θ ×
 2 |δ|² + 2 |a|² |θ|²: so the bounds of rows there are twice those of the node, and twice those times |a|² with the
 moment of the force on it, |f| |a|.
 
-May change freely: constants and masses: they change the number of steps, and results within ``tolerance``. Must stay:
+May change: constants and masses: they change the number of steps, and results within ``tolerance``. Must stay:
 arguments of `solve`, which `registry.STATICS` names and `studies.trials` calls with ``tolerance``; keys of ``stats``,
 those of `newton`. The system is not changed: plastic strains are part of x, and `taken_on` returns another x between
-load steps. Test: ``tests/statics/test_relaxation.py``.
+load steps. Tests: ``tests/statics/test_relaxation.py``.
 """
 
 from __future__ import annotations

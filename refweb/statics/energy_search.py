@@ -3,9 +3,9 @@
 Differences of the energy become smaller than rounding near the end. Then the slope, force times step, is compared
 instead.
 
-May change freely: constants and the rule of the search: they decide how many steps `newton` takes; what counts as an
+May change: constants and the rule of the search: they decide how many steps `newton` takes; what counts as an
 equilibrium, the residual decides. Must stay: arguments and answer of `along`, the same as those of
-`residual_search.ResidualSearch.along`, since `newton` calls either; each step goes down in energy. Test:
+`residual_search.ResidualSearch.along`, since `newton` calls either; each step goes down in energy. Tests:
 ``tests/statics/test_statics.py``.
 """
 

@@ -4,10 +4,10 @@ An equilibrium exists unless the net can be carried off, a part of it without su
 on it do not balance, or turns too fast, see `refweb.statics.critical_speed`. `check_supported` looks before anything is
 solved.
 
-May change freely: words of messages, `UNBALANCED`, `WITH_A_WAY_AROUND`. Must stay: fields of `Equilibrium` and
-`Stability`, which statics, studies and `results.observables` read by name; keys of ``stats``, which `simulation` copies
-into ``run.json`` by `results.solution.SOLVER`. `TOLERANCE`, `LIMIT` and `force_scale` change digits of all statics.
-Tests: ``tests/statics/test_statics.py``.
+May change: words of messages, `UNBALANCED`, `WITH_A_WAY_AROUND`. Must stay: fields of `Equilibrium` and `Stability`,
+which statics, studies and `results.observables` read by name; keys of ``stats``, which `simulation` copies into
+``run.json`` by `results.solution.SOLVER`. `TOLERANCE`, `LIMIT` and `force_scale` change digits of all statics. Tests:
+``tests/statics/test_statics.py``.
 """
 
 from __future__ import annotations

@@ -6,9 +6,9 @@ tension is proven to be above 0. A part that no support holds along an axis floa
 allow, |d| ≤ L. For other laws or forces, the null space of the tangent is open. Tensions, reactions and energies do not
 change as parts float.
 
-May change freely: `SAMPLES`, `OPEN`, private functions. Must stay: fields of `Floating` and `Parts`, which
+May change: `SAMPLES`, `OPEN`, private functions. Must stay: fields of `Floating` and `Parts`, which
 `results.observables`, `remarks` and `interval` read by name; `reach` and `limits` hold the values of all equilibria:
-they may be too wide, never too narrow. Test: ``tests/statics/test_floating.py``.
+they may be too wide, never too narrow. Tests: ``tests/statics/test_floating.py``.
 """
 
 from __future__ import annotations

@@ -4,10 +4,10 @@ By line and group they follow from the adjoint of the equilibrium alone, see `re
 the scene, at a path such as ``cable.area`` or ``load.0.force.2``, J + λ·f is differentiated at the displacement of the
 equilibrium, by systems that are built with other values of the number: no equilibrium is solved again.
 
-May change freely: private functions, sizes of steps. Must stay: fields of `Gradient` and keys of `BY_LINE` and
-`BY_NODE`, which users read and write through `Solution.gradient` and ``refweb gradient``; paths are those of ``--set``.
+May change: private functions, sizes of steps. Must stay: fields of `Gradient` and keys of `BY_LINE` and `BY_NODE`,
+which users read and write through `Solution.gradient` and ``refweb gradient``; paths are those of ``--set``.
 `dynamics.gradients`, `studies.frequency_gradients` and `sizing.case` use names of this file. `KNOWN` has only terms
-that `adjoint` knows. Test: ``tests/statics/test_gradients.py``.
+that `adjoint` knows. Tests: ``tests/statics/test_gradients.py``.
 """
 
 from __future__ import annotations

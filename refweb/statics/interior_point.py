@@ -19,9 +19,9 @@ takes 17 where all lines are alike. It does not converge where stiffnesses are 1
 Lines with a curve count as straight ones of its largest slope here: they go slack in nearly the same places, and from
 there Newton's method finds the equilibrium.
 
-May change freely: all but `by_interior_point`, which `load_steps` and `lowest` call: points of the central path only
-start Newton's method, whose residual decides, so that constants change numbers of factorizations. Must stay: counts of
-all iterations are added to ``stats``. Test: ``tests/statics/test_stiffness_ratios.py``.
+May change: all but `by_interior_point`, which `load_steps` and `lowest` call: points of the central path only start
+Newton's method, whose residual decides, so that constants change numbers of factorizations. Must stay: counts of all
+iterations are added to ``stats``. Tests: ``tests/statics/test_stiffness_ratios.py``.
 """
 
 from __future__ import annotations

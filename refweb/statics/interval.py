@@ -10,9 +10,9 @@ which a primal–dual interior-point method solves through λ c = μ. Its matrix
 lines at their limit do no harm. By weak duality e·t + Σ λ c is never below the largest t where the first equation
 holds. This sum is returned.
 
-May change freely: the iteration and its constants. Must stay: `Interval` and `limits`, which `floating.Parts.limits`
-calls, and that a limit is the value of the dual problem, e·t + Σ λ c with balanced multipliers: such a value is never
-too narrow, however the iteration ends. Test: ``tests/statics/test_floating.py``.
+May change: the iteration and its constants. Must stay: `Interval` and `limits`, which `floating.Parts.limits` calls,
+and that a limit is the value of the dual problem, e·t + Σ λ c with balanced multipliers: such a value is never too
+narrow, however the iteration ends. Tests: ``tests/statics/test_floating.py``.
 """
 
 from __future__ import annotations

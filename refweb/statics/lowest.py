@@ -11,9 +11,9 @@ s balance the loads. As in `refweb.statics.duality_bound`, they bound the energy
 a sum of terms that are never negative, with T(ε_s) = |s| and the vector d of a line. Nearly all of this bound is the
 energy of the lines that push.
 
-May change freely: `NOTHING` and `SURE`, and where the second start begins. Must stay: keys ``above_lowest``, ``starts``
-and ``unsure`` of ``stats``, which `remarks`, `results.summary_text` and ``run.json`` read; ``above_lowest`` is an upper
-bound, or None. Test: ``tests/statics/test_lowest.py``, which calls private functions too.
+May change: `NOTHING` and `SURE`, and where the second start begins. Must stay: keys ``above_lowest``, ``starts`` and
+``unsure`` of ``stats``, which `remarks`, `results.summary_text` and ``run.json`` read; ``above_lowest`` is an upper
+bound, or None. Tests: ``tests/statics/test_lowest.py``, which calls private functions too.
 """
 
 from __future__ import annotations

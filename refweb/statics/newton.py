@@ -33,9 +33,9 @@ factorizations by rslab (squares, 118 803 unknowns), 13 (triangles) and 22 (hexa
 less beside them, 10, 13 and 20. Forces without a potential have an
 unsymmetric tangent, its LU and a search of their own, see `refweb.statics.residual_search`.
 
-May change freely: constants and the choice of steps: they change numbers of factorizations, and results within the
-residual. Must stay: `solve` accepts a state by the residual of `equilibrium` alone; public attributes and methods of
-`Newton`, which `load_steps`, `lowest`, `interior_point`, `shared_push` and `adjoint` use; keys of ``stats``. Tests:
+May change: constants and the choice of steps: they change numbers of factorizations, and results within the residual.
+Must stay: `solve` accepts a state by the residual of `equilibrium` alone; public attributes and methods of `Newton`,
+which `load_steps`, `lowest`, `interior_point`, `shared_push` and `adjoint` use; keys of ``stats``. Tests:
 ``tests/statics/test_reused_factorization.py``, ``test_statics.py``.
 """
 

@@ -5,9 +5,9 @@ displacement, and the load with the product of both. The displacement of a prest
 powers are tried with the last two equilibria and, where the loads are 0 at load step 0, with the last one alone. The
 candidate of least energy is taken; the last equilibrium itself is one of them.
 
-May change freely: `POWERS` and other candidates: they change numbers of factorizations alone. Must stay: `predicted` is
-called by `load_steps` under dead loads where no line pushes; among the candidates is the last ``x``, which is returned
-as the same array. Test: ``tests/statics/test_reused_factorization.py``.
+May change: `POWERS` and other candidates: they change numbers of factorizations alone. Must stay: `predicted` is called
+by `load_steps` under dead loads where no line pushes; among the candidates is the last ``x``, which is returned as the
+same array. Tests: ``tests/statics/test_reused_factorization.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Findings of load steps: each kind once, with the load steps at which it was found.
 
-May change freely: words of texts, in so far as no test quotes them. Must stay: codes of findings, which stand in
+May change: words of texts, in so far as no test quotes them. Must stay: codes of findings, which stand in
 `findings.CODES` and ``run.json``; `Remarks`, `open_rows`, `remark_on_open` and `on_stability`, which
 `dynamics.simulation` and `studies` call as well. Tests: ``tests/test_findings.py``, ``tests/results/test_remarks.py``.
 """

@@ -4,7 +4,7 @@ Follower loads have no energy that a line search could lower. A part a of the st
 prestress, is taken if |J⁻¹r(x + ap)| < |p|. This is the natural monotonicity test [1]_: a residual in units of
 displacement, which depends neither on the scale of forces nor on that of stiffnesses.
 
-May change freely: how far and how often a step is cut: that decides how many steps `newton` takes; what counts as an
+May change: how far and how often a step is cut: that decides how many steps `newton` takes; what counts as an
 equilibrium, the residual decides. Must stay: arguments and answer of `along`, the same as those of
 `energy_search.EnergySearch.along`, since `newton` calls either. Tests: ``tests/effects/test_follower_loads.py``,
 ``test_winch.py``.

@@ -3,9 +3,9 @@
 The state after a break depends on the motion of the web; that is dynamics. Brent's method finds the load step of the
 break. It searches equilibria between the last load step without a break and the first with one.
 
-May change freely: `FINE` and `TRIALS`, which change digits of a message alone, and its words. Must stay: arguments of
+May change: `FINE` and `TRIALS`, which change digits of a message alone, and its words. Must stay: arguments of
 `refuse_break`, which `statics.simulation` calls after each load step, and that every break up to that step is refused.
-Test: ``tests/effects/test_rupture.py``.
+Tests: ``tests/effects/test_rupture.py``.
 """
 
 from __future__ import annotations

@@ -25,10 +25,10 @@ a ball takes 65 factorizations from its start, and is not found with w a hundred
 Dynamics has the force of the deepest element alone. Damped, it comes to the same rest, and goes to and fro about it by
 the way of a step.
 
-May change freely: the limits of w and numbers of rounds: they change the cost and no result. Must stay:
+May change: the limits of w and numbers of rounds: they change the cost and no result. Must stay:
 `SharedPush.equilibrium` and ``newton``, which `load_steps` uses; shares of an `Equilibrium` in the order of
 `system.contact_shares`. `SharedPush` copies a system and drops its cached properties by name: a new one of `System`
-that depends on terms belongs in that list. Test: ``tests/statics/test_contact_kinks.py``.
+that depends on terms belongs in that list. Tests: ``tests/statics/test_contact_kinks.py``.
 
 References
 ----------

@@ -2,9 +2,9 @@
 
 `Simulation` has the interface of `refweb.dynamics.simulation`, and the runner follows either.
 
-May change freely: private methods. Must stay: public names, which `runner` uses of this `Simulation` and of that of
-dynamics alike; a row is (load step, observables, energies) in the order of ``columns``, the header of ``history.csv``;
-keys of ``steps`` and ``solver``, which are those of ``run.json``. Tests: ``tests/statics/test_statics.py``,
+May change: private methods. Must stay: public names, which `runner` uses of this `Simulation` and of that of dynamics
+alike; a row is (load step, observables, energies) in the order of ``columns``, the header of ``history.csv``; keys of
+``steps`` and ``solver``, which are those of ``run.json``. Tests: ``tests/statics/test_statics.py``,
 ``tests/results/test_frames.py``.
 """
 

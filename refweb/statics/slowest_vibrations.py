@@ -8,8 +8,8 @@ with any ω. Without C they are those of μ φ = K⁻¹ M φ, s² = −1/μ. Arn
 solution of K in each step. Where a vibration may grow, the μ are found again to all digits. Then left eigenvectors, by
 solutions with Kᵀ, show how far rounding changes the μ.
 
-May change freely: numbers of vectors and tolerances. Must stay: fields of `Slowest`, which `stability` reads; ``grows``
-is True only beyond rounding; seeds are fixed, so that the same run gives the same answer. Test:
+May change: numbers of vectors and tolerances. Must stay: fields of `Slowest`, which `stability` reads; ``grows`` is
+True only beyond rounding; seeds are fixed, so that the same run gives the same answer. Tests:
 ``tests/statics/test_stability.py``.
 """
 

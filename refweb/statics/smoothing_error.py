@@ -3,9 +3,9 @@
 With the smooth law, results differ from those of η → 0 in proportion to η. An equilibrium with a tenth of η, found from
 the same state, shows nine tenths of this difference.
 
-May change freely: the insides of `Smoothing`. Must stay: values and errors come in the order of the scene's
-observables, then of ``more``, as `statics.simulation` gives and reads them; the share of η is
-`results.error_budget.SMOOTHING_SHARE`. Test: ``tests/dynamics/test_accuracy.py``.
+May change: the insides of `Smoothing`. Must stay: values and errors come in the order of the scene's observables, then
+of ``more``, as `statics.simulation` gives and reads them; the share of η is `results.error_budget.SMOOTHING_SHARE`.
+Tests: ``tests/dynamics/test_accuracy.py``.
 """
 
 from __future__ import annotations

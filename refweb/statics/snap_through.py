@@ -6,8 +6,8 @@ unit tensions balance between the supports, Σ (y_i − y_j)/L = 0 at each node.
 no bar there is shorter than its natural length, the supports keep the bars stretched, and the web is taken to have no
 other equilibrium. If a bar is shorter, it may have one.
 
-May change freely: all inside of `may_turn_over`; its answer makes a finding and changes no number. Must stay: its name
-and arguments, by which `stability` calls it, and the answer True where the check cannot be done. Test:
+May change: all inside of `may_turn_over`; its answer makes a finding and changes no number. Must stay: its name and
+arguments, by which `stability` calls it, and the answer True where the check cannot be done. Tests:
 ``tests/statics/test_stability.py``.
 """
 

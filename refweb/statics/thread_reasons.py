@@ -1,6 +1,6 @@
 """Reasons why a net with threads may have no equilibrium: a load that pulls a thread through, or rings together.
 
-May change freely: `ABOUT`, the order of reasons and their words. Must stay: name and arguments of `reason_of`, which
+May change: `ABOUT`, the order of reasons and their words. Must stay: name and arguments of `reason_of`, which
 `equilibrium.with_reason` calls where an iteration has failed. No number of a result depends on this file. Tests:
 ``tests/effects/test_thread.py``, ``test_thread_friction.py``.
 """

@@ -10,7 +10,7 @@ with the body:
 
 with W and u of `refweb.net.rotation`. `refweb.net.rotation.to_quaternion` gives δθ by the change of the quaternion.
 
-May change freely: how blocks are multiplied, and private names that `resting_bodies` does not use. Must stay: names and
+May change: how blocks are multiplied, and private names that `resting_bodies` does not use. Must stay: names and
 arguments of public methods, which `System`, statics and studies call through `System.carriers`; `cells` couples all
 rows that any block needs, else entries are missing in the pattern. Must follow: `resting_bodies`, which derives from
 `Carried` with a `_state` of its own. Tests: ``tests/effects/test_attach.py``, ``tests/statics/test_free_bodies.py``.

@@ -6,9 +6,9 @@ iterations. An iteration costs a ninth (rslab) to a thirtieth (SuperLU) of a fac
 iterations are not enough, a factorization of A itself costs less. If A or M shows a direction without stiffness, only a
 factorization can tell more. Both cases end the iteration.
 
-May change freely: the rule by which the iteration ends early; it changes the cost of `statics.newton`, and how sharp
-the bounds of `statics.duality_bound` are. Must stay: arguments of `solve` and fields of `Found`, which both read, and
-that A and M are symmetric. Test: ``tests/statics/test_reused_factorization.py``.
+May change: the rule by which the iteration ends early; it changes the cost of `statics.newton`, and how sharp the
+bounds of `statics.duality_bound` are. Must stay: arguments of `solve` and fields of `Found`, which both read, and that
+A and M are symmetric. Tests: ``tests/statics/test_reused_factorization.py``.
 """
 
 from __future__ import annotations

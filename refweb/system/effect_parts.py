@@ -2,9 +2,9 @@
 
 A kernel reads arrays without checks: a row out of range would be memory of others. Each part is checked once here.
 
-`System` and `statics.adjoint` call `parts_of`. May change freely: the order of checks. Must stay: no check is left out,
-and parts keep the order of effects. A new class of parts belongs in `PARTS`, and `System` must sort it. Messages are
-quoted by ``tests/test_plugins.py`` and ``tests/how_to/test_law.py``.
+`System` and `statics.adjoint` call `parts_of`. May change: the order of checks. Must stay: no check is left out, and
+parts keep the order of effects. A new class of parts belongs in `PARTS`, and `System` must sort it. Messages are quoted
+by ``tests/test_plugins.py`` and ``tests/how_to/test_law.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Result of an evaluation of all forces: their sum on every row, and the values of each term per cell.
 
-May change freely: the insides of `PerCell`. Must stay: `Forces` is a pair (force, per_cell), which callers unpack;
+May change: the insides of `PerCell`. Must stay: `Forces` is a pair (force, per_cell), which callers unpack;
 ``per_cell[i]`` belongs to ``System.terms[i]``, and all terms over the lines have the one array ``lines``. Must follow a
 change: `System.per_cell`, which makes these arrays, and all kernels that write to them as ``out``.
 """

@@ -3,9 +3,9 @@
 The accelerations satisfy M a + Gᵀλ = f with G = ∂g/∂x, and keep the lengths if G a = −|v₂ − v₁|²/L. A state is moved to
 the nearest velocities with G v = 0 and to the nearest positions with G δx = −g; mass weighs the distance.
 
-May change freely: constants and private functions. Must stay: `places` and `values` list the same entries in the same
-order, for the unknowns (x, v, λ, μ) of `dynamics.integrators.ida`: change all three together. Messages and lengths are
-tested by ``tests/dynamics/integrators/test_ida.py``.
+May change: constants and private functions. Must stay: `places` and `values` list the same entries in the same order,
+for the unknowns (x, v, λ, μ) of `dynamics.integrators.ida`: change all three together. Messages and lengths are tested
+by ``tests/dynamics/integrators/test_ida.py``.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 M is the lumped mass on the diagonal plus, for consistent mass, a block of each element whose rows sum to 0. Both masses
 therefore move a rigid net in the same way.
 
-May change freely: how values are computed. Must stay: public names; `values` stand in the pattern of the tangent, and
-`heavy` numbers components as 3 row + axis: `cvode`, `ida`, `links` and modes index both. Plug-ins use ``matrix`` and
+May change: how values are computed. Must stay: public names; `values` stand in the pattern of the tangent, and `heavy`
+numbers components as 3 row + axis: `cvode`, `ida`, `links` and modes index both. Plug-ins use ``matrix`` and
 ``factor``. Tests: ``tests/effects/test_damping.py``, ``tests/dynamics/integrators/test_cvode.py``.
 """
 

@@ -1,6 +1,6 @@
 """Fixed sparsity pattern of the tangent of a net, and the assembly of blocks of cells into its values.
 
-May change freely: how `Pattern` finds its entries. Must stay: rows increase within a column, which `attached_nodes` and
+May change: how `Pattern` finds its entries. Must stay: rows increase within a column, which `attached_nodes` and
 factorizations count on; names of attributes, which `cvode`, `ida` and modes read; the order of sums in `_scatter`,
 which decides the last bits of K. Tests: ``tests/system/test_factorization.py``, ``test_system.py``.
 """

@@ -1,8 +1,8 @@
 """Displacement and velocity at the start, from the effects and bodies of a system.
 
-`System.laid` and `System.initial_velocity` alone call the two functions. May change freely: their insides. Must stay:
-their names, argument and the shapes of results; effects, those of users too, bring ``lay(net, supported)`` and
-``start(net, supported, v)``; bodies write their rows last. Tests: ``tests/effects/test_velocity.py``, ``test_fold.py``.
+`System.laid` and `System.initial_velocity` alone call the two functions. May change: their insides. Must stay: their
+names, argument and the shapes of results; effects, those of users too, bring ``lay(net, supported)`` and ``start(net,
+supported, v)``; bodies write their rows last. Tests: ``tests/effects/test_velocity.py``, ``test_fold.py``.
 """
 
 from __future__ import annotations

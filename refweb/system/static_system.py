@@ -1,8 +1,8 @@
 """The system of statics: bodies that wait are fixed, and forces that need velocity are left out.
 
-May change freely: `NEAR`, private functions, the text of the refusal. Must stay: `at_rest` changes a copy, never the
-given system, and returns the system itself where nothing differs. It drops cached properties of `System` by name: a new
-one that depends on supports or terms belongs in its list. Tests: ``tests/dynamics/test_starts.py``,
+May change: `NEAR`, private functions, the text of the refusal. Must stay: `at_rest` changes a copy, never the given
+system, and returns the system itself where nothing differs. It drops cached properties of `System` by name: a new one
+that depends on supports or terms belongs in its list. Tests: ``tests/dynamics/test_starts.py``,
 ``test_bodies_come_to_rest.py``.
 """
 

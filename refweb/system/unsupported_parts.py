@@ -1,8 +1,8 @@
 """Parts of a net without support along an axis, which no force along that axis may act on in statics.
 
-`System.unsupported_parts` and `statics.equilibrium` call `find_parts`. May change freely: how parts are found, and
-their order, by which a message names the first. Must stay: fields of `Part`, which statics reads; terms of contact are
-known by their names "contact" and "self_contact": a renamed or further one belongs in `find_parts`. Test:
+`System.unsupported_parts` and `statics.equilibrium` call `find_parts`. May change: how parts are found, and their
+order, by which a message names the first. Must stay: fields of `Part`, which statics reads; terms of contact are known
+by their names "contact" and "self_contact": a renamed or further one belongs in `find_parts`. Tests:
 ``tests/statics/test_statics.py``.
 """
 

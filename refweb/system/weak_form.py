@@ -4,7 +4,7 @@ Position x(s) ∈ R³ over natural arc length s, λ = |x'|, t = x'/λ, tension T
 internal virtual work ∫ T t·δx' ds. No run evaluates it: the compiled kernels of `refweb.effects.elasticity` compute the
 same in 2 % of the time, and a test compares both.
 
-May change freely: all, since no run imports this file. Must stay: the result of `tangent_matrix`, the tangent of
+May change: all, since no run imports this file. Must stay: the result of `tangent_matrix`, the tangent of
 `refweb.effects.elasticity` to rounding, with which ``tests/net/test_elements.py`` compares it.
 """
 

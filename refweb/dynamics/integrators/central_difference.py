@@ -10,11 +10,11 @@ With smaller steps a slack chain in contact can still gain energy by many orders
 Therefore the energy balance is checked at every row: the run ends if ``|ΔE − work|`` is above `DRIFT` of the largest
 energy.
 
-May change freely: words of messages and private methods for them (``_name_…``, `_way_out`, `_remedy`). Must stay:
-public names, those of `integrator.Integrator`; class attributes ``kicks``, ``drifts``, ``stretch`` and `_keys`, which
+May change: words of messages and private methods for them (``_name_…``, `_way_out`, `_remedy`). Must stay: public
+names, those of `integrator.Integrator`; class attributes ``kicks``, ``drifts``, ``stretch`` and `_keys`, which
 `splitting` sets. `Scheme` and `Running` get fields by position, so that `records` and this file change together;
 `SHARED` is the first part of `CLOCK`. `budget.steps_with_twin` repeats `TWIN_STEPS` as √2. A run that goes on from a
-checkpoint has the bits of one that does not. Test: ``tests/dynamics/test_dynamics.py``.
+checkpoint has the bits of one that does not. Tests: ``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

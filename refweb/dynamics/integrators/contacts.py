@@ -1,9 +1,9 @@
 """Contact forces on bodies in the compiled loop: the sum over the cells that are near in a step.
 
-May change freely: nothing but names inside of kernels. Must stay: ``chosen`` is a place in ``cells`` of
-`records.ForceTerms`, counted as `neighbour_list.near_of` lists terms; sums are those of `system.contact_forces`, whose
-dtype and kernels it uses, so that a row of the loop equals that of a state. `step`, `dense_output` and `explicit_loop`
-call `feel`. Test: ``tests/results/test_contact_force.py``.
+May change: nothing but names inside of kernels. Must stay: ``chosen`` is a place in ``cells`` of `records.ForceTerms`,
+counted as `neighbour_list.near_of` lists terms; sums are those of `system.contact_forces`, whose dtype and kernels it
+uses, so that a row of the loop equals that of a state. `step`, `dense_output` and `explicit_loop` call `feel`. Tests:
+``tests/results/test_contact_force.py``.
 """
 
 from __future__ import annotations

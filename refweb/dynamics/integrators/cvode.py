@@ -10,10 +10,10 @@ An implicit step solves (I − γJ) z = r with J = [[0, I], [−M⁻¹K, −M⁻
 
 a matrix of half the size. It is symmetric unless an effect is not, and definite without the negative part of K.
 
-May change freely: `SHORT`, `STILL` and `RENEWED`, which change cost and digits within the tolerance. Must stay:
-arguments of `set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which sksundae calls them;
-`precondition` uses the factors of the last `set_up`; the Jacobian is the derivative of `right_side`. Keys of
-``[solve]`` are those of `registry.INTEGRATORS`. Test: ``tests/dynamics/integrators/test_cvode.py``.
+May change: `SHORT`, `STILL` and `RENEWED`, which change cost and digits within the tolerance. Must stay: arguments of
+`set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which sksundae calls them; `precondition`
+uses the factors of the last `set_up`; the Jacobian is the derivative of `right_side`. Keys of ``[solve]`` are those of
+`registry.INTEGRATORS`. Tests: ``tests/dynamics/integrators/test_cvode.py``.
 """
 
 from __future__ import annotations

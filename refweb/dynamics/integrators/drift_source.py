@@ -4,8 +4,8 @@ A kick, a drift and a kick change the kinetic energy by ½ (f₀ + f₁)·Δx of
 part that two successive steps cancel. Therefore the drift of a cell in a step is ΔE + ½ (f₀ + f₁)·Δx with its forces f
 = −∂E/∂x. A cell that gains energy by the work of others has no drift.
 
-`central_difference` alone calls it, for the text of an error. May change freely: all of it but the names `source_of`,
-`name_of` and `suspects`; no result depends on it. Test: ``tests/results/test_results.py``.
+`central_difference` alone calls it, for the text of an error. May change: all of it but the names `source_of`,
+`name_of` and `suspects`; no result depends on it. Tests: ``tests/results/test_results.py``.
 """
 
 from __future__ import annotations

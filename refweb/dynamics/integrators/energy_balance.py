@@ -2,11 +2,11 @@
 
 It is independent of the method: at every history row ``|ΔE − work|`` is compared with the largest energy of the run.
 
-May change freely: `CLOSING` and words of messages. Must stay: ``total`` is (energy of each term, kinetic energy, work,
-step size) and ``work`` ends with that of motion: `rows`, `simpson_balance` and `History` count on both. With `DRIFT`
-changes its value in words in ``validation/how_it_works.py``, which ``tests/test_readme.py`` compares. Kernels are
-called by `explicit_loop`, `step`, `dense_output`, `rows` and `simpson_balance`, which follow their arguments; another
-order of sums changes last bits of work. Test: ``tests/dynamics/test_impact.py``.
+May change: `CLOSING` and words of messages. Must stay: ``total`` is (energy of each term, kinetic energy, work, step
+size) and ``work`` ends with that of motion: `rows`, `simpson_balance` and `History` count on both. With `DRIFT` changes
+its value in words in ``validation/how_it_works.py``, which ``tests/test_readme.py`` compares. Kernels are called by
+`explicit_loop`, `step`, `dense_output`, `rows` and `simpson_balance`, which follow their arguments; another order of
+sums changes last bits of work. Tests: ``tests/dynamics/test_impact.py``.
 """
 
 from __future__ import annotations

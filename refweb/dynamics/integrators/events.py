@@ -3,9 +3,9 @@
 A compiled step is looked at once, at its end: a moment is known to its size. Bisection finds a moment to rounding where
 values are known anywhere within a step. An event of rest: a value has stayed below a share of its largest for a time.
 
-May change freely: how `search` comes to a moment, within rounding. Must stay: fields of `EVENT`, which checkpoints keep
-and `rupture` reads and sets by name; fields of `Event`, which `history` fills, have the same names there. `note_events`
-is called by `explicit_loop` with these arguments. Tests: ``tests/dynamics/test_events.py``,
+May change: how `search` comes to a moment, within rounding. Must stay: fields of `EVENT`, which checkpoints keep and
+`rupture` reads and sets by name; fields of `Event`, which `history` fills, have the same names there. `note_events` is
+called by `explicit_loop` with these arguments. Tests: ``tests/dynamics/test_events.py``,
 ``tests/dynamics/integrators/test_step_observer.py``.
 """
 

@@ -5,11 +5,11 @@ Its parts are beside their equations: `refweb.dynamics.integrators.step` moves r
 row of a plain scene calls count no references to arrays, see `refweb.kernels.kernel`: counting would take a third of
 the time of a cable of 100 elements.
 
-May change freely: `BREATH`. Must stay: the order of calls in `run_steps`, which is the method; the numbers that
-`advance_rows` returns, which `CentralDifference.advance` reads; a kernel with ``apart`` is called only where `features`
-has its names, else the run ends. Another order of sums changes last bits of results: then a run that goes on, one with
-lists of near lines and the undisturbed one must still be equal bit for bit
-(``tests/dynamics/integrators/test_nearby.py``). Test: ``tests/dynamics/test_dynamics.py``.
+May change: `BREATH`. Must stay: the order of calls in `run_steps`, which is the method; the numbers that `advance_rows`
+returns, which `CentralDifference.advance` reads; a kernel with ``apart`` is called only where `features` has its names,
+else the run ends. Another order of sums changes last bits of results: then a run that goes on, one with lists of near
+lines and the undisturbed one must still be equal bit for bit (``tests/dynamics/integrators/test_nearby.py``). Tests:
+``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """State of an explicit run.
 
-May change freely: nothing. Must stay: names of fields, which are keys of checkpoints unless their metadata says
+May change: nothing. Must stay: names of fields, which are keys of checkpoints unless their metadata says
 ``saved=False``. A further field that must survive a step, or a stop, belongs here, with a default for older folders;
 `CentralDifference` hands its array to `Running` by position. Tests: ``tests/dynamics/integrators/test_records.py``,
 ``tests/dynamics/test_dynamics.py``.

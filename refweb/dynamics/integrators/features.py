@@ -1,8 +1,8 @@
 """Features of a run: kernels for features that it has not are neither compiled nor loaded.
 
-May change freely: how a feature is counted. Must stay: each name in ``apart`` of a kernel of the loop is a key here,
-and counts above 0 in every run that may call that kernel: a run ends where it calls one whose feature is missing. A new
-name stands in the list of the docstring as well. Test: ``tests/test_pay_for_what_you_call.py``, by which a run has no
+May change: how a feature is counted. Must stay: each name in ``apart`` of a kernel of the loop is a key here, and
+counts above 0 in every run that may call that kernel: a run ends where it calls one whose feature is missing. A new
+name stands in the list of the docstring as well. Tests: ``tests/test_pay_for_what_you_call.py``, by which a run has no
 kernel that it does not need.
 """
 

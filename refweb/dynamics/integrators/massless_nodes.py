@@ -3,8 +3,8 @@
 They have one where the tangent among them, K_mm, is positive definite, that is where tension holds them; that follows
 all else without delay, K_mm v_m = −K_mo v_o − ∂f_m/∂t.
 
-May change freely: constants and rounds of Newton's method. Must stay: public names of `Massless` and `REMEDY`, which
-`ida` alone uses; a node that nothing holds is named and ends the run. Test: ``tests/dynamics/integrators/test_ida.py``.
+May change: constants and rounds of Newton's method. Must stay: public names of `Massless` and `REMEDY`, which `ida`
+alone uses; a node that nothing holds is named and ends the run. Tests: ``tests/dynamics/integrators/test_ida.py``.
 """
 
 from __future__ import annotations

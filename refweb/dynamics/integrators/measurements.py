@@ -5,9 +5,9 @@ parabola through the last three values, and an integral has one part for each ev
 within a step as at its ends. Therefore peaks are searched by several parabolas, and steps are halved if the error of a
 mean is too large.
 
-May change freely: `ROUNDS` and how peaks are searched. Must stay: public methods of `Measurements`, which
-`step_observer` calls; values are those of the kernels of the compiled loop: arguments follow `extremes`, `averages` and
-`rows`, in their order. Tests: ``tests/dynamics/test_peaks.py``, ``test_averages.py``.
+May change: `ROUNDS` and how peaks are searched. Must stay: public methods of `Measurements`, which `step_observer`
+calls; values are those of the kernels of the compiled loop: arguments follow `extremes`, `averages` and `rows`, in
+their order. Tests: ``tests/dynamics/test_peaks.py``, ``test_averages.py``.
 """
 
 from __future__ import annotations

@@ -22,10 +22,10 @@ impulse of supports is that of Simpson's rule: they close the balance within `al
 The book does not see what gives no impulse to all of the web, though it moves parts of it: natural lengths that reels
 and temperature change, pressure inside of a closed line. Nor does it see [[motion]], whose impulse is that of supports.
 
-May change freely: private functions. Must stay: fields of `MomentumBalance`, which checkpoints keep; the paragraph
-above on what the book does not see, which a test reads; `CLOSURE` and `allowed`, above which runs are refused. An
-effect from outside brings `Balance.impulse`, or is integrated along the steps. Kernels are called by `explicit_loop`,
-`rows` and `simpson_balance`, which follow their arguments. Test: ``tests/dynamics/test_momentum_balance.py``.
+May change: private functions. Must stay: fields of `MomentumBalance`, which checkpoints keep; the paragraph above on
+what the book does not see, which a test reads; `CLOSURE` and `allowed`, above which runs are refused. An effect from
+outside brings `Balance.impulse`, or is integrated along the steps. Kernels are called by `explicit_loop`, `rows` and
+`simpson_balance`, which follow their arguments. Tests: ``tests/dynamics/test_momentum_balance.py``.
 """
 
 from __future__ import annotations

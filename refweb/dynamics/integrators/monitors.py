@@ -1,8 +1,8 @@
 """Monitors of a run: probes and sums as a record, and their extremes, means and events where no step has been taken.
 
-May change freely: how `Observed.of` fills the record. Must stay: names of the fields of `Observed`, which kernels of
+May change: how `Observed.of` fills the record. Must stay: names of the fields of `Observed`, which kernels of
 `extremes`, `averages`, `events` and `rows` read; the order of probes, then sums, in ``signs`` and ``sums``;
-`measurements` puts other arrays into ``data`` for probes that read a term. Test: ``tests/dynamics/test_averages.py``,
+`measurements` puts other arrays into ``data`` for probes that read a term. Tests: ``tests/dynamics/test_averages.py``,
 ``tests/results/test_observable_contract.py``.
 """
 

@@ -11,9 +11,9 @@ position. Two bodies approach at most by the approach of their positions plus th
 Neither passes through the other if this approach plus their depth at the start is less than the least distance from a
 middle to its surface, or if the approach is less than the distance of the spheres around both.
 
-May change freely: `HALVINGS`, upwards, and how pieces are halved. Must stay: bounds of motion may be too large, never
-too small; checks are those of `crossings.checks_of`, and rows of ``crossings`` its kinds; `step_limits` calls `soon`,
-and `step_observer` calls `inspect`. `TRAVEL` bounds the steps of all methods with tolerances. Tests:
+May change: `HALVINGS`, upwards, and how pieces are halved. Must stay: bounds of motion may be too large, never too
+small; checks are those of `crossings.checks_of`, and rows of ``crossings`` its kinds; `step_limits` calls `soon`, and
+`step_observer` calls `inspect`. `TRAVEL` bounds the steps of all methods with tolerances. Tests:
 ``tests/effects/test_passage.py``, ``test_between_bodies.py``.
 """
 

@@ -1,8 +1,8 @@
 """History rows of the compiled loop: probes, energies, momentum and impulses at an instant.
 
-May change freely: nothing but names inside of kernels. Must stay: the order of a row, that of `integrator.History`,
-which `step_observer` writes as well: change all three together. `explicit_loop` calls `energies_now` and `write_row`,
-`measurements` calls `write_probes`, with these arguments. Test: ``tests/dynamics/test_dynamics.py``.
+May change: nothing but names inside of kernels. Must stay: the order of a row, that of `integrator.History`, which
+`step_observer` writes as well: change all three together. `explicit_loop` calls `energies_now` and `write_row`,
+`measurements` calls `write_probes`, with these arguments. Tests: ``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

@@ -6,11 +6,10 @@ integrated to any time within. Where Simpson's rule and the trapezoidal one diff
 slack in a long step, a piece is to be halved. Explicit steps book what each kick and drift gives instead, which closes
 to rounding, see `refweb.dynamics.integrators.energy_balance`.
 
-May change freely: `UNEVEN`, which trades cost for the error of the balance. Must stay: the last seven entries of
-``flow`` and ``before`` are work of motion, impulse of supports and impulse from outside: `step_observer` splits
-integrals by these places, and `rates` adds there what `system.material_flow` brings; fields of `Sample` and `Piece`,
-which `measurements`, `events` and `passages` read. Tests: ``tests/dynamics/integrators/test_step_observer.py``,
-``test_cvode.py``.
+May change: `UNEVEN`, which trades cost for the error of the balance. Must stay: the last seven entries of ``flow`` and
+``before`` are work of motion, impulse of supports and impulse from outside: `step_observer` splits integrals by these
+places, and `rates` adds there what `system.material_flow` brings; fields of `Sample` and `Piece`, which `measurements`,
+`events` and `passages` read. Tests: ``tests/dynamics/integrators/test_step_observer.py``, ``test_cvode.py``.
 """
 
 from __future__ import annotations

@@ -28,9 +28,9 @@ Order 8 is not included, since it needs more evaluations than order 6 for errors
 with the same forces takes 1.9 to 3 times as long as order 4 or 6 for errors of 1e-7 to 1e-11 m, by
 ``validation/methods/work_precision.py``.
 
-May change freely: words of refusals. Must stay: coefficients, as published, and the keys of `KICKS` and `DRIFTS`, which
-are the values of ``order`` in scenes: `settings.Dynamic` checks them, and its help has them in words. All else is that
-of `CentralDifference`, whose ``kicks``, ``drifts``, ``stretch`` and `_keys` it sets. Test:
+May change: words of refusals. Must stay: coefficients, as published, and the keys of `KICKS` and `DRIFTS`, which are
+the values of ``order`` in scenes: `settings.Dynamic` checks them, and its help has them in words. All else is that of
+`CentralDifference`, whose ``kicks``, ``drifts``, ``stretch`` and `_keys` it sets. Tests:
 ``tests/dynamics/integrators/test_nystrom.py``.
 
 References

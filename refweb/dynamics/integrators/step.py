@@ -1,8 +1,8 @@
 """The pieces of an explicit step: kick and drift, forces, and the last kick where forces depend on velocity.
 
-May change freely: `ROUNDS`, `SWEEPS` and limits of iterations, which trade cost for the error of the kick. Must stay:
-kernels are called by `explicit_loop` and `dense_output` with these arguments; names in ``apart`` are keys of
-`features`; fields of `Model` and `Running` stand in `records`. Another order of sums changes last bits of results.
+May change: `ROUNDS`, `SWEEPS` and limits of iterations, which trade cost for the error of the kick. Must stay: kernels
+are called by `explicit_loop` and `dense_output` with these arguments; names in ``apart`` are keys of `features`; fields
+of `Model` and `Running` stand in `records`. Another order of sums changes last bits of results.
 `dynamics.responses.between` repeats `interpolate_kicks`. Tests: ``tests/dynamics/test_dynamics.py``,
 ``tests/effects/test_contact_losses.py``.
 """

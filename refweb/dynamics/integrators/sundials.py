@@ -4,7 +4,7 @@
 of half the size or less, is factorized as the preconditioner of GMRES. Where that inverts the Jacobian exactly, one
 iteration does, and nothing is multiplied: what is to be inverted is the Jacobian times a vector that is known.
 
-May change freely: `DENSE`, texts in `LINEAR_SOLVERS`. Must stay: keys of `LINEAR_SOLVERS`, which scenes name and
+May change: `DENSE`, texts in `LINEAR_SOLVERS`. Must stay: keys of `LINEAR_SOLVERS`, which scenes name and
 `settings.Dynamic` lists; `_made`, `_initial` and `linear_options`, which `cvode` and `ida` bring, and private methods
 that they call; what SUNDIALS prints becomes the reason in a message. Tests:
 ``tests/dynamics/integrators/test_cvode.py``, ``test_ida.py``.

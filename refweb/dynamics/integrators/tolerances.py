@@ -1,8 +1,8 @@
 """Scales of the tolerances of displacements and velocities where the state itself is near zero.
 
-May change freely: nothing without a reason: default tolerances follow from these scales, so that others change steps
-and digits of all methods with rtol, within ±. Must stay: `scales` gives (displacement [m], velocity [m/s]) to `ida`,
-`step_observer` and `studies.dop853`. The help of ``atol_position`` in `settings.Dynamic` says the same in words. Test:
+May change: nothing without a reason: default tolerances follow from these scales, so that others change steps and
+digits of all methods with rtol, within ±. Must stay: `scales` gives (displacement [m], velocity [m/s]) to `ida`,
+`step_observer` and `studies.dop853`. The help of ``atol_position`` in `settings.Dynamic` says the same in words. Tests:
 ``tests/dynamics/integrators/test_cvode.py``.
 """
 

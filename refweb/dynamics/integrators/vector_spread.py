@@ -1,8 +1,7 @@
 """Spread of rows of vectors: no two differ by more.
 
-May change freely: how the bound is computed. Must stay: it may be too large and never too small, since `ccd`,
-`neighbour_list` and `explicit_loop` bound motion by it; arguments of both kernels. Test:
-``tests/dynamics/integrators/test_nearby.py``.
+May change: how the bound is computed. Must stay: it may be too large and never too small, since `ccd`, `neighbour_list`
+and `explicit_loop` bound motion by it; arguments of both kernels. Tests: ``tests/dynamics/integrators/test_nearby.py``.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ ring, turns back. So a step whose dense output turns back is cut at the first su
 anew. The energy that is lost needs the natural length at which a line yields, so that they are taken on after each
 piece of a step.
 
-May change freely: `SAMPLES`, `ROUNDS` and `SMALL`, which trade cost for the error of the moment. Must stay: public
-methods, which `step_observer` calls; ``method`` has `state` and `interpolated` of `step_observer`; followers have the
-functions ``grown`` and ``drive`` of `effects.base.InternalVariables`. Test: ``tests/effects/test_plastic.py``.
+May change: `SAMPLES`, `ROUNDS` and `SMALL`, which trade cost for the error of the moment. Must stay: public methods,
+which `step_observer` calls; ``method`` has `state` and `interpolated` of `step_observer`; followers have the functions
+``grown`` and ``drive`` of `effects.base.InternalVariables`. Tests: ``tests/effects/test_plastic.py``.
 """
 
 from __future__ import annotations
