@@ -9,7 +9,11 @@
 `numba_internals`    all uses of private parts of numba, with reasons and the ways without them
 ===================  ==========================================================================================
 
-A change of any file here, even of a comment, compiles all kernels of all users again.
+Room: the lowest, which imports nothing of refweb; other rooms take most of it through `refweb.kernels`, and rows from
+`refweb.compiled.rows`. A change of any file here, even of a comment, compiles all kernels of all users again: change
+several at once. May change: what each file says. Must stay: ``watchers`` and `watched`, by which `results.progress`
+counts compiled kernels; the first sentence, which stands in ``tests/test_architecture.py`` as well. Tests:
+``tests/compiled``.
 """
 
 from __future__ import annotations

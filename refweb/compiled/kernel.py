@@ -6,8 +6,10 @@ annotations, and are not compiled again when the kernel changes. ``apart`` lists
 a run without them neither compiles nor loads it, see `prepare`. A call from Python goes through an entry, which is
 compiled at the first call.
 
-`COMMON` decides the bits of all results, `keys` and numba call `machine_code_key` and `_numba_type_`, and a kernel with
-a name in ``apart`` that `dynamics.integrators.features` never gives is not prepared.
+May change: private functions, and how kernels are collected in `needed`, if none is left out. Must stay: arguments of
+`kernel`, which effects of users call; `machine_code_key` and `_numba_type_`, which `keys` and numba call; `COMMON`,
+which decides the bits of all results. A name in ``apart`` that `dynamics.integrators.features` never gives is not
+prepared, and its call ends the run. Tests: ``tests/compiled/test_kernel.py``.
 """
 
 from __future__ import annotations

@@ -19,7 +19,10 @@ of one's own                                                                   n
 ``REFWEB_PLAIN=1`` uses the right column. Tables of kernels need addresses of functions and the calling convention of
 numba in both. numba is bounded above in ``pyproject.toml``.
 
-A new use of a private part of numba gets a row of the table and, if there is one, a way without it.
+May change: nothing but names inside of functions: each use follows a private part of numba. Must stay: names that
+`kernel`, `records`, `tables`, `rows` and `second_process` import; both ways give the same results. A new use of a
+private part gets a row of the table and, if there is one, a way without it; a new version of numba has to be tried
+before the bound in ``pyproject.toml`` is raised. Tests: ``tests/compiled/test_kernel.py``, ``test_pointers.py``.
 """
 
 from __future__ import annotations

@@ -15,8 +15,11 @@ a record               another record
 =====================  =======================================================================================
 
 Kernels follow fields that are added and moved: the name of the type has a digest of them, so that these compile again.
-Callers that fill a record by position, and fields that go into checkpoints by name, do not. Names of records are unique
-in refweb.
+Callers that fill a record by position, and fields that go into checkpoints by name, do not.
+
+May change: private names. Must stay: public names of `Record` and the annotations at the end, which `kernels` hands on;
+the order of words in `_block`, in which `_read_field` finds a field: change both together. Names of records are unique
+in refweb. Tests: ``tests/compiled/test_pointers.py``.
 """
 
 from __future__ import annotations

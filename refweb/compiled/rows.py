@@ -4,9 +4,11 @@ All terms of the compiled loop take matrices, so that one loop serves every comb
 columns of a matrix; its fields are numbers or arrays of one type. A row may have more columns before and after those of
 a record.
 
-Fields are eight bytes wide, since columns count numbers; `record_at` reads memory without a check of its bounds. All
-effects with data of more than one column rely on the four functions of dtypes and on `record_at`; the way in which an
-intrinsic builds its address is free.
+Fields are eight bytes wide, since columns count numbers; `record_at` reads memory without a check of its bounds.
+
+May change: the way in which an intrinsic builds its address. Must stay: names and arguments of all functions here, on
+which all effects with data of more than one column rely; records and matrices that they return share memory with what
+they are given. Tests: ``tests/compiled/test_pointers.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,9 @@ all kernels of the list, needs no imports, and writes machine code to the folder
 the first process reads it. File locks prevent that both compile the same kernel. A copy is made only on Linux, on which
 copying a process with threads is safe while no thread compiles.
 
-The copy leaves by `os._exit`, so that it runs no handler of the first process; `LEAST` is free.
+May change: `LEAST`. Must stay: `beside`, which `kernel.prepare` calls; no copy is made off Linux or while a thread
+compiles; the copy leaves by `os._exit`, so that it runs no handler of the first process, and none is left at the end.
+Tests: ``tests/compiled/test_kernel.py``.
 """
 
 from __future__ import annotations

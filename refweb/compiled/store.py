@@ -4,7 +4,10 @@ Files are searched in a folder of the user, see `folder`, then in the folder ``m
 wheel may contain. A file is written under another name and then renamed, so that several processes may share a folder.
 Files unused for `UNUSED` are removed during compilation.
 
-The format of files is free: a change here gives all of them other names. ``pyproject.toml`` packs `SHIPPED`.
+May change: the format of files and their names, since a change here gives all of them other names; `UNUSED` and
+`NOTED`. Must stay: ``REFWEB_CACHE``; a file is never read half written or damaged; `SHIPPED`, which ``pyproject.toml``
+packs, `wheel` checks and ``refweb warm --ship`` fills; names that `numba_internals` uses. Tests:
+``tests/compiled/test_kernel.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,10 @@ A table has two words, the number of its items and their address. An item of a t
 kernel. An item of a table of arrays has the address of a reference counter, 0 for an array of Python, the address of
 the array, and its sizes.
 
-Words that Python writes and the code that reads them change together; ``_items`` stays, since kernels have its address.
+May change: private names but ``_items`` and ``_head``. Must stay: words that Python writes and the code that reads them
+change together; ``_items`` and ``_head`` exist as long as the table, since kernels have their addresses; references to
+arrays are counted as here, else memory leaks or is read after its end; names that `records` and `kernels` import.
+Tests: ``tests/compiled/test_pointers.py``.
 """
 
 from __future__ import annotations

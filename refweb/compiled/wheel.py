@@ -3,7 +3,8 @@
 It needs a clone, and the packages `build` and `wheel`. Machine code is for one minor version of Python and one
 platform, which are in the name of the wheel; with another version of numba refweb compiles as usual.
 
-The workflow ``wheels.yml`` calls this file; tags of a wheel must be as narrow as its machine code.
+May change: the message. Must stay: how it is called, since ``.github/workflows/wheels.yml`` does so, and the exit
+status; tags of a wheel are as narrow as its machine code: one minor version of Python, one platform. No test runs it.
 """
 
 from __future__ import annotations
