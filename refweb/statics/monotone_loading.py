@@ -5,10 +5,10 @@ then along the slope of hardening over the elastic and the plastic strain togeth
 equilibrium is that of lines with a curve, whatever the path has been, and `refweb.statics.duality_bound` proves it. It
 has no bound where a line yields without hardening, since its tension then tells nothing of its strain.
 
-May change: private names and `CLOSE`. Must stay: `turned_back` finds each line that was let go, else a bound is wrong;
-functions that `load_steps`, `dynamic_relaxation` and `gradients` call. `of_curves` drops cached properties of `System`
-by the names in `KEPT_BY_LINES`: a new one that follows from terms or numbers of lines belongs there. Tests:
-``tests/statics/test_monotone_loading.py``.
+May change: `CLOSE`, `pieces_of` and the insides of functions. Must stay: `turned_back` finds each line that was let go,
+else a bound is wrong; functions that `load_steps`, `dynamic_relaxation` and `gradients` call. `of_curves` drops cached
+properties of `System` by the names in `KEPT_BY_LINES`: a new one that follows from terms or numbers of lines belongs
+there. Tests: ``tests/statics/test_monotone_loading.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 May change: `ABOUT`, the order of reasons and their words. Must stay: name and arguments of `reason_of`, which
 `equilibrium.with_reason` calls where an iteration has failed. No number of a result depends on this file. Tests:
-``tests/effects/test_thread.py``, ``test_thread_friction.py``.
+``tests/effects/test_thread.py``, ``test_thread_friction.py``, ``test_winch.py``.
 """
 
 from __future__ import annotations
