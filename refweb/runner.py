@@ -1,9 +1,9 @@
 """From a scene to a solution: the solver runs, and files, history and progress follow it.
 
-May change: private functions, words of findings. Must stay: `run`, `trust` and `resume`, which users call; `_attempt`
-uses the same attributes of both simulations (``columns``, ``rows``, ``done``, ``system``, ``price``, ``follow``,
-``remarks``); `_before` asks for keys that `refweb.dynamics.simulation` writes to checkpoints; wrong input writes
-nothing. Tests: ``tests/results/test_remarks.py``, ``tests/test_faults.py``.
+May change: private functions, words of findings, `STIFFENINGS` and `MOST_TIMES`. Must stay: `run`, `trust` and
+`resume`, which users call; `_attempt` uses the same attributes of both simulations (``columns``, ``rows``, ``done``,
+``system``, ``price``, ``follow``, ``remarks``); `_before` asks for keys that `refweb.dynamics.simulation` writes to
+checkpoints; wrong input writes nothing. Tests: ``tests/results/test_remarks.py``, ``tests/test_faults.py``.
 """
 
 from __future__ import annotations

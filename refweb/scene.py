@@ -3,10 +3,11 @@
 `Scene` is frozen and one to one with a TOML file. A table that is present is an effect that is present; the module of
 an effect is imported when its table is.
 
-May change: private functions and words of messages. Must stay: fields, which are tables of scene files and arguments in
-scripts of users; `from_dict` reads the same scene from what `to_dict` writes, since result folders keep that as
-``scene.toml``. A new table stands in `registry` as well, and the reference is written anew (CONTRIBUTING). Tests:
-``tests/test_scene.py``, ``tests/reference/test_schema.py``.
+May change: private functions, words of messages, and `MAX_HISTORY_ROWS`, a limit of what is accepted. Must stay:
+fields, which are tables of scene files and arguments in scripts of users; `from_dict` reads the same scene from what
+`to_dict` writes, since result folders keep that as ``scene.toml``; `SHORTEST_INTERVAL` and `ROWS_OF_LONG_RUNS`, the
+default interval (``tests/dynamics/test_default_rows.py``). A new table stands in `registry` as well, and the reference
+is written anew (CONTRIBUTING). Tests: ``tests/test_scene.py``, ``tests/reference/test_schema.py``.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Settings of a scene: solver, supports and output, the tables that are neither web, cable nor effect.
 
 May change: words of docstrings, which are the text of ``refweb help`` and of the schema: the reference is written anew
-with them (CONTRIBUTING). Must stay: names and defaults of keys, the format of scenes; keys of `Dynamic` are also
-arguments of integrators, listed in `registry.INTEGRATORS`. A new key needs its docstring, a check of its range and a
-line in CHANGELOG. Tests: ``tests/test_scene.py``, ``tests/reference/test_schema.py``.
+with them (CONTRIBUTING). Must stay: names, defaults and values (`START_STATES`) of keys, the format of scenes; keys of
+`Dynamic` are also arguments of integrators, listed in `registry.INTEGRATORS`. A new key needs its docstring, a check of
+its range and a line in CHANGELOG. Tests: ``tests/test_scene.py``, ``tests/reference/test_schema.py``.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ wheel may contain. A file is written under another name and then renamed, so tha
 Files unused for `UNUSED` are removed during compilation.
 
 May change: the format of files and their names, since a change here gives all of them other names; `UNUSED` and
-`NOTED`. Must stay: ``REFWEB_CACHE``; a file is never read half written or damaged; `SHIPPED`, which ``pyproject.toml``
-packs, `wheel` checks and ``refweb warm --ship`` fills; names that `numba_internals` uses. Tests:
-``tests/compiled/test_kernel.py``.
+`NOTED`. Must stay: ``REFWEB_CACHE``; a file is never read half written or damaged; `V3`, the processors on which
+machine code of wheels runs; `SHIPPED`, which ``pyproject.toml`` packs, `wheel` checks and ``refweb warm --ship`` fills;
+names that `numba_internals` uses. Tests: ``tests/compiled/test_kernel.py``.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ rate goes on from the value of its table: a reel and a motion have no jump.
 Balances stay closed. A command changes the energy of gravity at once, which counts as work, and formulas of impulses,
 whose values at the start change by as much as those of the time.
 
-May change: private methods. Must stay: keys of `INPUTS` and `RATES`, which are paths that users write; numbers are
+May change: private methods, `SHORTEST` and `NEAR`. `NUMBERS` has the keys after whose change `only_numbers_differ` lets
+a restart use the system again. Must stay: keys of `INPUTS` and `RATES`, which are paths that users write; numbers are
 written in place, so that arrays of the compiled loop keep their addresses; texts of `save` and `arrays`, which
 checkpoints keep. A further input is an entry there and nothing else, if the numbers of its term follow from the new
 table of the effect. Tests: ``tests/dynamics/test_stepped_run.py``, ``test_control.py``.

@@ -1,6 +1,7 @@
 """Controls of a run: each measures at its period, and gives a command, see `refweb.dynamics.commands`.
 
-May change: private functions and words of messages. Must stay: keys and order in `Controller.arrays`, which checkpoints
+May change: private functions and words of messages. A further effect that controls may set needs its unit in `UNITS`
+and, if it takes a vector, its name in `VECTORS`. Must stay: keys and order in `Controller.arrays`, which checkpoints
 keep, and of `plain`, which stand in ``run.json``; a `Controller` measures in the columns of a history row, so that it
 sees what ``history.csv`` has. `simulation`, `commands` and `sweeps.episodes` use the public names. Tests:
 ``tests/dynamics/test_control.py``, ``test_attitude.py``.

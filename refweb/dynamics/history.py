@@ -6,8 +6,8 @@ After the probes of observables follow those for warnings, and those for events 
 May change: private functions. Must stay: probes stand in the order of observables, warnings and events, since results
 are found by number; the break of lines is the last event, as `integrators.rupture` expects; columns of `table`, the
 format of ``history.csv``, and of `compared`, which `twin_error`, `divergence` and `gradients` read by position; keys of
-`breaks`, which stand in ``run.json``. `SPREAD` widens ± of all dynamic results. Tests:
-``tests/dynamics/test_dynamics.py``.
+`breaks`, which stand in ``run.json``. `SPREAD` widens ± of all dynamic results; `AT_REST` and `REST_SHARE` are defaults
+of ``[[event]]``, which `settings.Event` says in words. Tests: ``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Dynamic run of a scene: from its start through rows and frames to results, with checkpoints.
 
-May change: private methods, words of findings. Must stay: public names, which `runner` uses of this `Simulation` and of
-that of statics alike, and `accuracy_loop`, `twin_error`, `stepped_run`, `gradients` and `studies.predictability` too;
-keys that `_frame` writes to ``checkpoint.npz``: `_set_off` and `runner._before` read them. Tests:
-``tests/dynamics/test_dynamics.py``, ``tests/test_faults.py``, ``tests/dynamics/test_starts.py``.
+May change: private methods, `LOOKS`, words of findings. Must stay: public names, which `runner` uses of this
+`Simulation` and of that of statics alike, and `accuracy_loop`, `twin_error`, `stepped_run`, `gradients` and
+`studies.predictability` too; keys that `_frame` writes to ``checkpoint.npz``: `_set_off` and `runner._before` read
+them. Tests: ``tests/dynamics/test_dynamics.py``, ``tests/test_faults.py``, ``tests/dynamics/test_starts.py``.
 """
 
 from __future__ import annotations

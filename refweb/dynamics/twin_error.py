@@ -4,9 +4,10 @@ The error of results and of the times of events is the difference of both runs, 
 method, times `SPREAD`. The second run takes place beside the first or after it.
 
 May change: `PAUSE`, private functions that do not change a factor. Must stay: fields of `TwinRun`; rows are those of
-`Watch.compared`; the name `THREADS`, which `sweeps.case` sets. A changed factor changes ± of all dynamic results:
-`accuracy_loop._throw` repeats that of `add_errors`, `SPREAD`/(1 − `error_share`), and ``python -m validation coverage``
-counts how often ± holds. Tests: ``tests/dynamics/test_agreement_by_chance.py``, ``test_one_row.py``.
+`Watch.compared`; the name `THREADS`, which `sweeps.case` sets. A changed factor, or another constant than `PAUSE`,
+changes ± of all dynamic results: `accuracy_loop._throw` repeats that of `add_errors`, `SPREAD`/(1 − `error_share`), and
+``python -m validation coverage`` counts how often ± holds. Tests: ``tests/dynamics/test_agreement_by_chance.py``,
+``test_one_row.py``.
 """
 
 from __future__ import annotations

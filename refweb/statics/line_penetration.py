@@ -4,8 +4,9 @@ Statics has no motion between two equilibria, so each point is taken to move in 
 this way have passed through each other or have slid around each other. The load steps do not tell which; smaller ones
 may.
 
-May change: words of ``why``. Must stay: `record` takes equilibria in their order, from `statics.simulation`, which
-writes ``why`` and ``deepest`` to ``run.json`` and to a finding. Tests: ``tests/effects/test_self_contact.py``.
+May change: words of ``why`` and `UNFOLLOWED`. Must stay: `record` takes equilibria in their order, from
+`statics.simulation`, which writes ``why`` and ``deepest`` to ``run.json`` and to a finding. Tests:
+``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

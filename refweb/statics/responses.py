@@ -3,9 +3,11 @@
 A largest or smallest value is that of one line, node or element; where others have the same value within ±, the result
 has one derivative to each side, and there is a `Response` for each of these.
 
-May change: private functions. Must stay: fields of `Response`, which `gradients` and `studies.frequency_gradients`
-read; ``slope`` and ``explicit`` are derivatives of ``value``: change them together. A new quantity of ``[[observe]]``
-needs a branch in `responses`; without one `gradients` refuses it by name. Tests: ``tests/statics/test_gradients.py``.
+May change: private functions and `STEP`. `EQUAL` decides when values count as equal, so that a result has a derivative
+to each side; `MOST` is a limit of what is accepted. Must stay: fields of `Response`, which `gradients` and
+`studies.frequency_gradients` read; ``slope`` and ``explicit`` are derivatives of ``value``: change them together. A new
+quantity of ``[[observe]]`` needs a branch in `responses`; without one `gradients` refuses it by name. Tests:
+``tests/statics/test_gradients.py``.
 """
 
 from __future__ import annotations

@@ -29,9 +29,10 @@ get the same mass, and flutter is not checked: the parity of the number of diver
 errors of eigenvalues follow from their condition numbers; parts within these errors count as zero. Lines between slack
 and taut count as taut. If the web would be unstable with these lines slack, its stability is not decided.
 
-May change: words of reasons, `DENSE`, private methods. Must stay: `ask`, which `load_steps` and `simulation` call; the
-sign, which stands in ``run.json`` as ``smallest_pivot``, is 1 only if stability is certain, and None where it is not
-decided. `remarks` puts reasons into findings. Tests: ``tests/statics/test_stability.py``.
+May change: words of reasons (`PIVOT`, `EIGENVALUE`), `DENSE`, private methods. The other constants are limits of
+rounding: larger ones leave more undecided, smaller ones may be wrong. Must stay: `ask`, which `load_steps` and
+`simulation` call; the sign, which stands in ``run.json`` as ``smallest_pivot``, is 1 only if stability is certain, and
+None where it is not decided. `remarks` puts reasons into findings. Tests: ``tests/statics/test_stability.py``.
 
 References
 ----------

@@ -10,9 +10,10 @@ factorizations cost the same. rslab is a young library: if the residual of a sol
 wrong, qdldl replaces it for the rest of the run, with a finding.
 
 May change: `LARGE`, `LARGEST` and `NEMIN`, which are measured: they change times, and results by rounding; the insides
-of the classes. Must stay: keys of `LIBRARIES`, the same as `registry.FACTORIZATIONS` and values of scenes; `Lu` and
-`Factor` have ``update``, ``solve``, ``shift`` and ``solutions`` alike, since `statics.newton` holds either. Signs of
-pivots decide stability in statics and counts of modes. Tests: ``tests/system/test_factorization.py``.
+of the classes. `FINE` and `ROUGH` decide when a solution is refined or refused. Must stay: keys of `LIBRARIES`, the
+same as `registry.FACTORIZATIONS` and values of scenes; `Lu` and `Factor` have ``update``, ``solve``, ``shift`` and
+``solutions`` alike, since `statics.newton` holds either. Signs of pivots decide stability in statics and counts of
+modes. Tests: ``tests/system/test_factorization.py``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Tables and keys that give lines and threads internal variables, for a run that starts from a folder with these.
 
-May change: private functions. Must stay: keys and contents of `kept`, which `results.folder` writes to
-``checkpoint.npz`` and `dynamics.internal_start` compares with a scene: other titles or words refuse folders of users.
-Tests: ``tests/dynamics/test_internal_start.py``.
+May change: private functions. Must stay: keys and contents of `kept`, with the title `WOUND`, which `results.folder`
+writes to ``checkpoint.npz`` and `dynamics.internal_start` compares with a scene: other titles or words refuse folders
+of users. Tests: ``tests/dynamics/test_internal_start.py``.
 """
 
 from __future__ import annotations

@@ -7,10 +7,10 @@ Where effects prescribe natural lengths, the numbers of the lines are a function
 force and energy uses the numbers of its time t, and `System.at` returns the system with the numbers of one time. The
 net itself keeps its lengths as built. A loop of kernels cannot call Python, and keeps its own array of lengths.
 
-Values are written to arrays of the caller, by default new ones, so that threads may share a system. Public names stay:
-solvers and plug-ins use them. Private names may change freely. A new cached property belongs in the lists of names that
-`at`, `with_line_data`, `static_system`, `broken_lines`, `statics.shared_push` and `statics.monotone_loading` drop, if
-it depends on what these change. Tests: ``tests/system/test_system.py``, ``tests/test_contract.py``.
+Values are written to arrays of the caller, by default new ones, so that threads may share a system. May change: private
+names and `MOST_TURN`. Must stay: public names, which solvers and plug-ins use. A new cached property belongs in the
+lists of names that `at`, `with_line_data`, `static_system`, `broken_lines`, `statics.shared_push` and
+`statics.monotone_loading` drop, if it depends on what these change. Tests: ``tests/system/test_system.py``.
 """
 
 from __future__ import annotations

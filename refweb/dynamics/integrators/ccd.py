@@ -16,11 +16,12 @@ A step of higher order has several drifts, and cannot be rejected after the firs
 order 2, and cut in the same way. Lines that pass in one of its drifts nevertheless are reported. The bound of explicit
 steps limits the approach of two bodies, see `refweb.effects.contact.pair_overlap`.
 
-May change: `FEW` and `CALM`, which decide how often is checked, and `SHORTER`. Must stay: bounds may be too large and
-never too small: no change may miss a meeting. Of ``met`` the first three numbers are rows, `line_body_ccd` sets the
-fourth and `central_difference` reads the fifth. Must follow: `features` gives the names in ``apart``, `records` has the
-fields of ``model`` and ``running``, `explicit_loop` calls the kernels. Tests: ``tests/effects/test_passage.py``,
-``test_self_contact.py``.
+May change: `FEW` and `CALM`, which decide how often is checked, and `SHORTER` and `LEAST`, which decide how far a step
+is cut before the run ends. Must stay: bounds may be too large and never too small: no change may miss a meeting. Of
+``met`` the first three numbers are rows, `line_body_ccd` sets the fourth and `central_difference` reads the fifth.
+`PAST` and `NEXT` are places in the list of `kernels.DUE`, whose layout `line_line_ccd` shares. Must follow: `features`
+gives the names in ``apart``, `records` has the fields of ``model`` and ``running``, `explicit_loop` calls the kernels.
+Tests: ``tests/effects/test_passage.py``, ``test_self_contact.py``.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ ends. Of a kick, a drift and a kick the state before is that of the step taken b
 forces: nothing is kept for it in all the steps that have no peak.
 
 May change: `SAME_PEAK` and `BEHIND`, which decide how often is looked, and how a state within is found, of the order of
-the method. Must stay: a look inside of a step overwrites natural lengths and what terms show, so that it ends with
-`show_again`: without it bits of the run change. Must follow: names in ``apart`` are those of `features`;
-`explicit_loop` calls the kernels, `workspace` has `Inside`. Tests: ``tests/dynamics/test_peaks.py``,
-``test_averages.py``.
+the method. Must stay: `LOOKS` equals `averages.PARTS`; a look inside of a step overwrites natural lengths and what
+terms show, so that it ends with `show_again`: without it bits of the run change. Must follow: names in ``apart`` are
+those of `features`; `explicit_loop` calls the kernels, `workspace` has `Inside`. Tests:
+``tests/dynamics/test_peaks.py``, ``test_averages.py``.
 """
 
 from __future__ import annotations

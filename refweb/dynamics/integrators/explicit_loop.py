@@ -6,10 +6,10 @@ row of a plain scene calls count no references to arrays, see `refweb.kernels.ke
 the time of a cable of 100 elements.
 
 May change: `BREATH`. Must stay: the order of calls in `run_steps`, which is the method; the numbers that `advance_rows`
-returns, which `CentralDifference.advance` reads; a kernel with ``apart`` is called only where `features` has its names,
-else the run ends. Another order of sums changes last bits of results: then a run that goes on, one with lists of near
-lines and the undisturbed one must still be equal bit for bit (``tests/dynamics/integrators/test_nearby.py``). Tests:
-``tests/dynamics/test_dynamics.py``.
+returns (`HELD`, −1, rows), which `CentralDifference.advance` reads; a kernel with ``apart`` is called only where
+`features` has its names, else the run ends. Another order of sums changes last bits of results: then a run that goes
+on, one with lists of near lines and the undisturbed one must still be equal bit for bit
+(``tests/dynamics/integrators/test_nearby.py``). Tests: ``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

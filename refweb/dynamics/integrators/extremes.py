@@ -12,10 +12,10 @@ Over 30 phases, the largest error of a peak of an oscillator in central differen
 7.81e-3 with the maximum of the parabola, and the error of the amplitude at steps is 7.82e-3 itself. But the parabola
 exceeds a kink by an eighth of a second difference, so that it gives negative tensions, or slack fractions above 1.
 
-May change: nothing without the tests of peaks, since each rule here decides values of results. Must stay: fields of
-`Extremes`, which checkpoints keep; ``looked`` and ``recent`` have the last three looks, the oldest first. Kernels are
-called by `explicit_loop`, `dense_output`, `measurements`, `averages` and `events`, which follow their arguments. Tests:
-``tests/dynamics/test_peaks.py``.
+May change: nothing without the tests of peaks, since each rule here, and `EDGE`, decides values of results. Must stay:
+fields of `Extremes`, which checkpoints keep; ``looked`` and ``recent`` have the last three looks, the oldest first.
+Kernels are called by `explicit_loop`, `dense_output`, `measurements`, `averages` and `events`, which follow their
+arguments. Tests: ``tests/dynamics/test_peaks.py``.
 """
 
 from __future__ import annotations

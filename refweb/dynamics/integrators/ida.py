@@ -19,10 +19,10 @@ A step solves J z = r with J = ∂F/∂y + c ∂F/∂y'. Eliminating displacemen
 
 for every node alike, with r_x = 0 for one without mass.
 
-May change: private methods. Must stay: unknowns stand in the order x, v, λ, μ, also for `system.links`; arguments of
-`residual`, `set_up`, `precondition`, `jacobian_times` and `jacobian`, by which sksundae calls them; the Jacobian is the
-derivative of `residual`. Keys of ``[solve]`` are those of `registry.INTEGRATORS`. Tests:
-``tests/dynamics/integrators/test_ida.py``.
+May change: private methods, and `UNTESTED`, upwards. Must stay: unknowns stand in the order x, v, λ, μ, also for
+`system.links`; arguments of `residual`, `set_up`, `precondition`, `jacobian_times` and `jacobian`, by which sksundae
+calls them; the Jacobian is the derivative of `residual`. Keys of ``[solve]`` are those of `registry.INTEGRATORS`.
+Tests: ``tests/dynamics/integrators/test_ida.py``.
 
 References
 ----------

@@ -10,10 +10,11 @@ made of a system and of what is to be looked at:
 
 ``start`` makes an `IntegratorState`, the whole state of a run; ``advance`` takes it on and returns a `History` of rows.
 
-May change: docstrings and error texts. Must stay: names in `Integrator`, which plug-ins bring; fields of
-`IntegratorState` and keys of `GROUPS`, which are keys of checkpoints; the order of columns of `History`, which `rows`
-and `step_observer` write by position and `history` reads. An optional attribute of integrators belongs in the notes of
-`Integrator`. Tests: ``tests/how_to/test_integrator.py``, ``tests/dynamics/test_dynamics.py``.
+May change: words, `MAX_STEPS_PER_ROW`, a limit of what is accepted, and `SAME`, above rounding. Must stay: names in
+`Integrator`, which plug-ins bring; fields of `IntegratorState` and keys of `GROUPS`, which are keys of checkpoints; the
+order of columns of `History`, which `rows` and `step_observer` write by position and `history` reads. An optional
+attribute of integrators belongs in the notes of `Integrator`. Tests: ``tests/how_to/test_integrator.py``,
+``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

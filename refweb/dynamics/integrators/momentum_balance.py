@@ -23,9 +23,9 @@ The book does not see what gives no impulse to all of the web, though it moves p
 and temperature change, pressure inside of a closed line. Nor does it see [[motion]], whose impulse is that of supports.
 
 May change: private functions. Must stay: fields of `MomentumBalance`, which checkpoints keep; the paragraph above on
-what the book does not see, which a test reads; `CLOSURE` and `allowed`, above which runs are refused. An effect from
-outside brings `Balance.impulse`, or is integrated along the steps. Kernels are called by `explicit_loop`, `rows` and
-`simpson_balance`, which follow their arguments. Tests: ``tests/dynamics/test_momentum_balance.py``.
+what the book does not see, which a test reads; `CLOSURE`, `ROUNDINGS` and `allowed`, by which runs are refused. An
+effect from outside brings `Balance.impulse`, or is integrated along the steps. Kernels are called by `explicit_loop`,
+`rows` and `simpson_balance`, which follow their arguments. Tests: ``tests/dynamics/test_momentum_balance.py``.
 """
 
 from __future__ import annotations

@@ -13,10 +13,11 @@ A list is deep enough for the next `LASTS` steps, and for the bound on the steps
 `LONGEST` steps. Thus a list is made once in several rows, by a search over all lines.
 
 May change: `LASTS`, `LONGEST`, `WIDEST`, `MANY`, `FEWEST`, `PRICE` and `KEPT_UP_TO`, which trade searches for
-evaluations. Must stay: no change may miss a contact; results are those with all lines, bit for bit. Places behind the
-terms in `records.ForceTerms` are in the order of `near_of`, also for `contacts`, `step_bound` and `implicit_contacts`.
-`ccd` leaves out cells and checks by ``depth``, ``used``, ``last`` and ``steps`` of `SKIN`: their meaning stays, or a
-passage is missed. Tests: ``tests/dynamics/integrators/test_nearby.py``.
+evaluations. Must stay: no change may miss a contact, so that `WAY`, `SHARE` and `COVERED`, parts of the bound, stay;
+results are those with all lines, bit for bit. Places behind the terms in `records.ForceTerms` are in the order of
+`near_of`, also for `contacts`, `step_bound` and `implicit_contacts`. `ccd` leaves out cells and checks by ``depth``,
+``used``, ``last`` and ``steps`` of `SKIN`: their meaning stays, or a passage is missed. Tests:
+``tests/dynamics/integrators/test_nearby.py``.
 """
 
 from __future__ import annotations

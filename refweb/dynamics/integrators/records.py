@@ -4,11 +4,11 @@ Kernels of one signature, and arrays of one type, are in tables, so that the loo
 effects. Features that a scene does not have are empty tables or arrays, and their kernels are not compiled, see
 `refweb.dynamics.integrators.features`.
 
-May change: how ``of`` fills a record. Must stay: names of fields, which kernels of the loop read; their order in
-`Scheme` and `Running`, which `central_difference` fills by position; names of `CLOCK` up to ``share``, which are those
-of `IntegratorState`; places behind the terms in `ForceTerms`, which `neighbour_list` fills. A further field compiles
-all kernels that take the record again. Tests: ``tests/dynamics/integrators/test_records.py``,
-``tests/test_pay_for_what_you_call.py``.
+May change: how ``of`` fills a record, and `LINE`, which changes the speed alone. Must stay: names of fields, which
+kernels of the loop read; their order in `Scheme` and `Running`, which `central_difference` fills by position; names of
+`CLOCK` up to ``share``, which are those of `IntegratorState`; places behind the terms in `ForceTerms`, which
+`neighbour_list` fills. A further field compiles all kernels that take the record again. Tests:
+``tests/dynamics/integrators/test_records.py``, ``tests/test_pay_for_what_you_call.py``.
 """
 
 from __future__ import annotations

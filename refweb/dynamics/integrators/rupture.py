@@ -6,10 +6,10 @@ it has passed: they are taken again from before, to where it does, by Brent's me
 two. So nothing has to be taken back from the books, extremes and means, and the error of the moment is that of the
 motion.
 
-May change: `FINE` and how the moment is sought. Must stay: `Rupturing` passes on attributes that it lacks from
-``inner``, so that it stands for any integrator; the last event is that of breaks, as `history.Watch` orders events;
-keys ``broken_…`` of checkpoints. `registry.Method` makes it, `studies.trials` by `with_breaks`. Tests:
-``tests/effects/test_rupture.py``, ``test_plastic.py``.
+May change: `FINE` and how the moment is sought. `TOGETHER` decides which elements break at once, and so results. Must
+stay: `Rupturing` passes on attributes that it lacks from ``inner``, so that it stands for any integrator; the last
+event is that of breaks, as `history.Watch` orders events; keys ``broken_…`` of checkpoints. `registry.Method` makes it,
+`studies.trials` by `with_breaks`. Tests: ``tests/effects/test_rupture.py``, ``test_plastic.py``.
 """
 
 from __future__ import annotations

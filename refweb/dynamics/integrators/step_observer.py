@@ -4,7 +4,8 @@ A method takes steps of its own choice and knows its state anywhere within the l
 rows, is looked at in its middle and at its end: for extremes and events, and for the integrals of power and of the
 supports' forces by Simpson's rule. A flag of success is not believed: the book of energies is checked at every row.
 
-May change: `PATIENCE`, `BREATH`, private methods. Must stay: public names and arguments, since plug-ins derive from
+May change: `PATIENCE`, `BREATH`, `HALVINGS`, `HALVINGS_BY_PATH`, private methods. `TWIN_TOLERANCES` sets the tolerances
+of the step-refinement run: its cost and ± follow. Must stay: public names and arguments, since plug-ins derive from
 `StepObserver`; fields of `ObservedState` and the order of ``stats``, which checkpoints keep; a row as in
 `integrator.History`. Simpson's weights stand in `simpson_balance`. Tests: ``tests/how_to/test_integrator.py``,
 ``tests/dynamics/integrators/test_step_observer.py``, ``test_cvode.py``.
