@@ -12,6 +12,11 @@ one that is asked for [m/s], 1 in statics, where time does not pass, the number 
 these rows, of time [s] and speed [m/s]; in dynamics those of a constant power behind them.
 
 A line on a winch is in `refweb.effects.wound_lines`.
+
+May change: messages. Must stay: keys and docstring of `Winch` (scene format; help writes it to
+``validation/REFERENCE.md``); the order of the numbers above, which `thread_slips`, `winch_power`, `wound_lines` and
+`wound_mass` read by position; `writes` and `commanded`, with which `dynamics.commands` sets new values in a run. Tests:
+``tests/effects/test_winch.py``, ``tests/effects/test_wound_lines.py``.
 """
 
 from __future__ import annotations

@@ -8,7 +8,10 @@ The bound of explicit steps limits the approach to 0.2 times that distance times
 given size, it follows from the step and the largest speed of the run. Steps of CVODE and IDA are checked one by one,
 see `refweb.dynamics.integrators.passages`.
 
-Texts of `passage` and keys of `plain` stand in ``run.json``; `WAY` follows from the bound of `body_body_penalty`.
+May change: messages of findings. Must stay: "certified" and "not certified" of `passage` and the keys of ``plain``,
+which stand in ``run.json``; `WAY`, which follows from the bound of `body_body_penalty` (10 × speed over thickness);
+`record`, `note_way` and `note_met`, which `dynamics.simulation` and `statics.body_penetration` call. Tests:
+``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations
