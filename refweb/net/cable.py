@@ -1,7 +1,9 @@
 """The cable a web is made of: material, section, slackness and natural length of every line, by group.
 
-Fields of `Group` repeat those of `Cable`, since `_values` reads both by name; docstrings of tables are text of
-`refweb help`; laws, `discretisation` and `studies.form` read `properties` by name.
+May change: texts of errors. Must stay: keys, defaults and docstrings of `Cable`, `Group` and `Viscous` (scene format;
+help writes it to ``validation/REFERENCE.md``); fields of `Group`, which repeat those of `Cable`, as `_values` reads
+both by name; names of the properties that `Cable.properties` returns, which `discretisation`, laws and `studies.form`
+read. Tests: ``tests/net/test_laws_by_group.py``, ``tests/test_scene.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Numbers of the elements of lines, by name, over the matrix that kernels read.
 
-`discretisation` fills `FIELDS` in this order; effects add columns behind them, and find them by name.
+May change: how the matrix is kept. Must stay: names and order of `FIELDS`, which `discretisation` fills and all kernels
+over lines read; new columns behind them, as effects add theirs by name. Tests: ``tests/net/test_elements.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations
