@@ -1,6 +1,8 @@
 """Print the content of a scene, a study, requirements or a result folder."""
 
-# A verb named by `kind` in `run.json` has `show(summary)`; this docstring is help; keys of `--json` are for programs.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; the call of `show(summary)` of the verb that `kind` in `run.json` names; keys of `--json`,
+# which are for scripts. Tests: tests/commands/test_cli.py.
 
 import json
 import pathlib

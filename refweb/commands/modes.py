@@ -1,6 +1,8 @@
 """Compute natural frequencies and mode shapes about the equilibrium of a scene."""
 
-# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` of this kind.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` of this kind; names of options. Tests:
+# tests/studies/test_modes.py.
 
 import pathlib
 

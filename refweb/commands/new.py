@@ -1,6 +1,8 @@
 """Write a commented scene file to start from."""
 
-# This docstring is the help of the verb; `KEYS` has all keys with paths, and a test uncomments all of `START`.
+# This docstring is the help of the verb. May change: comments in `START`. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; keys in `START`, all of which tests/commands/test_new.py uncomments and runs; in `KEYS` all
+# keys of scenes and studies that hold paths: a new one goes there.
 
 import json
 import os

@@ -1,6 +1,8 @@
 """Plot result folders: histories with ±, books, spectra; several over each other."""
 
-# This docstring is the help of the verb; options are keywords of `pictures.plots.plot`.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; names of options, which are keywords of `pictures.plots.plot`. Tests:
+# tests/pictures/test_plots.py.
 
 import sys
 

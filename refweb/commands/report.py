@@ -1,6 +1,8 @@
 """Write one page of a result folder: results, plots, pictures, and the web in space to turn and play."""
 
-# This docstring is the help of the verb; `pages` checks values, and this file which options exclude each other.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; names of options. This file says which options exclude each other, `pages` checks their
+# values. Tests: tests/pages/test_page.py, tests/pages/test_sheet.py.
 
 import pathlib
 

@@ -1,7 +1,8 @@
 """Print the JSON Schema of scene files, or of another kind, by which editors check and complete them."""
 
-# This docstring is the help of the verb; `reference.schema` makes all that is printed. The command line finds
-# the verb by the name of this file, and calls `add_arguments` and `run`.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; the schema alone on standard output, for editors. `reference.schema` makes it. Tests:
+# tests/reference/test_schema.py.
 
 import sys
 

@@ -1,6 +1,8 @@
 """Find the least design that meets requirements: its scene, margins, what governs it, and the trade-off."""
 
-# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` of this kind.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` of this kind; names of options; exit
+# status 1 where no design meets the requirements, for scripts. Tests: tests/sizing/test_size.py.
 
 import pathlib
 

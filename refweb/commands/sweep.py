@@ -1,6 +1,8 @@
 """Run a study: one scene with many values, spread and ± apart, chances of conditions."""
 
-# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` of this kind.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` of this kind; names of options. Tests:
+# tests/sweeps/test_sweep.py.
 
 import pathlib
 

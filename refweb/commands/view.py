@@ -1,6 +1,8 @@
 """Look at a result folder: its page in a browser, a window, or a script for ParaView."""
 
-# This docstring is the help of the verb; a page that is older than `run.json` is written anew.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; names of options; that a page older than `run.json` is written anew. Tests:
+# tests/pictures/test_viewers.py.
 
 import pathlib
 import sys

@@ -16,8 +16,11 @@ Every verdict follows from ± and the parts alone:
 
 A result has n digits if ± is at most 10^−n of its value. There is no verdict if ± is small and a part is not estimated.
 
-Parts and verdicts stand in `run.json` and `results.csv`; a new part needs words, and a colour of `pictures.sheet`. The
-runs that show smoothing have `SMOOTHING_SHARE` of it, to which `SMOOTHED` belongs.
+May change: texts, `ALLOWED` and `FAR_WITHIN`, which move the border between verdicts. Must stay: names of parts and
+verdicts, which stand in ``run.json`` and ``results.csv`` (a new part needs `WORDS` and a colour of
+`pictures.sheet.COLOURS`); `SMOOTHED`, which follows from `SMOOTHING_SHARE`, the smoothing of the runs in
+`studies.further_runs` and `statics.smoothing_error`; ± as the sum of the known parts. Tests:
+``tests/results/test_error_budget.py``.
 """
 
 from __future__ import annotations
