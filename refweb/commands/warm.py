@@ -7,7 +7,7 @@ all usual processors of this kind run is written into the package itself, for a 
 
 # This docstring is the help of the verb. May change: `METHODS` and `ROWS`, which decide what is compiled ahead: users
 # compile the rest at its first use. Must stay: `add_arguments` and `run`, which `refweb.__main__` calls; `--ship`, by
-# which wheels are built, and its setting of processors before numba is imported. Tests: tests/compiled/test_kernel.py.
+# which wheels are built, and its setting of processors before numba is imported. No test runs this file.
 
 import contextlib
 import os

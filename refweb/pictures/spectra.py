@@ -1,6 +1,7 @@
 """Spectra of histories with equal intervals: amplitude over frequency.
 
-`plots` offers a spectrum from `FEWEST` rows on; other constants change only the drawing and its texts.
+May change: the drawing and its texts; `STANDS_OUT`, by which peaks are named. Must stay: `FEWEST`, from which on
+`plots` offers a spectrum; amplitudes and frequencies of `spectrum_of`. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations
