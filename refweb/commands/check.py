@@ -9,7 +9,7 @@ from .arguments import add_scene, add_values, print_sizing, print_study, scene_o
 
 
 def add_arguments(parser):
-    """The scene."""
+    """Declare the scene and its values."""
     add_scene(parser)
     add_values(parser)
 

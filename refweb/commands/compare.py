@@ -8,7 +8,7 @@ from .arguments import add_json, print_json
 
 
 def add_arguments(parser):
-    """The folders, and how to print."""
+    """Declare the folders and the format."""
     parser.add_argument("folders", nargs="+", metavar="DIR", help="result folders, two or more")
     add_json(parser)
 

@@ -10,7 +10,7 @@ from .arguments import add_force, add_scene, add_values, scene_of
 
 
 def add_arguments(parser):
-    """The scene, the folder, the time it may take, and what errors are of."""
+    """Declare the scene, the folder, the budget of time and the observable of the errors."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for cost.png and cost.csv (default: none is written)")

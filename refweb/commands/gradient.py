@@ -12,7 +12,7 @@ SHOWN = 20
 
 
 def add_arguments(parser):
-    """The scene, the result, and by what it is differentiated."""
+    """Declare the scene, the result, and the numbers by which it is differentiated."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument(

@@ -20,7 +20,7 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Print the pages."""
+    """Print the pages of a table, a term, a guide or a verb."""
     from ..reference.glossary import explained
     from ..reference.pages import names
     from ..reference.words import as_markdown, as_text, guide, guides, overview

@@ -13,13 +13,13 @@ from .arguments import add_json, print_json, print_sizing, print_study
 
 
 def add_arguments(parser):
-    """The scene or the folder, and how to print it."""
+    """Declare the scene or folder, and the format."""
     parser.add_argument("source", metavar="SCENE | DIR")
     add_json(parser)
 
 
 def run(arguments):
-    """Print what is there."""
+    """Print the content of a result folder, a study, requirements or a scene."""
     from ..scene import shipped
     from ..sizing.requirements import is_sizing
     from ..sweeps.study import is_study

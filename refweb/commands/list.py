@@ -7,7 +7,7 @@ import tomllib
 
 
 def add_arguments(parser):
-    """None."""
+    """Declare nothing: the verb has no arguments."""
 
 
 def run(arguments):

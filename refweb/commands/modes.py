@@ -10,7 +10,7 @@ from .arguments import add_force, add_scene, add_values, scene_of
 
 
 def add_arguments(parser):
-    """The scene, how many modes, and the folder."""
+    """Declare the scene, the number of modes and the folder."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument("-n", dest="number", type=int, default=10, metavar="N", help="how many (default: 10)")
@@ -19,7 +19,7 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Print what vibrates, find its modes, print them."""
+    """Print the scene, compute its modes, print the modes."""
     from ..results.progress import followed
     from ..scene import slug
     from ..studies.modes import modes

@@ -93,7 +93,7 @@ KEYS = ("path", "lines", "positions", "file", "start", "scene")
 
 
 def add_arguments(parser):
-    """The name, and what it begins with."""
+    """Declare the name of the file, and the scene or study that it begins as a copy of."""
     parser.add_argument("name", metavar="NAME", help="the scene file is NAME.toml")
     parser.add_argument(
         "--from", dest="source", metavar="SCENE", help="begin with a copy of this scene or study, file or name"

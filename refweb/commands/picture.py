@@ -11,7 +11,7 @@ from ..errors import InputError
 
 
 def add_arguments(parser):
-    """The folder, what is drawn of it, how and where."""
+    """Declare the folder, the frame, the field, the look and the file."""
     folder = parser.add_argument("folder", metavar="DIR")
     parser.add_argument(
         "--frame", type=int, metavar="N", help="number of the frame, of modes that of the mode; -1 is the last"

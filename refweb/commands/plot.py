@@ -8,7 +8,7 @@ import sys
 
 
 def add_arguments(parser):
-    """The folders, what is drawn of them, and where."""
+    """Declare the folders, the quantities and the file."""
     parser.add_argument("folders", nargs="+", metavar="DIR", help="result folders; several are drawn over each other")
     text = (
         "an observable or another column of history.csv; energy or momentum, with balance; spectrum or spectrum:NAME; "

@@ -10,7 +10,7 @@ from ..errors import InputError
 
 
 def add_arguments(parser):
-    """The folder, where the page goes, and how much of the motion is on it."""
+    """Declare the folder, the file and the number of frames."""
     parser.add_argument("folder", metavar="DIR")
     parser.add_argument(
         "--out", metavar="FILE", help="page to write, HTML that needs nothing else (default: DIR/report.html)"
@@ -24,7 +24,7 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Write it, and print where it is."""
+    """Write the page, and print its path."""
     from ..pages import page, study
     from ..results.folder import read_summary
     from ..results.progress import followed

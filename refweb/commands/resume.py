@@ -8,7 +8,7 @@ from .arguments import resumable
 
 
 def add_arguments(parser):
-    """The folder of the run."""
+    """Declare the folder of the run."""
     parser.add_argument("folder", metavar="DIR", help="its result folder")
 
 

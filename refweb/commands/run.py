@@ -11,7 +11,7 @@ from .arguments import add_force, add_scene, add_values, resumable, scene_of
 
 
 def add_arguments(parser):
-    """The scene, the folder, and what is found besides."""
+    """Declare the scene, the folder and the horizon."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="result folder (default: the title, in the current folder)")

@@ -10,13 +10,13 @@ from .arguments import print_json
 
 
 def add_arguments(parser):
-    """The kind of file."""
+    """Declare the kind of file."""
     kinds = ("scene", "study", "sizing")
     parser.add_argument("file", nargs="?", default="scene", choices=kinds, help="kind of file (default: scene)")
 
 
 def run(arguments):
-    """Print it."""
+    """Print the schema."""
     from ..reference.schema import schema
     from ..registry import load_installed
 

@@ -10,7 +10,7 @@ from .arguments import add_workers, workers_of
 
 
 def add_arguments(parser):
-    """The requirements, the folder, and who runs designs."""
+    """Declare the requirements, the folder and the workers."""
     text = "a requirements file, or the name of one shipped with refweb"
     parser.add_argument("requirements", metavar="REQUIREMENTS", help=text)
     text = "folder of the sizing (default: its title, in the current folder); one that holds runs goes on"

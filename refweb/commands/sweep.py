@@ -10,7 +10,7 @@ from .arguments import add_workers, workers_of
 
 
 def add_arguments(parser):
-    """The study, its folder, and who runs it."""
+    """Declare the study, its folder and the workers."""
     parser.add_argument("study", metavar="STUDY", help="a study file, or the name of a study shipped with refweb")
     text = "folder of the study (default: its title, in the current folder); one that holds rows goes on"
     parser.add_argument("--out", metavar="DIR", help=text)

@@ -10,7 +10,7 @@ from .arguments import add_force, add_scene, add_values, resumable, scene_of
 
 
 def add_arguments(parser):
-    """The scene, the folder and the time it may take."""
+    """Declare the scene, the folder and the budget of time."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for trust.json and trust.png (default: none is written)")

@@ -19,7 +19,7 @@ ROWS = 2
 
 
 def add_arguments(parser):
-    """One."""
+    """Declare the option for a wheel."""
     parser.add_argument("--ship", action="store_true", help="write into the package, for a wheel")
 
 

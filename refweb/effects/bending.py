@@ -17,9 +17,10 @@ that k = 2 B/L. A cantilever of n such elements has springs B n inside and 2 B n
 tip it bends by P L³/(3 B) (1 + 1/(2 n²)).
 
 May change: formulas of the kernels, if force, stiffness and bound still belong to the one energy; `ROUNDING`. Must
-stay: keys and docstring of `Bending` (scene format; help writes it to ``validation/REFERENCE.md``); kernel signatures;
-k as the first number of a cell, which `without` sets to 0 at a break; the column name "bending_energy". `LARGEST` and
-`FAR` change results. Tests: ``tests/test_contract.py``, ``tests/effects/test_bending.py``.
+stay: keys and docstring of `Bending` (scene format and help; after a change write ``validation/REFERENCE.md`` anew);
+kernel signatures; k as the first number of a cell, which `without` sets to 0 at a break; the column name
+"bending_energy". `LARGEST` and `FAR` change results. Tests: ``tests/test_contract.py``,
+``tests/effects/test_bending.py``.
 """
 
 from __future__ import annotations

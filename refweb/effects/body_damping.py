@@ -37,7 +37,7 @@ def fade(t, x, v, f, cells, data, out):
 
 @kernel(IMPULSE)
 def no_impulse(t, x, cells, data, total):
-    """Moments give no momentum."""
+    """Add nothing: moments give no momentum."""
 
 
 def rotation_terms(net, rate, drag, damping, bound):

@@ -16,8 +16,8 @@ does the work −(1 + ε) N L' w. The force of a line without smoothing jumps wh
 are of order 1 across this jump.
 
 May change: how the kernels are written; force, stiffness and damping change together. Must stay: keys and docstring of
-`Damping` (scene format; help writes it to ``validation/REFERENCE.md``); the column `GROWTH` directly behind
-``damping_time``, where kernels read it and `natural_lengths` writes it; columns of `LINE_OUT`. Tests:
+`Damping` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); the column `GROWTH` directly
+behind ``damping_time``, where kernels read it and `natural_lengths` writes it; columns of `LINE_OUT`. Tests:
 ``tests/test_contract.py``, ``tests/effects/test_damping.py``.
 """
 

@@ -7,9 +7,9 @@ velocity v is
 
 `refweb.effects.turning_axes` has the kernels.
 
-May change: only the code of `on`. Must stay: the key and docstring of `Frame` (scene format; help writes it to
-``validation/REFERENCE.md``); `MovingFrame` of its terms, from which statics, modes and reeled masses read Ω; the name
-"frame", by which `statics.critical_speed` finds it; "frame_energy", a column of ``history.csv``. Tests:
+May change: only the code of `on`. Must stay: the key and docstring of `Frame` (scene format and help; after a change
+write ``validation/REFERENCE.md`` anew); `MovingFrame` of its terms, from which statics, modes and reeled masses read Ω;
+the name "frame", by which `statics.critical_speed` finds it; "frame_energy", a column of ``history.csv``. Tests:
 ``tests/effects/test_frame.py``.
 """
 

@@ -1,8 +1,8 @@
 """Dead loads: forces of fixed direction on nodes, and forces and torques on bodies, with an optional factor over time.
 
-May change: messages. Must stay: keys and docstring of `Load` (scene format; help writes it to
-``validation/REFERENCE.md``); the name "load", by which `statics.simulation` finds dead loads; `numbers`, with which
-`dynamics.commands` writes another force over the first three numbers of a cell. Kernels are in `outer_load` and
+May change: messages. Must stay: keys and docstring of `Load` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); the name "load", by which `statics.simulation` finds dead loads; `numbers`, with
+which `dynamics.commands` writes another force over the first three numbers of a cell. Kernels are in `outer_load` and
 `body_load`. Tests: ``tests/test_contract.py``, ``tests/dynamics/test_attitude.py``.
 """
 

@@ -1,9 +1,9 @@
 """The cable a web is made of: material, section, slackness and natural length of every line, by group.
 
-May change: texts of errors. Must stay: keys, defaults and docstrings of `Cable`, `Group` and `Viscous` (scene format;
-help writes it to ``validation/REFERENCE.md``); fields of `Group`, which repeat those of `Cable`, as `_values` reads
-both by name; names of the properties that `Cable.properties` returns, which `discretisation`, laws and `studies.form`
-read. Tests: ``tests/net/test_laws_by_group.py``, ``tests/test_scene.py``.
+May change: texts of errors. Must stay: keys, defaults and docstrings of `Cable`, `Group` and `Viscous` (scene format
+and help; after a change write ``validation/REFERENCE.md`` anew); fields of `Group`, which repeat those of `Cable`, as
+`_values` reads both by name; names of the properties that `Cable.properties` returns, which `discretisation`, laws and
+`studies.form` read. Tests: ``tests/net/test_laws_by_group.py``, ``tests/test_scene.py``.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ class Viscous(Table):
     statics: str = choice("long", "short", default="long")
 
     def check(self) -> None:
-        """Refuse arms that are none."""
+        """Refuse arms whose modulus or time is not > 0."""
         for i, arm in enumerate(self.arms):
             for j, (name, unit) in enumerate((("modulus", "Pa"), ("time", "s"))):
                 if not arm[j] > 0.0:

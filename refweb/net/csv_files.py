@@ -88,7 +88,7 @@ class Problems:
         self._texts, self._hints = [], []
 
     def add(self, text):
-        """Add one."""
+        """Add a problem."""
         self._texts.append(text)
 
     def hint(self, text):

@@ -1,7 +1,7 @@
 """Webs given node by node and line by line in the scene.
 
-May change: texts of errors. Must stay: keys and docstring of `Inline` (scene format; help writes it to
-``validation/REFERENCE.md``); the order of nodes and lines as given; the class name, which `registry.WEBS` and
+May change: texts of errors. Must stay: keys and docstring of `Inline` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); the order of nodes and lines as given; the class name, which `registry.WEBS` and
 `studies.form` have. Tests: ``tests/net/test_webs.py``.
 """
 

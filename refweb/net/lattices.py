@@ -25,8 +25,8 @@ the links are their ``anchors``. In a web of layers the nodes of the outline are
 ``ring-N`` is only the outline.
 
 May change: how polygons are made, as long as numbers stay. Must stay: the order of nodes and lines and the names of
-groups, by which scenes name them; keys and docstrings of `Paper`, `Window` and `Layers` (scene format; help writes it
-to ``validation/REFERENCE.md``). Tests: ``tests/net/test_webs.py``, ``tests/net/test_window_sizes.py``,
+groups, by which scenes name them; keys and docstrings of `Paper`, `Window` and `Layers` (scene format and help; after a
+change write ``validation/REFERENCE.md`` anew). Tests: ``tests/net/test_webs.py``, ``tests/net/test_window_sizes.py``,
 ``tests/net/test_groups.py``.
 """
 

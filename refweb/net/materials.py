@@ -81,7 +81,7 @@ def as_text():
 
 
 def as_markdown():
-    """The same as a table of Markdown."""
+    """The materials as a table of Markdown."""
     rows = [
         "| material | modulus [Pa] | density [kg/m³] | strength [Pa] | kind, and source of the values |",
         "|---|---|---|---|---|",

@@ -1,8 +1,8 @@
 """Webs from files: meshes of VTK and Gmsh, result frames, and CSV of points and lines.
 
-May change: texts of findings and errors. Must stay: keys and docstring of `File` (scene format; help writes it to
-``validation/REFERENCE.md``); names of data, which are those of frames by `results.vtu` (a new one also goes to `BY_VTK`
-of `mesh_readers`); the order of nodes and lines of a file. Tests: ``tests/net/test_mesh_files.py``,
+May change: texts of findings and errors. Must stay: keys and docstring of `File` (scene format and help; after a change
+write ``validation/REFERENCE.md`` anew); names of data, which are those of frames by `results.vtu` (a new one also goes
+to `BY_VTK` of `mesh_readers`); the order of nodes and lines of a file. Tests: ``tests/net/test_mesh_files.py``,
 ``tests/net/test_webs.py``.
 """
 

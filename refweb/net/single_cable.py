@@ -1,7 +1,7 @@
 """Single cables, straight or hanging on an arc.
 
-May change: texts of errors. Must stay: keys and docstring of `SingleCable` (scene format; help writes it to
-``validation/REFERENCE.md``); the order of nodes from end to end; the class name in `registry.WEBS`. Tests:
+May change: texts of errors. Must stay: keys and docstring of `SingleCable` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); the order of nodes from end to end; the class name in `registry.WEBS`. Tests:
 ``tests/net/test_webs.py``.
 """
 

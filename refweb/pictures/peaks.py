@@ -39,7 +39,7 @@ class Largest(NamedTuple):
     within: tuple[Any, ...] | None = None
 
     def times(self, factor, source):
-        """The same with all values times a factor."""
+        """A copy with all values times a factor."""
         error = None if self.error is None else factor * self.error
         within = self.within and tuple(factor * end for end in self.within)
         return self._replace(value=factor * self.value, error=error, within=within, source=source)

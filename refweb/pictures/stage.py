@@ -130,7 +130,7 @@ class Seen(NamedTuple):
         )
 
     def spanned(self):
-        """The same limits by fewer points, which span the others to two hundredths of their extent."""
+        """These limits by fewer points, which span all points to two hundredths of their extent."""
         bodies = {name: outermost(points) for name, points in self.bodies.items()}
         return self._replace(points=outermost(self.points), supports=outermost(self.supports), bodies=bodies)
 

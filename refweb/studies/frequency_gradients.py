@@ -145,7 +145,7 @@ class Equal:
         return [Mode(self.squared, shape, self.sign) for shape in (*shapes, *(m / np.sqrt(2.0) for m in mixed))]
 
     def change(self, rest):
-        """Change of a shape where L of it is a rest, without a share of these shapes."""
+        """Change δφ of a shape with L δφ = −``rest``, without parts along the shapes of this frequency."""
         bent = np.zeros(len(self.shapes), dtype=np.result_type(rest, self._matrix))
         if self._lu is not None:
             bent[self._bent] = -self._lu.solve(rest[self._bent].astype(self._matrix.dtype))

@@ -72,7 +72,7 @@ class Outcome(NamedTuple):
 
 
 def machine():
-    """This machine and process."""
+    """(Name of this machine, number of this process)."""
     return socket.gethostname(), os.getpid()
 
 

@@ -208,7 +208,7 @@ class Expression:
             raise self._refused(values) from None
 
     def _refused(self, values):
-        """The error of values of which it cannot be computed."""
+        """The error for values with which the expression cannot be computed."""
         return InputError(f"{quote(self.text)}: cannot be computed of {_values_text(values, self.used)}")
 
     def _truth(self, node, values):

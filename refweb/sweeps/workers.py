@@ -102,7 +102,7 @@ class Processes:
 
 
 class Given:
-    """An executor that the caller has made and ends."""
+    """An executor that the caller has made, and shuts down."""
 
     local = False
 

@@ -145,7 +145,7 @@ def in_sphere(skin, x, cells, data, c, nodes, functions):
 
 @functools.cache
 def in_box(spins):
-    """The same of the sphere and of the box about the axes of a body, which it fills; spins as in `pairing`."""
+    """Kernel as `in_sphere`, for the sphere and the box around a body along its axes; spins as in `pairing`."""
     paired = pairing(spins)
 
     @kernel(forceinline=True)

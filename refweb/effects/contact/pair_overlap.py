@@ -34,7 +34,7 @@ class DeepestPair(Deepest):
 
     @property
     def name(self):
-        """Names of both."""
+        """Names of both bodies."""
         return " and ".join(f'"{body.name}"' for body in self.bodies)
 
     @property
@@ -114,7 +114,7 @@ class PairOverlaps:
         )
 
     def note_met(self, met):
-        """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.IntegratorState.crossings`."""
+        """Note the first pair that has met, a row of ``crossings`` of the state of an integrator."""
         self._met = met
 
     def refuse(self):
@@ -142,7 +142,7 @@ class PairOverlaps:
         return "certified"
 
     def _text(self, time, body_a, body_b, *_):
-        """The same of steps that were followed, of which two bodies have met at a time, or none."""
+        """Text of `passage` for steps that were checked one by one: two bodies have met at a time, or none have."""
         if not math.isfinite(time):
             return "certified"
         pair = next(pair for pair in self.deepest if [body.row for body in pair.bodies] == [body_a, body_b])

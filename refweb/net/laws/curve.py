@@ -103,7 +103,7 @@ def beside(curve, slope):
 
 
 def _check(points, unit):
-    """Refuse points that are no curve of a line."""
+    """Refuse fewer than two points, a first one that is not slack, and a curve that does not rise."""
     kind = "stress" if unit == "Pa" else "tension"
     if len(points) < 2:
         raise InputError(f"{kind} has {len(points)} point, a curve has two or more: [[strain, {unit}], ...]")
@@ -122,7 +122,7 @@ def _check(points, unit):
 
 
 def _slopes(strain, value, chord):
-    """Slopes at the points."""
+    """Slopes at the points, by PCHIP."""
     if len(chord) == 1:
         return np.repeat(chord, 2)
     from scipy.interpolate import PchipInterpolator

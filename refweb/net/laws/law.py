@@ -205,7 +205,7 @@ def record_of(columns, numbers):
 
 @functools.cache
 def _over_lines(scalar, record):
-    """A kernel that writes a scalar kernel of each strain and line."""
+    """A kernel that writes the values of a scalar kernel for each strain and line."""
 
     @kernel(leaf=True, apart=())
     def over_lines(strain: Vector, data: Matrix, out: Vector) -> None:

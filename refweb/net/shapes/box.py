@@ -1,8 +1,8 @@
 """Boxes with rounded edges.
 
-May change: texts of errors. Must stay: keys and docstring of `Box` (scene format; help writes it to
-``validation/REFERENCE.md``); what `grown` and `skeleton` return, on which contact, mass and bounds rest; the class name
-in `registry.SHAPES`. Tests: ``tests/effects/test_contact.py``, ``tests/effects/test_between_bodies.py``.
+May change: texts of errors. Must stay: keys and docstring of `Box` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); what `grown` and `skeleton` return, on which contact, mass and bounds rest; the class
+name in `registry.SHAPES`. Tests: ``tests/effects/test_contact.py``, ``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

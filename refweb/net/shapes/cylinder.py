@@ -1,7 +1,7 @@
 """Cylinders with rounded edges.
 
-May change: texts of errors. Must stay: keys and docstring of `Cylinder` (scene format; help writes it to
-``validation/REFERENCE.md``); what `grown` and `skeleton` return, on which contact, mass and bounds rest; the class
+May change: texts of errors. Must stay: keys and docstring of `Cylinder` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); what `grown` and `skeleton` return, on which contact, mass and bounds rest; the class
 name, which `registry.SHAPES` and `effects.around.KINDS` have. Tests: ``tests/effects/test_contact.py``,
 ``tests/effects/test_between_bodies.py``.
 """

@@ -1,8 +1,8 @@
 """Solids from files of a surface of triangles.
 
-May change: texts of errors. Must stay: keys and docstring of `Mesh` (scene format; help writes it to
-``validation/REFERENCE.md``); ``file``, which `registry.FILES` names so that paths count from the scene's folder. Tests:
-``tests/effects/test_mesh_bodies.py``, ``tests/net/test_repair.py``.
+May change: texts of errors. Must stay: keys and docstring of `Mesh` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); ``file``, which `registry.FILES` names so that paths count from the scene's folder.
+Tests: ``tests/effects/test_mesh_bodies.py``, ``tests/net/test_repair.py``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Rings: rigid circles; a web in the plane of a ring touches it as a disc.
 
-May change: `TUBE`, which is for pictures alone. Must stay: keys and docstring of `Ring` (scene format; help writes it
-to ``validation/REFERENCE.md``); ``planar``, by which `rigid_body` gives it one row of rotation; the class name, which
-`registry.SHAPES` and `effects.around.KINDS` have. Tests: ``tests/effects/test_contact.py``.
+May change: `TUBE`, which is for pictures alone. Must stay: keys and docstring of `Ring` (scene format and help; after a
+change write ``validation/REFERENCE.md`` anew); ``planar``, by which `rigid_body` gives it one row of rotation; the
+class name, which `registry.SHAPES` and `effects.around.KINDS` have. Tests: ``tests/effects/test_contact.py``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Observables of the energy balance: energies, work and step size, sums that need no probe.
 
-May change: only docstrings, which help writes to ``validation/REFERENCE.md``. Must stay: names of books, which are
-columns of `results.columns` and of `Balance` of effects; `weights` and `lost_by_path`, which `dynamics.history`,
-`dynamics.responses` and `statics.remarks` call; class names in `registry.OBSERVABLES`. Tests:
+May change: only docstrings, which are help: then write ``validation/REFERENCE.md`` anew. Must stay: names of energies,
+which are columns of `results.columns` and of `Balance` of effects; `weights` and `lost_by_path`, which
+`dynamics.history`, `dynamics.responses` and `statics.remarks` call; class names in `registry.OBSERVABLES`. Tests:
 ``tests/results/test_observable_contract.py``.
 """
 

@@ -1,8 +1,8 @@
 """Observables between nodes: their distance, and perimeter and area of the mouth of a net.
 
 May change: how sums are written: the kernels `distance`, `perimeter` and `area` serve `of` as well. Must stay: class
-docstrings (help writes them to ``validation/REFERENCE.md``), class names in `registry.OBSERVABLES`, `MouthArea`, which
-`commands.doubts` uses, and `Between`, which `statics.responses` differentiates. Tests:
+docstrings (help; after a change write ``validation/REFERENCE.md`` anew), class names in `registry.OBSERVABLES`,
+`MouthArea`, which `commands.doubts` uses, and `Between`, which `statics.responses` differentiates. Tests:
 ``tests/results/test_distances.py``, ``tests/results/test_observable_contract.py``.
 """
 

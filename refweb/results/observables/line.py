@@ -1,7 +1,7 @@
 """Tension, stress and strain of elements of lines, of which one counts, see ``select`` of `refweb.Observe`.
 
-May change: how values are found, in `values` and in the probe together. Must stay: class docstrings (help writes them
-to ``validation/REFERENCE.md``) and names in `registry.OBSERVABLES`; classes that `statics.simulation`,
+May change: how values are found, in `values` and in the probe together. Must stay: class docstrings (help; after a
+change write ``validation/REFERENCE.md`` anew) and names in `registry.OBSERVABLES`; classes that `statics.simulation`,
 `statics.responses`, `dynamics.responses` and `sizing.case` know. Tests: ``tests/results/test_observable_contract.py``,
 ``tests/results/test_selections.py``.
 """

@@ -1,8 +1,8 @@
 """``[[observe]]``: a quantity with a name, and its reduction over time.
 
-May change: texts of errors. Must stay: keys, defaults and docstring of `Observe` (scene format; help writes it to
-``validation/REFERENCE.md``); `default`, the observables of a scene without any; `observes_of` and `bounds_by_name`,
-which read ``scene.toml`` for pictures and studies. Tests: ``tests/test_scene.py``,
+May change: texts of errors. Must stay: keys, defaults and docstring of `Observe` (scene format and help; after a change
+write ``validation/REFERENCE.md`` anew); `default`, the observables of a scene without any; `observes_of` and
+`bounds_by_name`, which read ``scene.toml`` for pictures and studies. Tests: ``tests/test_scene.py``,
 ``tests/results/test_selections.py``.
 """
 

@@ -1,6 +1,6 @@
 """The share of elements that are slack.
 
-May change: the class docstring, which help writes to ``validation/REFERENCE.md``. Must stay: one value with
+May change: the class docstring, which is help: then write ``validation/REFERENCE.md`` anew. Must stay: one value with
 `probes.slack_fraction`, the kernel of dynamics; the class name in `registry.OBSERVABLES`. Tests:
 ``tests/results/test_observable_contract.py``.
 """

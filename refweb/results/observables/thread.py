@@ -1,9 +1,9 @@
 """Tension, stress, strain and length of a thread, and the slip over its rings.
 
-May change: class docstrings, which help writes to ``validation/REFERENCE.md``. Must stay: columns of ``out`` that
-`column` counts, as `effects.thread`, `effects.thread_friction` and `effects.winding` write them; class names, which are
-the capitalised names of quantities: `Observe` finds them so; `of_cell`, which `dynamics.history` calls. Tests:
-``tests/effects/test_thread.py``, ``tests/effects/test_thread_friction.py``.
+May change: class docstrings, which are help: then write ``validation/REFERENCE.md`` anew. Must stay: columns of ``out``
+that `column` counts, as `effects.thread`, `effects.thread_friction` and `effects.winding` write them; class names,
+which are the capitalised names of quantities: `Observe` finds them so; `of_cell`, which `dynamics.history` calls.
+Tests: ``tests/effects/test_thread.py``, ``tests/effects/test_thread_friction.py``.
 """
 
 from __future__ import annotations
