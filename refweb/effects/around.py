@@ -2,9 +2,9 @@
 
 May change: `INSIDE`, `EVEN` and the formulas in `Around.wrap` and `winding_length`, which must give the same length as
 the kernels of `winding`. Must stay: keys and docstring of `Around` (scene format and help; after a change write
-``validation/REFERENCE.md`` anew), fields of `Wrap` and numbers in `KINDS`, which `winding` reads, and `body_of`,
-`steady`, `check_route` and `refuse_free`, which `winding`, `half_turns`, `thread` and `system.static_system` call.
-Tests: ``tests/effects/test_around.py``.
+``validation/REFERENCE.md`` anew), fields of `Wrap`, numbers in `KINDS` and of `STRAIGHT`, `SPHERE` and `CYLINDER`,
+which kernels of `winding` read, and `body_of`, `steady`, `check_route` and `refuse_free`, which `winding`,
+`half_turns`, `thread` and `system.static_system` call. Tests: ``tests/effects/test_around.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ without a table, which are 1 and 0, in statics 0 and 1; its table. Without a tab
 step.
 
 May change: how kernels are written. Must stay: the order of the numbers of a factor (largest size, constant, slope,
-table), which `factor_at` and `factor_until` read by position, and which bounds of `pressure`, `thrust` and `body_load`
-begin with; the numbers of a load ahead of them, over which `dynamics.commands` writes. Tests:
+table), which `factor_at` and `factor_until` read by position, and the first of which bounds of `pressure`, `thrust` and
+`body_load` read; the numbers of a load ahead of them, over which `dynamics.commands` writes. Tests:
 ``tests/test_contract.py``.
 """
 

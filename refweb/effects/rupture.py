@@ -5,9 +5,9 @@ had stored, and the energy of the forces that end with it, become the constant e
 energy balance closes through every break. `refweb.dynamics.integrators.rupture` finds the times of breaks.
 
 May change: messages. Must stay: keys and docstring of `Rupture` and `GroupRupture` (scene format and help; after a
-change write ``validation/REFERENCE.md`` anew); `BreakLimits` with a tension limit for each element, which
-`integrators.rupture` and `statics.rupture` read. Tests: ``tests/effects/test_rupture.py``,
-``tests/effects/test_plastic.py``.
+change write ``validation/REFERENCE.md`` anew); `BreakLimits` with a limit of the tension (and of the strain of lines
+that yield) for each element, which `integrators.rupture` and `statics.rupture` read. Tests:
+``tests/effects/test_rupture.py``, ``tests/effects/test_plastic.py``.
 """
 
 from __future__ import annotations

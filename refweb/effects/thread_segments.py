@@ -4,8 +4,9 @@ Data of a cell have ``width`` columns of a record, 1/A, and four columns for eac
 its vector in the web's position and the length of it [m].
 
 May change: how a kernel computes its numbers. Must stay: the columns above, which `net.threads` writes and `thread`,
-`thread_friction`, `thread_slips`, `winch_power` and `winding` read: a change of the layout goes to all of them; the six
-numbers that a segment kernel returns. Tests: ``tests/effects/test_thread.py``.
+`thread_friction`, `thread_slips` and `winch_power` read: a change of the layout goes to all of them; the six numbers
+that a segment kernel returns; arguments of `energy_kernel`, which `winding` calls too. Tests:
+``tests/effects/test_thread.py``.
 """
 
 from __future__ import annotations

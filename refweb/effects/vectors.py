@@ -1,6 +1,6 @@
 """Products of vectors of three numbers, as compiled kernels.
 
-May change: nothing: kernels of the whole room inline these functions, and another order of sums changes the last digits
+May change: nothing: kernels of the whole room call these functions, and another order of sums changes the last digits
 of all results. Must stay: vectors as tuples of three numbers. A new product is a new function.
 """
 

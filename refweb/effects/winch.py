@@ -13,10 +13,10 @@ these rows, of time [s] and speed [m/s]; in dynamics those of a constant power b
 
 A line on a winch is in `refweb.effects.wound_lines`.
 
-May change: messages. Must stay: keys and docstring of `Winch` (scene format and help; after a change write
-``validation/REFERENCE.md`` anew); the order of the numbers above, which `thread_slips`, `winch_power`, `wound_lines`
-and `wound_mass` read by position; `writes` and `commanded`, with which `dynamics.commands` sets new values in a run.
-Tests: ``tests/effects/test_winch.py``, ``tests/effects/test_wound_lines.py``.
+May change: private functions and messages. Must stay: keys and docstring of `Winch` (scene format and help; after a
+change write ``validation/REFERENCE.md`` anew); the order of the numbers above, which `thread_slips`, `winch_power`,
+`wound_lines` and `wound_mass` read by position; `writes` and `commanded`, with which `dynamics.commands` sets new
+values in a run. Tests: ``tests/effects/test_winch.py``, ``tests/effects/test_wound_lines.py``.
 """
 
 from __future__ import annotations

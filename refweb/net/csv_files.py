@@ -1,8 +1,9 @@
 """Reading of webs from two CSV files, one of points and one of lines.
 
-May change: texts of errors. Must stay: names of columns in `POINTS`, `LINES` and `NAMES`, a file format that
-`mesh_file` describes; what `web_of` returns, and `columns_of`, which `effects.fold`, `boundary.heights` and `law_keys`
-call. Tests: ``tests/net/test_mesh_files.py``, ``tests/net/test_bad_files.py``.
+May change: private functions, texts of errors, `LISTED` and `ALIKE`, which are of these. Must stay: names of columns in
+`POINTS`, `LINES` and `NAMES`, a file format that `mesh_file` describes; what `web_of` returns, and `columns_of`, which
+`effects.fold`, `boundary.heights` and `law_keys` call. Tests: ``tests/net/test_mesh_files.py``,
+``tests/net/test_bad_files.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Keys of ``[cable]`` and its groups that some laws alone have: points of a curve, and parameters of other packages.
 
-May change: texts of errors. Must stay: keys of `CURVES`, which are fields of `Cable`, `Group` and
+May change: private functions and texts of errors. Must stay: keys of `CURVES`, which are fields of `Cable`, `Group` and
 `effects.thread.Thread` and heads of CSV files; names of parameters, which are columns that compiled laws read. `cable`
 calls all functions of this file. Tests: ``tests/net/test_curves.py``, ``tests/how_to/test_law.py``.
 """

@@ -4,9 +4,9 @@ Values of fibres are those of the yarn along its axis. A braided or twisted rope
 its construction; knots and edges take more. So a material fills in what a first calculation needs, and the keys
 ``modulus``, ``density`` and ``strength`` of a scene go before it.
 
-May change: values and new materials, which change results of scenes that name the material. Must stay: names of
-materials, which are the scene format; `FILLED`, which are keys of `Cable` and `Group`; help prints the table to
-``validation/REFERENCE.md``. Tests: ``tests/net/test_materials.py``.
+May change: values in `MATERIALS` and new materials, which change results of scenes that name the material. Must stay:
+names of materials, which are the scene format; `FILLED`, which are keys of `Cable` and `Group`; help prints the table
+to ``validation/REFERENCE.md``. Tests: ``tests/net/test_materials.py``.
 """
 
 from __future__ import annotations

@@ -9,8 +9,9 @@ A rim consists of two rows of arcs, shifted by half an arc. Each arc has one con
 weights of both rows add up to 1 at the deepest point of the rim, so that a rolling rim has a constant force.
 
 May change: `MOST`, above which a mesh is refused; `FLAT`, which changes contact of meshes with bodies. Must stay:
-fields of `PART`, which `effects.contact` reads by name and width; numbers of `POINT`, `SEGMENT` and `ARC`; the order of
-parts, which decides the last digits of contact between bodies. Tests: ``tests/effects/test_between_bodies.py``.
+fields of `PART`, which `effects.contact` reads by name and width; numbers of `POINT`, `SEGMENT` and `ARC`; `ARCS`, on
+which contact of rims depends; the order of parts, which decides the last digits of contact between bodies. Tests:
+``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

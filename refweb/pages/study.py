@@ -1,7 +1,7 @@
 """The page of a study: statistics of its rows, a plot of each result, and the rows, as one HTML file.
 
-May change: the order of sections and `MOST_ROWS`; sentences belong in `results.study_text`. Must stay: `report`, which
-`commands.report` and `commands.sweep` call; classes, which ``page.css`` knows. Tests:
+May change: private functions, the order of sections and `MOST_ROWS`; sentences belong in `results.study_text`. Must
+stay: `report`, which `commands.report` and `commands.sweep` call; classes, which ``page.css`` knows. Tests:
 ``tests/sweeps/test_study_pages.py``.
 """
 

@@ -1,9 +1,9 @@
 """Cameras: projection of points to a page, and the choice of views that show the deformation of a web.
 
-May change: positions on the page, and which view is chosen. Must stay: names in `VIEWS`, which are values of ``refweb
-picture --view``; methods of `View`, which `render`, `polygons`, `stage` and `pages.space` call; `choose` and `nearby`,
-from which `pages.space` takes its first view. Tests: ``tests/pictures/test_pictures.py``,
-``tests/pictures/test_large.py``.
+May change: private functions, positions on the page (`ALONE` to `BESIDE`), `TANGENT`, `MANY`, and which view is chosen.
+Must stay: names in `VIEWS`, which are values of ``refweb picture --view``; methods of `View`, which `render`,
+`polygons`, `stage` and `pages.space` call; `choose` and `nearby`, from which `pages.space` takes its first view. Tests:
+``tests/pictures/test_pictures.py``, ``tests/pictures/test_large.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Data of a record for plots: history with units, results with ±, and the style among several records.
 
-May change: texts. Must stay: properties of `Shown`, which panels read by name; names and units from heads of tables,
-``NAME [unit]``, a file format. Tests: ``tests/pictures/test_plots.py``.
+May change: private functions and texts. Must stay: properties of `Shown`, which panels read by name; names and units
+from heads of tables, ``NAME [unit]``, a file format. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

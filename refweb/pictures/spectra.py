@@ -1,7 +1,8 @@
 """Spectra of histories with equal intervals: amplitude over frequency.
 
-May change: the drawing and its texts; `STANDS_OUT`, by which peaks are named. Must stay: `FEWEST`, from which on
-`plots` offers a spectrum; amplitudes and frequencies of `spectrum_of`. Tests: ``tests/pictures/test_plots.py``.
+May change: private functions, the drawing and its texts, `DECADES` among it; `STANDS_OUT` and `WIDTH_OF_A_LINE`, by
+which peaks are named; `EVEN`, up to which rows count as even. Must stay: `FEWEST`, from which on `plots` offers a
+spectrum; amplitudes and frequencies of `spectrum_of`. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

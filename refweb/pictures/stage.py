@@ -1,8 +1,8 @@
 """The stage of a picture: the common parts of all pages of a film, and the drawing and labels of a frame.
 
-May change: colours and sizes here: `paraview` and `pages.space`, which takes `UNITS` as well, have them from this file,
-so that all show a field alike. Must stay: their names; fields of `Look` and methods of `Stage`, which `pictures`,
-`film` and `gym.images` use; `LARGEST`, which `over_frames` and `line_numbers` know. Tests:
+May change: private functions, colours and sizes here: `paraview` and `pages.space`, which takes `UNITS` as well, have
+them from this file, so that all show a field alike. Must stay: their names; fields of `Look` and methods of `Stage`,
+which `pictures`, `film` and `gym.images` use; `LARGEST`, which `over_frames` and `line_numbers` know. Tests:
 ``tests/pictures/test_pictures.py``, ``tests/pictures/test_over_frames.py``.
 """
 

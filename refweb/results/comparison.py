@@ -1,7 +1,7 @@
 """Comparison of result folders: agreement of their results within ±, and differences of their scenes.
 
-May change: `MEANINGLESS` and other texts. Must stay: keys of what `compare` returns, which are those of ``refweb
-compare --json`` and which `commands.console` prints; the rule of agreement in its docstring. Tests:
+May change: private functions, `MEANINGLESS` and other texts. Must stay: keys of what `compare` returns, which are those
+of ``refweb compare --json`` and which `commands.console` prints; the rule of agreement in its docstring. Tests:
 ``tests/results/test_comparison.py``.
 """
 

@@ -16,9 +16,10 @@ this matrix are forms of φ_i and of (φ_i + φ_j)/√2, in axes that turn of (�
 ± holds besides the errors of the equilibrium those of the shapes, by their residuals and by rounding. A change of L
 bends a shape by δφ with L δφ = −(δL) φ, where as many components as there are equal frequencies stay [2]_.
 
-May change: `STEPS`, `FIRST`, `SHRINKS` and `ENOUGH`, by which differences are made. Must stay: `FrequencyGradients`,
-which `modes` calls, and `NAME`, by which `commands.gradient` knows a frequency; names of results, which are those of
-`modes`; ± that covers the error. Tests: ``tests/studies/test_frequency_gradients.py``.
+May change: private functions; `STEPS`, `FIRST`, `SHRINKS` and `ENOUGH`, by which differences are made; `MOST`,
+`ROUNDED` and `OPPOSED`, limits of what has a gradient. Must stay: `FrequencyGradients`, which `modes` calls, and
+`NAME`, by which `commands.gradient` knows a frequency; names of results, which are those of `modes`; ± that covers the
+error. Tests: ``tests/studies/test_frequency_gradients.py``.
 
 References
 ----------

@@ -3,9 +3,9 @@
 The worker may be a process on another machine. The job contains the files that it needs. The outcome contains the cells
 of a row, and on demand ``run.json`` or an archive of the result folder.
 
-May change: how files are packed, on both sides (`packed`, `unpacked`) at once. Must stay: fields of `Job` and
-`Outcome`, which travel by pickle to other machines as plain values and bytes; columns of `cells_of`, which are those of
-`results.case_rows`; `solve`, which workers call. Tests: ``tests/sweeps/test_sweep.py``,
+May change: private functions; how files are packed, on both sides (`packed`, `unpacked`) at once. Must stay: fields of
+`Job` and `Outcome`, which travel by pickle to other machines as plain values and bytes; columns of `cells_of`, which
+are those of `results.case_rows`; `solve`, which workers call. Tests: ``tests/sweeps/test_sweep.py``,
 ``tests/sweeps/test_workers.py``.
 """
 

@@ -1,8 +1,8 @@
 """The cases of a study: the values of each case, and its scene, made of the base scene.
 
-May change: texts of errors. Must stay: the digest by `key_of` and the order of samples and of cases: with others all
-cases of stored studies run again. `sizing`, `episodes` and `sweep` call this file. Tests:
-``tests/sweeps/test_sweep.py``, ``tests/sweeps/test_chances.py``.
+May change: private functions and texts of errors. Must stay: the digest by `key_of`, its length `KEY`, and the order of
+samples and of cases: with others all cases of stored studies run again. `sizing`, `episodes` and `sweep` call this
+file. Tests: ``tests/sweeps/test_sweep.py``, ``tests/sweeps/test_chances.py``.
 """
 
 from __future__ import annotations

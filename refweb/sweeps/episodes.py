@@ -1,8 +1,8 @@
 """Learning environments of scenes: the table ``[gym]``, with inputs, observations, reward, end and draws of episodes.
 
 It knows no Gymnasium: a scene with the table is read, run and swept without that library. `refweb.gym` makes episodes.
-May change: texts of errors. Must stay: keys and docstring of `Gym` (scene format and help; after a change write
-``validation/REFERENCE.md`` anew); `TIME` and `BEFORE`, names that formulas of users have. Tests:
+May change: private functions and texts of errors. Must stay: keys and docstring of `Gym` (scene format and help; after
+a change write ``validation/REFERENCE.md`` anew); `TIME` and `BEFORE`, names that formulas of users have. Tests:
 ``tests/gym/test_environment.py``.
 """
 

@@ -13,9 +13,9 @@ and x = 2 it leaves ``y > 2 and x > 3`` undecided, though it is false. Its metho
 are private, and it checks an expression only during evaluation. The library asteval gives a condition access to 387
 names.
 
-May change: texts of errors, `LONGEST` and `DEEPEST` upwards. Must stay: operators and `FUNCTIONS`, the language of
-``skip`` and ``conditions`` in study files and of formulas in requirements files: none is removed; intervals that are
-never narrower than the exact ones; that nothing but what was read here is run. Tests:
+May change: private functions, texts of errors, `LONGEST` and `DEEPEST` upwards. Must stay: operators and `FUNCTIONS`,
+the language of ``skip`` and ``conditions`` in study files and of formulas in requirements files: none is removed;
+intervals that are never narrower than the exact ones; that nothing but what was read here is run. Tests:
 ``tests/sweeps/test_expressions.py``.
 """
 

@@ -4,9 +4,9 @@
 find the job that kills its worker among those that ran at the same time. A job that has killed `TRIES` workers is given
 up.
 
-May change: `TRIES` and `GLANCE`. Must stay: each outcome once from `through`; of an executor of a user only ``submit``,
-standard futures and, where it exists, ``_max_workers`` are used; `THREADS`, by which rows are the same in all
-processes. Tests: ``tests/sweeps/test_workers.py``.
+May change: private functions, `TRIES` and `GLANCE`. Must stay: each outcome once from `through`; of an executor of a
+user only ``submit``, standard futures and, where it exists, ``_max_workers`` are used; `THREADS`, by which rows are the
+same in all processes. Tests: ``tests/sweeps/test_workers.py``.
 """
 
 from __future__ import annotations

@@ -10,9 +10,9 @@ and the force jumps.
 
 May change: how ξ is searched, and limits of the iterations. Must stay: the four entries of `Places` in their order,
 which `penalty`, `friction`, `line_body_friction` and `body_body_detection` unpack; three contacts of an element on a
-convex body, which is `SLOTS` of `line_body_friction`; the fields of `ContactPoint`; that `in_reach` and `reaching` miss
-no contact. Tests: ``tests/effects/test_contact.py``, ``tests/dynamics/integrators/test_nearby.py``,
-``tests/test_contract.py``.
+convex body, which is `SLOTS` of `line_body_friction`; the fields of `ContactPoint` and the mark `NOWHERE`; that
+`in_reach` and `reaching` miss no contact. Tests: ``tests/effects/test_contact.py``,
+``tests/dynamics/integrators/test_nearby.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -8,9 +8,10 @@ beyond the last one the last slope goes on. The energy is the exact integral.
 Kernels read the pieces of a curve from an array at an address that stands among the numbers of a line. The net keeps
 these arrays, `refweb.net.net.Net.kept`.
 
-May change: how pieces are found. Must stay: numbers of a piece in the order of `WIDTH`, which kernels here and
-`statics.monotone_loading` read by position; the arrays, which `Net.kept` keeps alive; ``last_strain``, which `Net` and
-`results.state` read by name; stress, tangent, curvature and energy of one curve. Tests: ``tests/net/test_curves.py``.
+May change: private functions and how pieces are found. Must stay: numbers of a piece in the order of `WIDTH`, which
+kernels here and `statics.monotone_loading` read by position; the arrays, which `Net.kept` keeps alive; ``last_strain``,
+which `Net` and `results.state` read by name; stress, tangent, curvature and energy of one curve. Tests:
+``tests/net/test_curves.py``.
 """
 
 from __future__ import annotations

@@ -4,9 +4,10 @@ A law is a class of scalar kernels that take a strain and the numbers of a line 
 `refweb.net.laws.line_data.FIELDS` and the columns of the law. In place of stress and modulus kernels have the tension
 and EA of the line, ``line.ea``.
 
-May change: how `Mixed` chooses. Must stay: names of kernels and attributes of `TensionLaw`, which laws of users give (a
-new one needs a default here, and an entry in `Mixed`), and which `Net.law_is`, `cable` and `statics` read by name; the
-signature ``(strain, line)``. Tests: ``tests/net/test_laws.py``, ``tests/net/test_laws_by_group.py``,
+May change: private functions; how `Mixed` chooses, and `DOUBLED` and `HALVED`, limits of the search of a strain. Must
+stay: names of kernels and attributes of `TensionLaw`, which laws of users give (a new one needs a default here, and an
+entry in `Mixed`), and which `Net.law_is`, `cable` and `statics` read by name; the signature ``(strain, line)``; `LINE`,
+the dtype of `line_data.FIELDS`. Tests: ``tests/net/test_laws.py``, ``tests/net/test_laws_by_group.py``,
 ``tests/how_to/test_law.py``.
 """
 

@@ -1,9 +1,9 @@
 """Observables between nodes: their distance, and perimeter and area of the mouth of a net.
 
-May change: how sums are written: the kernels `distance`, `perimeter` and `area` serve `of` as well. Must stay: class
-docstrings (help; after a change write ``validation/REFERENCE.md`` anew), class names in `registry.OBSERVABLES`,
-`MouthArea`, which `commands.doubts` uses, and `Between`, which `statics.responses` differentiates. Tests:
-``tests/results/test_distances.py``, ``tests/results/test_observable_contract.py``.
+May change: private functions; how sums are written: the kernels `distance`, `perimeter` and `area` serve `of` as well.
+Must stay: class docstrings (help; after a change write ``validation/REFERENCE.md`` anew), class names in
+`registry.OBSERVABLES`, `MouthArea`, which `commands.doubts` uses, and `Between`, which `statics.responses`
+differentiates. Tests: ``tests/results/test_distances.py``, ``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

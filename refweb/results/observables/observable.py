@@ -1,9 +1,9 @@
 """Observables: a value at an instant, and the probe that follows it through the steps of a run.
 
 May change: how defaults are computed. Must stay: names of attributes and methods of `Observable` and fields of `Value`,
-which observables of users give and statics, dynamics and plots call (a new one needs a default); numbers of
-`SELECTIONS`, which kernels of `probes` read; `ROUNDING` and `SHARE` belong to ±. Tests:
-``tests/results/test_observable_contract.py``, ``tests/how_to/test_observable.py``.
+which observables of users give and statics, dynamics and plots call (a new one needs a default); `ANY` and
+`NOT_NEGATIVE`, which are bounds; numbers of `SELECTIONS`, which kernels of `probes` read; `ROUNDING` and `SHARE` belong
+to ±. Tests: ``tests/results/test_observable_contract.py``, ``tests/how_to/test_observable.py``.
 """
 
 from __future__ import annotations
