@@ -42,4 +42,5 @@ The entry point of your package, whose verbs stand behind those of refweb, which
     weigh = "my_webs.weigh"
 """
 
-# This docstring is a page of the site, and `tests/how_to/test_verb.py` runs the code in it.
+# This docstring is a page of the site and of `refweb help own-verb`. May change: the prose. Must stay: the first
+# sentence, which tests/test_architecture.py compares, and its code, which tests/how_to/test_verb.py runs.

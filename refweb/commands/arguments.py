@@ -1,6 +1,8 @@
 """Arguments that several verbs have, and what they print as JSON."""
 
-# Help texts here are those of verbs, which read `scene`, `values`, `json` and `force` of the parsed arguments.
+# May change: help texts, which are those of verbs. Must stay: names of options, and of the parsed arguments ("scene",
+# "values", "json", "force", "workers", "scheduler"), which verbs read; what the functions return. Tests:
+# tests/commands/test_cli.py, tests/commands/test_values.py.
 
 import contextlib
 import json
@@ -9,12 +11,12 @@ from ..errors import InputError
 
 
 def add_scene(parser):
-    """The scene to work on."""
+    """Declare the argument for the scene."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or the name of a scene shipped with refweb")
 
 
 def add_values(parser):
-    """Values in place of those of the scene."""
+    """Declare the option for values in place of those of the scene."""
     text = (
         "a value in place of the scene's, by its path, as solve.duration=0.5 or body.0.velocity=[0,0,2]; an effect is "
         "left out by false, as contact=false; repeatable"
@@ -34,7 +36,7 @@ def scene_of(arguments):
 
 
 def add_json(parser):
-    """Add the option that prints JSON."""
+    """Declare the option that prints JSON."""
     parser.add_argument("--json", action="store_true", help="as JSON")
 
 
@@ -44,12 +46,12 @@ def print_json(content):
 
 
 def add_force(parser):
-    """Leave to replace results."""
+    """Declare the option that allows earlier results to be replaced."""
     parser.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")
 
 
 def add_workers(parser, runs="it", use=""):
-    """Add the options for workers: their help names the ``runs``, and the ``use`` of several processes."""
+    """Declare the options for workers: their help names the ``runs``, and the ``use`` of several processes."""
     text = f"processes of this machine{use} (default: one for each processor)"
     parser.add_argument("--workers", type=int, metavar="N", help=text)
     text = f"run {runs} on a Dask cluster, tcp://HOST:PORT of its scheduler; needs refweb[cluster]"
@@ -74,7 +76,7 @@ def workers_of(arguments, text):
 
 @contextlib.contextmanager
 def resumable(folder):
-    """Say of a run that is interrupted how it goes on; ``folder`` is its result folder, None for none."""
+    """Tell how to resume a run that is interrupted in the block; ``folder`` is its result folder, or None."""
     try:
         yield
     except KeyboardInterrupt:

@@ -1,13 +1,15 @@
 """Check a scene without solving it; writes nothing."""
 
-# This docstring is the help of the verb; a new check belongs in the scene, `runner.notices` or `doubts`.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; exit status 0 of a scene that is right; that nothing is solved or written. A new check
+# belongs in the scene, `runner.notices` or `doubts`. Tests: tests/commands/test_cli.py, tests/commands/test_doubts.py.
 
 from ..errors import InputError
 from .arguments import add_scene, add_values, print_sizing, print_study, scene_of
 
 
 def add_arguments(parser):
-    """The scene."""
+    """Declare the scene and its values."""
     add_scene(parser)
     add_values(parser)
 

@@ -1,6 +1,8 @@
 """Output at a terminal: one box before a run and one after."""
 
-# Programs read `run.json` and `--json`, so that texts are free; keys are those of `run.json` and `trust.json`.
+# May change: all texts and their layout, as programs read `run.json` and `--json` instead. Must stay: names and
+# arguments of `print_…`, which verbs call; keys that are read, those of `run.json` and `trust.json`. Sentences on
+# results belong in `results.summary_text`. Tests: tests/commands/test_cli.py, tests/results/test_results.py.
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """Compute the cost of digits: errors and CPU times of every method on a scene."""
 
-# This docstring is the help of the verb; options are keywords of `work_precision.cost`, and `refweb info` calls `show`.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls, and `show`, which `refweb info` calls; names of options, which are keywords of
+# `studies.work_precision.cost`. Tests: tests/studies/test_cost.py.
 
 import pathlib
 
@@ -8,7 +10,7 @@ from .arguments import add_force, add_scene, add_values, scene_of
 
 
 def add_arguments(parser):
-    """The scene, the folder, the time it may take, and what errors are of."""
+    """Declare the scene, the folder, the budget of time and the observable of the errors."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for cost.png and cost.csv (default: none is written)")

@@ -4,7 +4,9 @@ A scene is refused where it cannot be, and a run warns of what limits its result
 in MPa, an area in mm², a body that never meets the web. Nothing is solved for it.
 """
 
-# `commands.check` alone prints these findings, whose codes stand in `findings.CODES`; all limits are free.
+# May change: all limits and texts, as `commands.check` alone prints these findings. Must stay: codes of findings, which
+# stand in `refweb.findings.CODES`; `doubts_on`, which `check` calls; that nothing is solved. Tests:
+# tests/commands/test_doubts.py, which has a scene and its neighbour for each doubt.
 
 from __future__ import annotations
 

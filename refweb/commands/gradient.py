@@ -1,5 +1,9 @@
 """Compute how results and frequencies change with numbers of a scene: gradients, in statics by line as a picture."""
 
+# This docstring is the help of the verb. May change: texts and `SHOWN`. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; names of options; keys of `--json`, which are for scripts. `Solution.gradient` computes.
+# Tests: tests/statics/test_gradients.py, tests/dynamics/test_dynamic_gradients.py.
+
 from ..errors import InputError
 from .arguments import add_json, add_scene, add_values, print_json, scene_of
 
@@ -8,7 +12,7 @@ SHOWN = 20
 
 
 def add_arguments(parser):
-    """The scene, the result, and by what it is differentiated."""
+    """Declare the scene, the result, and the numbers by which it is differentiated."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument(

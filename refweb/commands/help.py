@@ -1,6 +1,8 @@
 """Print what a table of a scene file may hold, what a term means, or a guide."""
 
-# This docstring is the help of the verb; `--markdown` writes `validation/REFERENCE.md`, which a test compares.
+# This docstring is the help of the verb. May change: which page comes first where a word names several. Must stay:
+# `add_arguments` and `run`, which `refweb.__main__` calls; `--markdown`, which writes `validation/REFERENCE.md`:
+# tests/reference/test_help.py compares both.
 
 import argparse
 import sys
@@ -18,7 +20,7 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Print the pages."""
+    """Print the pages of a table, a term, a guide or a verb."""
     from ..reference.glossary import explained
     from ..reference.pages import names
     from ..reference.words import as_markdown, as_text, guide, guides, overview

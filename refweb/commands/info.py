@@ -1,6 +1,8 @@
 """Print the content of a scene, a study, requirements or a result folder."""
 
-# A verb named by `kind` in `run.json` has `show(summary)`; this docstring is help; keys of `--json` are for programs.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; the call of `show(summary)` of the verb that `kind` in `run.json` names; keys of `--json`,
+# which are for scripts. Tests: tests/commands/test_cli.py.
 
 import json
 import pathlib
@@ -11,13 +13,13 @@ from .arguments import add_json, print_json, print_sizing, print_study
 
 
 def add_arguments(parser):
-    """The scene or the folder, and how to print it."""
+    """Declare the scene or folder, and the format."""
     parser.add_argument("source", metavar="SCENE | DIR")
     add_json(parser)
 
 
 def run(arguments):
-    """Print what is there."""
+    """Print the content of a result folder, a study, requirements or a scene."""
     from ..scene import shipped
     from ..sizing.requirements import is_sizing
     from ..sweeps.study import is_study

@@ -1,12 +1,13 @@
 """List the scenes, studies and requirements that are shipped with refweb."""
 
-# This docstring is the help of the verb; the first comment of a shipped file is its line here.
+# This docstring is the help of the verb. May change: the layout. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; the first comment of a shipped file as its line here. Tests: tests/commands/test_new.py.
 
 import tomllib
 
 
 def add_arguments(parser):
-    """None."""
+    """Declare nothing: the verb has no arguments."""
 
 
 def run(arguments):

@@ -1,6 +1,8 @@
 """Compute natural frequencies and mode shapes about the equilibrium of a scene."""
 
-# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` of this kind.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` of this kind; names of options. Tests:
+# tests/studies/test_modes.py.
 
 import pathlib
 
@@ -8,7 +10,7 @@ from .arguments import add_force, add_scene, add_values, scene_of
 
 
 def add_arguments(parser):
-    """The scene, how many modes, and the folder."""
+    """Declare the scene, the number of modes and the folder."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument("-n", dest="number", type=int, default=10, metavar="N", help="how many (default: 10)")
@@ -17,7 +19,7 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Print what vibrates, find its modes, print them."""
+    """Print the scene, compute its modes, print the modes."""
     from ..results.progress import followed
     from ..scene import slug
     from ..studies.modes import modes

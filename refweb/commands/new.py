@@ -1,6 +1,8 @@
 """Write a commented scene file to start from."""
 
-# This docstring is the help of the verb; `KEYS` has all keys with paths, and a test uncomments all of `START`.
+# This docstring is the help of the verb. May change: comments in `START`. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; keys in `START`, all of which tests/commands/test_new.py uncomments and runs; in `KEYS` all
+# keys of scenes and studies that hold paths: a new one goes there.
 
 import json
 import os
@@ -91,7 +93,7 @@ KEYS = ("path", "lines", "positions", "file", "start", "scene")
 
 
 def add_arguments(parser):
-    """The name, and what it begins with."""
+    """Declare the name of the file, and the scene or study that it begins as a copy of."""
     parser.add_argument("name", metavar="NAME", help="the scene file is NAME.toml")
     parser.add_argument(
         "--from", dest="source", metavar="SCENE", help="begin with a copy of this scene or study, file or name"

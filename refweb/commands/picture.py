@@ -1,6 +1,8 @@
 """Draw a result folder: one instant, or all of them as a film."""
 
-# This docstring is the help of the verb; options are keywords of `pictures.picture` and `film.animate`.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; names of options, which are keywords of `pictures.pictures.picture` and
+# `pictures.film.animate`. Tests: tests/pictures/test_pictures.py.
 
 import argparse
 import pathlib
@@ -9,7 +11,7 @@ from ..errors import InputError
 
 
 def add_arguments(parser):
-    """The folder, what is drawn of it, how and where."""
+    """Declare the folder, the frame, the field, the look and the file."""
     folder = parser.add_argument("folder", metavar="DIR")
     parser.add_argument(
         "--frame", type=int, metavar="N", help="number of the frame, of modes that of the mode; -1 is the last"

@@ -1,12 +1,14 @@
 """Plot result folders: histories with ±, books, spectra; several over each other."""
 
-# This docstring is the help of the verb; options are keywords of `pictures.plots.plot`.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; names of options, which are keywords of `pictures.plots.plot`. Tests:
+# tests/pictures/test_plots.py.
 
 import sys
 
 
 def add_arguments(parser):
-    """The folders, what is drawn of them, and where."""
+    """Declare the folders, the quantities and the file."""
     parser.add_argument("folders", nargs="+", metavar="DIR", help="result folders; several are drawn over each other")
     text = (
         "an observable or another column of history.csv; energy or momentum, with balance; spectrum or spectrum:NAME; "

@@ -1,6 +1,8 @@
 """Write one page of a result folder: results, plots, pictures, and the web in space to turn and play."""
 
-# This docstring is the help of the verb; `pages` checks values, and this file which options exclude each other.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; names of options. This file says which options exclude each other, `pages` checks their
+# values. Tests: tests/pages/test_page.py, tests/pages/test_sheet.py.
 
 import pathlib
 
@@ -8,7 +10,7 @@ from ..errors import InputError
 
 
 def add_arguments(parser):
-    """The folder, where the page goes, and how much of the motion is on it."""
+    """Declare the folder, the file and the number of frames."""
     parser.add_argument("folder", metavar="DIR")
     parser.add_argument(
         "--out", metavar="FILE", help="page to write, HTML that needs nothing else (default: DIR/report.html)"
@@ -22,7 +24,7 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Write it, and print where it is."""
+    """Write the page, and print its path."""
     from ..pages import page, study
     from ..results.folder import read_summary
     from ..results.progress import followed

@@ -1,12 +1,14 @@
 """Continue a dynamic run that was killed, interrupted or failed."""
 
-# This docstring is the help of the verb, which messages of `results.folder.remedy` name.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; the name of the verb, which messages of `results.folder.remedy` tell users. Tests:
+# tests/test_faults.py.
 
 from .arguments import resumable
 
 
 def add_arguments(parser):
-    """The folder of the run."""
+    """Declare the folder of the run."""
     parser.add_argument("folder", metavar="DIR", help="its result folder")
 
 

@@ -1,6 +1,8 @@
 """Solve a scene and write its result folder."""
 
-# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` without a kind.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` without a kind; names of options.
+# Tests: tests/commands/test_cli.py.
 
 import pathlib
 
@@ -9,7 +11,7 @@ from .arguments import add_force, add_scene, add_values, resumable, scene_of
 
 
 def add_arguments(parser):
-    """The scene, the folder, and what is found besides."""
+    """Declare the scene, the folder and the horizon."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="result folder (default: the title, in the current folder)")

@@ -1,7 +1,8 @@
 """Print the JSON Schema of scene files, or of another kind, by which editors check and complete them."""
 
-# This docstring is the help of the verb; `reference.schema` makes all that is printed. The command line finds
-# the verb by the name of this file, and calls `add_arguments` and `run`.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; the schema alone on standard output, for editors. `reference.schema` makes it. Tests:
+# tests/reference/test_schema.py.
 
 import sys
 
@@ -9,13 +10,13 @@ from .arguments import print_json
 
 
 def add_arguments(parser):
-    """The kind of file."""
+    """Declare the kind of file."""
     kinds = ("scene", "study", "sizing")
     parser.add_argument("file", nargs="?", default="scene", choices=kinds, help="kind of file (default: scene)")
 
 
 def run(arguments):
-    """Print it."""
+    """Print the schema."""
     from ..reference.schema import schema
     from ..registry import load_installed
 

@@ -1,6 +1,8 @@
 """Find the least design that meets requirements: its scene, margins, what governs it, and the trade-off."""
 
-# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` of this kind.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` of this kind; names of options; exit
+# status 1 where no design meets the requirements, for scripts. Tests: tests/sizing/test_size.py.
 
 import pathlib
 
@@ -8,7 +10,7 @@ from .arguments import add_workers, workers_of
 
 
 def add_arguments(parser):
-    """The requirements, the folder, and who runs designs."""
+    """Declare the requirements, the folder and the workers."""
     text = "a requirements file, or the name of one shipped with refweb"
     parser.add_argument("requirements", metavar="REQUIREMENTS", help=text)
     text = "folder of the sizing (default: its title, in the current folder); one that holds runs goes on"

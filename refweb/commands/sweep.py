@@ -1,6 +1,8 @@
 """Run a study: one scene with many values, spread and ± apart, chances of conditions."""
 
-# This docstring is the help of the verb; `refweb info` calls `show` for a `run.json` of this kind.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` of this kind; names of options. Tests:
+# tests/sweeps/test_sweep.py.
 
 import pathlib
 
@@ -8,7 +10,7 @@ from .arguments import add_workers, workers_of
 
 
 def add_arguments(parser):
-    """The study, its folder, and who runs it."""
+    """Declare the study, its folder and the workers."""
     parser.add_argument("study", metavar="STUDY", help="a study file, or the name of a study shipped with refweb")
     text = "folder of the study (default: its title, in the current folder); one that holds rows goes on"
     parser.add_argument("--out", metavar="DIR", help=text)

@@ -1,6 +1,8 @@
 """Find all parts of the error of each result, and say what the numbers are worth."""
 
-# This docstring is the help of the verb; `show` takes the content of `trust.json`, not that of `run.json`.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; names of options; `show` of the content of `trust.json`, not of `run.json`. Tests:
+# tests/studies/test_further_runs.py.
 
 import pathlib
 
@@ -8,7 +10,7 @@ from .arguments import add_force, add_scene, add_values, resumable, scene_of
 
 
 def add_arguments(parser):
-    """The scene, the folder and the time it may take."""
+    """Declare the scene, the folder and the budget of time."""
     add_scene(parser)
     add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for trust.json and trust.png (default: none is written)")

@@ -1,6 +1,8 @@
 """Look at a result folder: its page in a browser, a window, or a script for ParaView."""
 
-# This docstring is the help of the verb; a page that is older than `run.json` is written anew.
+# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# `refweb.__main__` calls; names of options; that a page older than `run.json` is written anew. Tests:
+# tests/pictures/test_viewers.py.
 
 import pathlib
 import sys
@@ -9,7 +11,7 @@ from ..errors import InputError
 
 
 def add_arguments(parser):
-    """The folder, and what shows it."""
+    """Declare the folder and the viewer."""
     parser.add_argument("folder", metavar="DIR")
     group = parser.add_mutually_exclusive_group()
     group.add_argument("--window", action="store_true", help="a window of pyvista, with a slider over the frames")
@@ -19,7 +21,7 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Show it."""
+    """Show the folder in the viewer that is asked for."""
     elsewhere = arguments.window or arguments.paraview
     if arguments.out is not None and not arguments.paraview:
         raise InputError(f"--out {arguments.out} belongs to --paraview; the page is written by refweb report --out")

@@ -5,7 +5,9 @@ Two processes compile where there are two cores; REFWEB_COMPILERS=1 leaves it to
 all usual processors of this kind run is written into the package itself, for a wheel.
 """
 
-# This docstring is the help of the verb; kernels that no run here needs are compiled at their first use by users.
+# This docstring is the help of the verb. May change: `METHODS` and `ROWS`, which decide what is compiled ahead: users
+# compile the rest at its first use. Must stay: `add_arguments` and `run`, which `refweb.__main__` calls; `--ship`, by
+# which wheels are built, and its setting of processors before numba is imported. No test runs this file.
 
 import contextlib
 import os
@@ -17,7 +19,7 @@ ROWS = 2
 
 
 def add_arguments(parser):
-    """One."""
+    """Declare the option for a wheel."""
     parser.add_argument("--ship", action="store_true", help="write into the package, for a wheel")
 
 

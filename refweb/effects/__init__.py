@@ -109,5 +109,6 @@ against energies and stiffness against forces for every effect and asks for numb
 ``Examples`` section of its docstring.
 """
 
-# This docstring is a page of the site, and tests/how_to/test_effect.py runs its example; test_architecture.py
-# compares the first sentence.
+# This docstring is a page of the site and of `refweb help own-effect`. May change: the prose. Must stay: the first
+# sentence, which tests/test_architecture.py compares, and the three code blocks in their order (module, entry point,
+# scene), which tests/how_to/test_effect.py and tests/test_plugins.py take from it and run.

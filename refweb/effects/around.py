@@ -1,6 +1,10 @@
 """Bodies that a thread runs over: spheres, cylinders and rings, and how it lies on them in the web's position.
 
-Keys of `Around` are the scene format, and its docstring is help; `winding` reads `Wrap` and the numbers of kinds.
+May change: `INSIDE`, `EVEN` and the formulas in `Around.wrap` and `winding_length`, which must give the same length as
+the kernels of `winding`. Must stay: keys and docstring of `Around` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew), fields of `Wrap`, numbers in `KINDS` and of `STRAIGHT`, `SPHERE` and `CYLINDER`,
+which kernels of `winding` read, and `body_of`, `steady`, `check_route` and `refuse_free`, which `winding`,
+`half_turns`, `thread` and `system.static_system` call. Tests: ``tests/effects/test_around.py``.
 """
 
 from __future__ import annotations

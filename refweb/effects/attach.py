@@ -9,7 +9,11 @@ the body: the centre of mass of both moves by s, and the tensor of inertia about
 M being the mass of the body alone; the row of the body is that of this centre. Nothing else changes in the equations,
 which have no multipliers. On a fixed body a node is a support. One that tables move has no mass, and its nodes none.
 
-`net.rotation` moves the nodes, `system.attached_nodes` and `resting_bodies` have the tangents: they change together.
+May change: `_joined` and `_about`, within the formula above. Must stay: keys and docstring of `Attach` (scene format
+and help; after a change write ``validation/REFERENCE.md`` anew); the fields ``carried`` and ``points`` of the body and
+the zero mass of its nodes, from which `net.rotation` moves the nodes and `system.attached_nodes` and
+`system.resting_bodies` make tangents. Those three change together with this file. Tests:
+``tests/effects/test_attach.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

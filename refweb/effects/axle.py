@@ -1,6 +1,9 @@
 """Axles of bodies: the table of one, and the torque about it.
 
-`System` calls `torques`; data are the direction and a table of `time_tables`, and a cell ends with the angle's row.
+May change: private functions; how the torque is read and computed. Must stay: keys and docstring of `BodyAxle` (scene
+format and help; after a change write ``validation/REFERENCE.md`` anew); `torques`, which `system.system` calls; the
+name "axle", cells and data of its terms (direction, then a table of `time_tables`), which `dynamics.commands` writes
+anew during a run. Tests: ``tests/effects/test_axles.py``.
 """
 
 from __future__ import annotations

@@ -16,8 +16,12 @@ matrix and knows no other effect.
 ``lay(net, supported)``
     Returns the displacement of all rows at the start of a run.
 
-Kernels, `results.probes` and `results.state` read columns of `LINE_OUT`, `TOUCH` and `FELT`; effects of users make
-`ForceTerm` and its parts, so that a new field needs a default.
+May change: helpers below `ForceTerm` (`with_rows`, `refuse_flows`, `without`, …) inside, with their signatures kept.
+Must stay: names, order and defaults of the fields of `ForceTerm`, its parts, `PrescribedMotion`, `Constraint` and
+`BreakLimits`, since effects of users make them (a new field needs a default); columns of `LINE_OUT` (numbers of which
+are `TENSION` to `LENGTH_POWER`), `TOUCH` and `FELT`, and the mark `CONTACT`, which kernels write and `results.probes`,
+`results.state` and `system.contact_forces` read. `system.effect_parts` checks what effects make. Tests:
+``tests/test_contract.py``, ``tests/test_plugins.py``.
 """
 
 from __future__ import annotations

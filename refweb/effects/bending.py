@@ -16,7 +16,11 @@ A clamp is a spring at the end of a line: a is a constant vector in the directio
 that k = 2 B/L. A cantilever of n such elements has springs B n inside and 2 B n at the clamp, and under a load P at its
 tip it bends by P L³/(3 B) (1 + 1/(2 n²)).
 
-Force, energy, stiffness and bound follow from one energy; k is the first number, which `without` zeroes at a break.
+May change: private functions, formulas of the kernels, if force, stiffness and bound still belong to the one energy;
+`ROUNDING`. Must stay: keys and docstring of `Bending` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); kernel signatures; k as the first number of a cell, which `without` sets to 0 at a
+break; the column name "bending_energy". `LARGEST` and `FAR` change results. Tests: ``tests/test_contract.py``,
+``tests/effects/test_bending.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,10 @@
 """Rigid bodies as a table of the scene.
 
-Keys of a shape are the fields of its class in `registry.SHAPES`; bodies get their rows in the order of their tables.
+May change: private functions, checks and their messages, and `EVEN`, a tolerance of these. Must stay: keys and
+docstring of `Body` (scene format and help; after a change write ``validation/REFERENCE.md`` anew), to which each class
+in `registry.SHAPES` adds its fields; rows of bodies in the order of their tables, behind all nodes; the fields of
+`refweb.net.rigid_body.RigidBody` that `extend` fills. Tests: ``tests/effects/test_contact.py``,
+``tests/effects/test_faulty_bodies.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
 A body of momentum P and angular momentum L about its centre feels the force −γ P and the moment −γ L, so that both fade
 as exp(−γ t) where nothing else acts, and the power −γ (v·P + ω·L) ≤ 0 is lost.
 
-`damping` gives the kernels of places; data are the coefficient of the drag and then W by rows.
+May change: the code of `fade`. Must stay: `rotation_terms`, which `damping` calls with its kernels of places; the order
+of the numbers of a cell (coefficient of the drag, then W by rows), which `fade` reads; kernel signatures. Tests:
+``tests/dynamics/test_bodies_come_to_rest.py``.
 """
 
 from __future__ import annotations
@@ -35,7 +37,7 @@ def fade(t, x, v, f, cells, data, out):
 
 @kernel(IMPULSE)
 def no_impulse(t, x, cells, data, total):
-    """Moments give no momentum."""
+    """Add nothing: moments give no momentum."""
 
 
 def rotation_terms(net, rate, drag, damping, bound):

@@ -2,7 +2,9 @@
 
 Every system with broken elements has this term, also if they were broken in the initial web.
 
-`system.broken_lines` and `results.folder` use the column `HELD` by name, and a broken element is one of EA 0.
+May change: how the kernels are written. Must stay: the column `HELD`, which `system.broken_lines` writes and
+`results.folder` reads by its name; the name "rupture_energy", a column of ``history.csv``; EA = 0 as the mark of a
+broken element, which `system.broken_lines` sets. Tests: ``tests/effects/test_rupture.py``.
 """
 
 from __future__ import annotations

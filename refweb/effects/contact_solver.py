@@ -28,7 +28,11 @@ nodes in a fluid. A force term has a kernel that detects its contacts, and one f
 while all others stay. `friction_law` is friction with damping. A force on a node that is attached to a body is a force
 and a moment on the body: rows of the body replace those of the node.
 
-`friction_law` and `contact.friction` have one law; another order of contacts or sums changes bits of results.
+May change: `SETTLING` and `UNMIXED`, which move results within the error of a step. Must stay: the law in
+`friction_law`, which is that of `contact.friction`; fields of `refweb.kernels.CONTACT` that are read and written;
+`prepare`, `carry`, `gauss_seidel`, `warm_start` and `commit`, which `integrators.implicit_contacts` and
+`integrators.step` call. Another order of contacts or sums changes the last digits of results. Tests:
+``tests/effects/test_contact_losses.py``, ``tests/effects/test_attached_contact_losses.py``.
 
 References
 ----------

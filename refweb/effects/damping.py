@@ -15,8 +15,10 @@ and the power −w L N ε̇ ≤ 0. Where L changes, by reels and heat, ∂N/∂�
 does the work −(1 + ε) N L' w. The force of a line without smoothing jumps when it snaps taut, and central differences
 are of order 1 across this jump.
 
-`natural_lengths` finds `GROWTH` by name, kernels here find it directly behind ``damping_time``, and force, stiffness
-and damping change together.
+May change: how the kernels are written; force, stiffness and damping change together. Must stay: keys and docstring of
+`Damping` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); the column `GROWTH` directly
+behind ``damping_time``, where kernels read it and `natural_lengths` writes it; columns of `LINE_OUT`. Tests:
+``tests/test_contract.py``, ``tests/effects/test_damping.py``.
 """
 
 from __future__ import annotations

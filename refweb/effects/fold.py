@@ -1,6 +1,9 @@
 """Folded initial positions of a web: all lines slack and apart from each other.
 
-`registry.with_fold` makes this table of ``[web] fold`` and ``positions``, and `net.folding` has the geometry.
+May change: messages, and the default of ``gap``. Must stay: keys and docstring of `Fold` (scene format and help; after
+a change write ``validation/REFERENCE.md`` anew), of which `registry.with_fold` makes a table from ``[web] fold`` and
+``positions``; what `lay` returns, the displacement of all rows at the start. The geometry is in `net.folding`. Tests:
+``tests/effects/test_fold.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Half turns of threads about cylinders: how far ends are from where `winding` counts their turns.
 
-The azimuth of an end is within half a turn of that in the web's position, so an end that goes farther would change the
-length by a whole turn. `statics` refuses an equilibrium near there, and `dynamics.half_turns` follows the farthest end.
+May change: `MOST`, up to ½, and messages. Must stay: the order of the ``numbers`` of `End`, which the compiled
+`turns_of` reads by position; `ends_of`, `turns_of`, `MOST` and `REMEDY`, which `dynamics.half_turns` uses, and
+`refuse_half_turns`, which `statics.equilibrium` calls. Tests: ``tests/effects/test_around.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,9 @@
 kernel over lines is `refweb.net.laws.line_data.LineData.matrix`: all terms of the compiled loop take matrices. `LINE`
 gives its first columns their names, and `refweb.net.net.Net.law_record` those that the laws of a net read.
 
-Kernels of all lines inline these functions: another order of sums changes the bits of all results.
+May change: nothing without a change of the last digits of all results, since kernels of all lines inline these
+functions and their order of sums. Must stay: arguments, and what each returns. Tests: ``tests/test_contract.py``,
+``tests/net/test_elements.py``.
 """
 
 from __future__ import annotations

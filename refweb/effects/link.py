@@ -1,6 +1,8 @@
 """Rigid links: pairs of nodes that keep their distance.
 
-Data are the vector and the length that `base.Constraint` reads; `system.links` has the equations.
+May change: messages. Must stay: the key and docstring of `Link` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); the four numbers of a pair (vector at x = 0, then its length), which
+`base.Constraint` reads. `system.links` has the equations. Tests: ``tests/dynamics/integrators/test_ida.py``.
 """
 
 from __future__ import annotations

@@ -14,7 +14,10 @@ momentum of all, and the angular momentum about a drum at rest, are kept.
 An explicit step brings Δm in the middle of its drift, where v − v_d goes with 1/m: that is the exact solution for F =
 0, and the step stays its own adjoint.
 
-The explicit loop uses `FollowedMass`, other methods `system.material_flow`: both have the same equations.
+May change: how the kernels are written, with the order of passages kept: it makes the step of order 2. Must stay:
+fields of `MassFlow`, which `reel` fills, of `Passages`, which `wound_mass` fills, and of `FollowedMass`, which the
+explicit loop reads by name; the equations, which `system.material_flow` has for other methods. Tests:
+``tests/effects/test_reel_mass.py``, ``tests/effects/test_winch_mass.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Prescribed motion: nodes and bodies whose displacement, and rotation, are functions of time.
 
-`rotations_over_time` writes and `turn` reads rows of `ROW` numbers; these kernels write x and v and no force.
+May change: `ALONG` and messages. Must stay: keys and docstring of `Motion` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); rows of `ROW` numbers, which `rotations_over_time` writes and the compiled `turn`
+reads by position; that kernels write x and v, and no force; cells and shape of the data for another rate, as
+`dynamics.commands` writes over it. Tests: ``tests/effects/test_moved_bodies.py``.
 """
 
 from __future__ import annotations

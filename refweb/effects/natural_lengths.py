@@ -3,7 +3,10 @@
 Reels and heat add factors to the net; nothing else changes natural lengths. Only `set_lengths` computes them; it writes
 them to the line data of its caller.
 
-`explicit_loop` and `step_bound` count on ∞ and −∞ behind the corners; `damping` adds the column `GROWTH`.
+May change: how kernels are written. Must stay: fields of `NaturalLengths`, which the explicit loop reads by name; ∞ and
+−∞ behind the corners, on which `explicit_loop` and `step_bound` count; the column `GROWTH`, which `damping` adds.
+`set_lengths` is the only place that computes lengths: a new effect on them calls `with_factor`. Tests:
+``tests/effects/test_reel.py``, ``tests/effects/test_viscous.py``.
 """
 
 from __future__ import annotations

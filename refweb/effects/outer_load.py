@@ -4,7 +4,10 @@ Each cell of such a load has first its numbers, and then those of the factor: it
 without a table, which are 1 and 0, in statics 0 and 1; its table. Without a table the factor is 1, in statics the load
 step.
 
-`pressure` and `thrust` give `factor_at` the column behind their numbers, and their bounds read its first number.
+May change: how kernels are written. Must stay: the order of the numbers of a factor (largest size, constant, slope,
+table), which `factor_at` and `factor_until` read by position, and the first of which bounds of `pressure`, `thrust` and
+`body_load` read; the numbers of a load ahead of them, over which `dynamics.commands` writes. Tests:
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Point masses on nodes.
 
-Pictures and checkpoints read ``point_mass`` of the net, methods ``mass``.
+May change: how masses are added up. Must stay: keys and docstring of `PointMass` (scene format and help; after a change
+write ``validation/REFERENCE.md`` anew); that both ``mass`` of the net, which methods use, and ``point_mass``, which
+pictures and checkpoints read, get the mass. Tests: ``tests/test_contract.py`` (``test_point_masses_add_up``).
 """
 
 from __future__ import annotations

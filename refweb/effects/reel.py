@@ -1,6 +1,9 @@
 """Reels: lines whose natural length is a function of time, such as those of a winch or a closing line.
 
-`natural_lengths` and `mass_flow` do the work; the table of the factor is one of `time_tables`.
+May change: messages. Must stay: keys and docstring of `Reel` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); the table of the factor, the same object in ``factors`` of the net, by which
+`dynamics.commands` finds it. `natural_lengths` and `mass_flow` do the work. Tests: ``tests/effects/test_reel.py``,
+``tests/effects/test_reel_mass.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,10 @@ A broken element has no stiffness: its tension, strain and energy are 0, and for
 had stored, and the energy of the forces that end with it, become the constant energy of a separate term, so that the
 energy balance closes through every break. `refweb.dynamics.integrators.rupture` finds the times of breaks.
 
-`integrators.rupture` and `statics.rupture` read `BreakLimits`, whose limits are tensions of elements.
+May change: messages. Must stay: keys and docstring of `Rupture` and `GroupRupture` (scene format and help; after a
+change write ``validation/REFERENCE.md`` anew); `BreakLimits` with a limit of the tension (and of the strain of lines
+that yield) for each element, which `integrators.rupture` and `statics.rupture` read. Tests:
+``tests/effects/test_rupture.py``, ``tests/effects/test_plastic.py``.
 """
 
 from __future__ import annotations

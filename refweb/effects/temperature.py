@@ -1,6 +1,9 @@
 """Temperature: natural lengths that expand, L (1 + α ΔT).
 
-`GroupTemperature` has keys of `Temperature`, which `net.groups.givers` finds by name; factors multiply those of reels.
+May change: private functions and messages. Must stay: keys and docstring of `Temperature` (scene format and help; after
+a change write ``validation/REFERENCE.md`` anew); the same names of keys in `GroupTemperature`, which
+`net.groups.givers` finds by name; that factors multiply those of reels, by `natural_lengths.with_factor`. Tests:
+``tests/effects/test_temperature.py``.
 """
 
 from __future__ import annotations

@@ -3,8 +3,10 @@
 Data of a cell have ``width`` columns of a record, 1/A, and four columns for each segment s from ``width + 1 + 4 s`` on:
 its vector in the web's position and the length of it [m].
 
-`thread` and `thread_friction` write these columns and call the kernels, so that the layout changes in all three; how a
-kernel computes its numbers is free.
+May change: how a kernel computes its numbers. Must stay: the columns above, which `net.threads` writes and `thread`,
+`thread_friction`, `thread_slips` and `winch_power` read: a change of the layout goes to all of them; the six numbers
+that a segment kernel returns; arguments of `energy_kernel`, which `winding` calls too. Tests:
+``tests/effects/test_thread.py``.
 """
 
 from __future__ import annotations

@@ -2,6 +2,13 @@
 
 Numbers of a thread stand in a matrix w, a row for each kind and a column for each segment or ring. Ring r is between
 segment r and the next; there is one ring less than segments, in a closed thread as many.
+
+May change: limits of the iterations (`STEPS`, `ROUGH`, `BISECTIONS`, `DOUBLINGS`, `FARTHER`, `POLISH`) upwards: slips
+are to be found to rounding, of which the other constants say what it is. Must stay: the rows of w by their names,
+`LONGER` to `REACH`, and `ROWS`, which `thread_friction`, `winch_power`, `wound_lines` and `wound_mass` read; the layout
+that `layout_kernels` reads: first row, ends, friction of each ring, numbers of the winch, as
+`thread_friction.numbers_of` writes them. Tests: ``tests/effects/test_thread_friction.py``,
+``tests/effects/test_winch.py``.
 """
 
 from __future__ import annotations

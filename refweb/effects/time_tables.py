@@ -3,7 +3,10 @@
 A table of rows (t, values...) is stored in a row of ``data``: the number of rows, then the rows one after another. Its
 values are constant before the first and after the last time.
 
-`system.material_flow` interpolates the same tables by numpy; a force gives its times to `Timing`: steps end there.
+May change: how a row is searched. Must stay: the layout of a table in ``data`` (number of rows, then rows), which
+`flattened` writes, kernels of seven files read and `dynamics.commands` writes over; end values held. A force gives its
+times to `Timing`, so that implicit steps end there; `system.material_flow` interpolates the same tables by numpy.
+Tests: ``tests/effects/test_time_tables.py``.
 """
 
 from __future__ import annotations

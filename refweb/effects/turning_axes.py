@@ -12,7 +12,10 @@ axes. A ring keeps its plane in these axes, and this moment does not act about i
 
 Consistent mass couples the nodes of an element here as in M v'.
 
-`turning_bodies` and `turning_flows` have the same forces on bodies and on reeled mass, and change with these.
+May change: private functions and how the kernels are written. Must stay: `force_terms`, which `frame` and `orbit` call;
+the two forces above, which `turning_bodies` has for bodies that turn in space and `turning_flows` for reeled mass: all
+three change together. Tests: ``tests/effects/test_frame.py``, ``tests/effects/test_orbit.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

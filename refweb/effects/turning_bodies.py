@@ -8,7 +8,9 @@ Let S = ∫ r⊗r dm of a body, which is ½ tr(J) 1 − J with its tensor of ine
 The first moment, which includes gravity gradients, has the potential −½ tr(S G). The second does no work. ω is the
 angular velocity in these axes, see `refweb.net.rotation`. A rotation δθ changes S by δθ × S − S × δθ.
 
-`BODY` names the numbers of a cell; `system.resting_bodies` has the Coriolis moment once more, by angular velocities.
+May change: how the kernels are written. Must stay: the fields of `BODY`, which `rows_of` writes and kernels read by
+name; the Coriolis moment, which `system.resting_bodies` has once more, by angular velocities: both change together;
+`force_terms`, which `turning_axes` calls. Tests: ``tests/test_contract.py``, ``tests/effects/test_orbit.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
 They are those of `refweb.effects.turning_axes` for a mass m (φ(t) − 1) at each node, with the factor φ of the reel. The
 force m (φ − 1) G r does work, since its potential changes with time; that of Coriolis does none.
 
-`FLOW` names the numbers of a cell, behind which the table stands; forces change with those of `turning_axes`.
+May change: how the kernels are written. Must stay: the fields of `FLOW`, behind which, at `TABLE`, the table of the
+factor stands; both forces, which are those of `turning_axes` and change with them; `force_terms`, which `mass_flow`
+calls. Tests: ``tests/effects/test_reel_mass.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Products of vectors of three numbers, as compiled kernels.
 
-Vectors are tuples of three numbers, and another order of sums changes the bits of all results.
+May change: nothing: kernels of the whole room call these functions, and another order of sums changes the last digits
+of all results. Must stay: vectors as tuples of three numbers. A new product is a new function.
 """
 
 from __future__ import annotations

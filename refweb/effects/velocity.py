@@ -1,6 +1,8 @@
 """Initial velocities of nodes.
 
-`system.start` calls `start` in the order of the tables, so that later tables write over earlier ones.
+May change: messages. Must stay: keys and docstring of `Velocity` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); `start`, which `system.start` calls in the order of the tables, so that later tables
+write over earlier ones. Tests: ``tests/effects/test_velocity.py``.
 """
 
 from __future__ import annotations

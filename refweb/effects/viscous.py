@@ -17,7 +17,10 @@ the time, and so are the rates.
 The states are rows of the unknowns behind all places, `refweb.effects.base.InternalVariables`, three to a row, those of
 a quadrature point after those of the one before.
 
-Kernels read the columns behind `ROW` by position, `of` counts arms by ``arm_time_…``, and callers unpack `kernels`.
+May change: `ROUNDS` and `SHORT`. Must stay: the columns behind `ROW` (bar, then EA and τ of each arm), which kernels
+read by position; the names ``arm_time_…``, by which `of` counts arms; the order of what `kernels` returns, with ∂E/∂L
+as the last; the order of states in rows; `refuse_beside`, which `damping` calls. Tests:
+``tests/effects/test_viscous.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -12,6 +12,11 @@ one that is asked for [m/s], 1 in statics, where time does not pass, the number 
 these rows, of time [s] and speed [m/s]; in dynamics those of a constant power behind them.
 
 A line on a winch is in `refweb.effects.wound_lines`.
+
+May change: private functions and messages. Must stay: keys and docstring of `Winch` (scene format and help; after a
+change write ``validation/REFERENCE.md`` anew); the order of the numbers above, which `thread_slips`, `winch_power`,
+`wound_lines` and `wound_mass` read by position; `writes` and `commanded`, with which `dynamics.commands` sets new
+values in a run. Tests: ``tests/effects/test_winch.py``, ``tests/effects/test_wound_lines.py``.
 """
 
 from __future__ import annotations
@@ -288,7 +293,7 @@ class Winch(Table):
             )
 
     def numbers(self, quasi_static: bool) -> tuple[float, ...]:
-        """Its numbers, see the module."""
+        """Numbers of the winch, in the order that the docstring of this module gives."""
         if self.tension is not None:
             holds = self.tension, self.tension
         else:

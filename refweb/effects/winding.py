@@ -16,9 +16,10 @@ The angle θ follows from the azimuths of both ends. Each is within half a turn 
 node on a body that turns about its axle, within half a turn of the one that it turns to. So any number of turns is
 counted, and nothing is remembered from step to step.
 
-Columns of ``out`` are those of `net.threads.COLUMNS`, and then a `base.TOUCH` for each segment on a body with the force
-on this, which `system.contact_forces` adds up; length, gradient and tangent change together, and the bound may be too
-large, never too small.
+May change: how the bound is found, if it is not smaller; `SURFACE`, a tolerance of rounding. Must stay: length,
+gradient and tangent of one formula; columns of ``out``, those of `net.threads.COLUMNS` and then a `base.TOUCH` for each
+segment on a body with the force on it, which `system.contact_forces` adds up; fields of `SEGMENT`, which `half_turns`
+reads by name. Tests: ``tests/effects/test_around.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

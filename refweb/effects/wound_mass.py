@@ -14,6 +14,11 @@ Forces of gravity and of rotating axes on the mass that is added are terms of th
 
 Numbers of a cell are those of `refweb.effects.thread_slips`; at their end stand those of `FIELD`, and `NODE` for each
 node.
+
+May change: how the kernels are written. Must stay: fields of `FIELD` and `NODE`, which kernels read by name; the
+equations, which are those of `mass_flow`; fields of `Passages`, by which the explicit loop and `system.material_flow`
+exchange mass; `write_numbers` and `WoundFlow`, which `winch` uses, and ``of_field``, by which `dynamics.commands`
+writes columns. Tests: ``tests/effects/test_winch_mass.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,9 @@ Importing this package registers the shipped environments, so that ``gymnasium.m
 any scene with a table ``[gym]``, ``gymnasium.make("refweb/Scene-v0", scene="my-net.toml")``. It needs the library
 Gymnasium, ``pip install "refweb[gym]"``.
 
-Ids and names of scenes in `SHIPPED` are what users write; a scene that changes what an agent sees or gets needs an id
-with the next number.
+May change: the text on installation. Must stay: ids and names of scenes in `SHIPPED`, which users write: a scene that
+changes what an agent sees or gets needs an id with the next number; the error that names Gymnasium where it is missing.
+Tests: ``tests/gym/test_environment.py``.
 """
 
 try:

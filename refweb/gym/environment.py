@@ -1,6 +1,8 @@
 """The environment of a scene: actions are commands of a stepped run, observations its observables.
 
-The keys of ``info`` are what programs of users read: ``time``, ``values``, ``energy_drift``, ``event`` and ``failure``.
+May change: private functions and texts of errors. Must stay: arguments and results of `SceneEnv`, which are those of
+Gymnasium; keys in `OPTIONS`; keys of ``info``, which programs of users read: ``time``, ``values``, ``energy_drift``,
+``event`` and ``failure``; the same bits for the same seed. Tests: ``tests/gym/test_environment.py``.
 """
 
 from __future__ import annotations

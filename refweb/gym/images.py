@@ -1,6 +1,8 @@
 """Images of an environment, by the renderer of pictures off screen.
 
-The camera stays for an episode while the scene is within its view, and is moved back where it leaves that.
+The camera stays for an episode while the scene is within its view, and is moved back where it leaves that. May change:
+`MARGIN`, `LOOK` and the camera. Must stay: an array of uint8, shape (height, width, 3), which `environment` returns;
+`close`, which ends the process that draws. Tests: ``tests/gym/test_environment.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,10 @@
 """The cable a web is made of: material, section, slackness and natural length of every line, by group.
 
-Fields of `Group` repeat those of `Cable`, since `_values` reads both by name; docstrings of tables are text of
-`refweb help`; laws, `discretisation` and `studies.form` read `properties` by name.
+May change: private functions, texts of errors, and `DEEPEST`, a limit of what is accepted; `SMOOTH_LAW` changes results
+of scenes with default numbers of that law. Must stay: keys, defaults and docstrings of `Cable`, `Group` and `Viscous`
+(scene format and help; after a change write ``validation/REFERENCE.md`` anew); fields of `Group`, which repeat those of
+`Cable`, as `_values` reads both by name; names of the properties that `Cable.properties` returns, which
+`discretisation`, laws and `studies.form` read. Tests: ``tests/net/test_laws_by_group.py``, ``tests/test_scene.py``.
 """
 
 from __future__ import annotations
@@ -158,7 +161,7 @@ class Viscous(Table):
     statics: str = choice("long", "short", default="long")
 
     def check(self) -> None:
-        """Refuse arms that are none."""
+        """Refuse arms whose modulus or time is not > 0."""
         for i, arm in enumerate(self.arms):
             for j, (name, unit) in enumerate((("modulus", "Pa"), ("time", "s"))):
                 if not arm[j] > 0.0:

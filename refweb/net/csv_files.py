@@ -1,6 +1,9 @@
 """Reading of webs from two CSV files, one of points and one of lines.
 
-Names in `POINTS` and `LINES` are a file format; `fold`, `boundary.heights` and `law_keys` use `columns_of`.
+May change: private functions, texts of errors, `LISTED` and `ALIKE`, which are of these. Must stay: names of columns in
+`POINTS`, `LINES` and `NAMES`, a file format that `mesh_file` describes; what `web_of` returns, and `columns_of`, which
+`effects.fold`, `boundary.heights` and `law_keys` call. Tests: ``tests/net/test_mesh_files.py``,
+``tests/net/test_bad_files.py``.
 """
 
 from __future__ import annotations
@@ -86,7 +89,7 @@ class Problems:
         self._texts, self._hints = [], []
 
     def add(self, text):
-        """Add one."""
+        """Add a problem."""
         self._texts.append(text)
 
     def hint(self, text):

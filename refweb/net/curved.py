@@ -1,6 +1,9 @@
 """Curved line elements on [0, 1]: the quadratic one of scikit-fem, and a nodal cubic, which scikit-fem lacks.
 
-Both ends come first among the nodes, as columns of `Net.cells` have them and `results.vtu` expects.
+May change: nothing of the functions: they are the elements of order 2 and 3. Must stay: `CURVED`, the elements by their
+order, which `elements` takes; both ends first among the nodes, as columns of `Net.cells` have them and `results.vtu`
+expects; names that scikit-fem asks of an element (``doflocs``, ``maxdeg``, ``lbasis``, …). Tests:
+``tests/net/test_elements.py``, ``tests/system/test_orders.py``.
 """
 
 from __future__ import annotations

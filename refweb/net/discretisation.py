@@ -19,7 +19,10 @@ on by themselves, with velocities that several points going slack one after anot
 the errors of p = 2 and 3 are still an eighth of that of p = 1, with 1000 nodes all three are alike. The strain jumps
 where a slack part is pulled taut, and no order exceeds 1.
 
-Rows of the web's nodes come first, then those inside lines, line by line; `_line_data` has the order of `FIELDS`.
+May change: how arrays are filled. Must stay: rows of the web's nodes first, then those inside lines, line by line,
+since files, checkpoints and observables count so; elements of a line one after another; the order of `line_data.FIELDS`
+in `_line_data`; fields of `Net`; no import of scikit-fem for explicit steps (``tests/test_pay_for_what_you_call.py``).
+Tests: ``tests/net/test_elements.py``, ``tests/system/test_orders.py``.
 """
 
 from __future__ import annotations

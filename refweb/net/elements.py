@@ -4,7 +4,10 @@ The functions of a straight element are 1 − ξ and ξ and its nodes are the en
 else, and therefore avoid scikit-fem: its import and that of scipy take as long as that of numba. Elements of higher
 order are in `refweb.net.curved`.
 
-Nodes have the order of columns of `Net.cells`, both ends first; `effects.reel` uses `lumped_shares` as well.
+May change: how values are computed. Must stay: nodes in the order of columns of `Net.cells`, both ends first; the
+number of Gauss points that `gauss` is asked for, on which orders of convergence rest; no import of scikit-fem at the
+head (``tests/test_pay_for_what_you_call.py``). `discretisation`, `effects.reel`, `statics.adjoint` and
+`system.weak_form` call this file. Tests: ``tests/net/test_elements.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Edges of the faces of a mesh file as the lines of a web, each once.
 
-`mesh_file` finds the edges in the last block of the mesh, and takes kinds in `CORNERS` for faces.
+May change: private functions, texts of findings and errors. Must stay: the edges as the last block of the mesh, where
+`mesh_file` finds them; each edge once; kinds of cells in `CORNERS`, which `mesh_file` takes for faces; the order of
+lines, by which scenes number them. Tests: ``tests/net/test_faces.py``.
 """
 
 from __future__ import annotations

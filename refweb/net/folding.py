@@ -8,7 +8,9 @@ R the largest r. With κ = r ω' ≤ 2π n, no distance grows by more than
 the larger singular value of s [[1, 0], [κ, 1]]; along the axis it is s. Where natural lengths are at least σ times the
 distance, all lines are slack.
 
-`effects.fold` draws webs by `turns_of` and `wound`, which change together with σ.
+May change: `CHUNK`, which decides memory alone. Must stay: `turns_of` and `wound` together with σ, since `effects.fold`
+relies on slack lines; `refuse_unfit`, which it calls. `SLACKEST` changes the default number of turns. Tests:
+``tests/effects/test_fold.py``.
 """
 
 from __future__ import annotations

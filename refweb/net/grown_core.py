@@ -24,7 +24,10 @@ cables bent over the edge of a box Newton's method then refuses 48, here none; n
 energy to 0.1, here to 1e-5 with order 2. A `WIDENING` of 1, with a constant edge radius, gives the same results except
 for a rounding of 1e-4 of the size, at which the order is 1. A `WIDENING` of 2 gives less depth in the middle.
 
-Contact relies on a concave depth with a gradient of at most 1; value, gradient and Hessian change together.
+May change: private functions and how the root is found. Must stay: value, gradient and Hessian of one depth, which is
+concave with a gradient of at most 1: contact, its bounds and `effects.contact.line_body_ccd` rely on both; the
+signature ``(point, grown)``, which is that of `Shape.depth`. `EXACT` and `WIDENING` change contact deep in bodies.
+Tests: ``tests/effects/test_deep_contact.py``.
 """
 
 from __future__ import annotations

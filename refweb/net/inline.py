@@ -1,6 +1,8 @@
 """Webs given node by node and line by line in the scene.
 
-`registry.WEBS` and `studies.form` name the class; its docstring is text of `refweb help` and of the schema.
+May change: private functions and texts of errors. Must stay: keys and docstring of `Inline` (scene format and help;
+after a change write ``validation/REFERENCE.md`` anew); the order of nodes and lines as given; the class name, which
+`registry.WEBS` and `studies.form` have. Tests: ``tests/net/test_webs.py``.
 """
 
 from __future__ import annotations

@@ -24,7 +24,11 @@ the links are their ``anchors``. In a web of layers the nodes of the outline are
 ``rim``. A line that cuts off a corner of a triangle has both nodes on the outline and belongs to ``rim`` too;
 ``ring-N`` is only the outline.
 
-Scenes name nodes, lines and groups by number and name: their order stays, and class docstrings are help text.
+May change: private functions, as long as numbers stay; `_MOST_CELLS`, a limit of what is accepted. Must stay: constants
+of the lattices (`MESHES` to `AREA`); the order of nodes and lines and the names of groups, by which scenes name them;
+keys and docstrings of `Paper`, `Window` and `Layers` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew). Tests: ``tests/net/test_webs.py``, ``tests/net/test_window_sizes.py``,
+``tests/net/test_groups.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Keys of ``[cable]`` and its groups that some laws alone have: points of a curve, and parameters of other packages.
 
-Keys of `CURVES` are fields of `Cable`, `Group` and `Thread` and heads of CSV files, and names of parameters are columns
-that compiled laws read.
+May change: private functions and texts of errors. Must stay: keys of `CURVES`, which are fields of `Cable`, `Group` and
+`effects.thread.Thread` and heads of CSV files; names of parameters, which are columns that compiled laws read. `cable`
+calls all functions of this file. Tests: ``tests/net/test_curves.py``, ``tests/how_to/test_law.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,9 @@ Values of fibres are those of the yarn along its axis. A braided or twisted rope
 its construction; knots and edges take more. So a material fills in what a first calculation needs, and the keys
 ``modulus``, ``density`` and ``strength`` of a scene go before it.
 
-`FILLED` are keys of `Cable` and `Group`; a changed value changes results of all scenes that name the material.
+May change: values in `MATERIALS` and new materials, which change results of scenes that name the material. Must stay:
+names of materials, which are the scene format; `FILLED`, which are keys of `Cable` and `Group`; help prints the table
+to ``validation/REFERENCE.md``. Tests: ``tests/net/test_materials.py``.
 """
 
 from __future__ import annotations
@@ -79,7 +81,7 @@ def as_text():
 
 
 def as_markdown():
-    """The same as a table of Markdown."""
+    """The materials as a table of Markdown."""
     rows = [
         "| material | modulus [Pa] | density [kg/m³] | strength [Pa] | kind, and source of the values |",
         "|---|---|---|---|---|",

@@ -3,7 +3,10 @@
 meshio skips polylines of .vtu files without a message, and reads neither polygonal data nor texts. VTK reads such
 files, in a separate process, since a damaged file may end the process.
 
-`BY_VTK` passes on only data that it names; `boundary.surface_file` calls `by_meshio` and `by_vtk` as well.
+May change: private functions, `REMEDIES` and texts of errors. Must stay: fields of `Mesh` and `Block`, which
+`mesh_file` and `faces` read; suffixes in `FORMATS` and kinds in `LINES`; names in `BY_VTK`, which passes on no other
+data; `by_meshio` and `by_vtk`, which `boundary.surface_file` calls too; VTK in a process of its own. Tests:
+``tests/net/test_mesh_files.py``, ``tests/net/test_bad_files.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,10 @@
 `refweb.net.discretisation` makes a net from a web. A net is never changed: effects return copies with more rows, mass
 and numbers of elements.
 
-Effects, solvers and plug-ins read fields by name; a new one has a default, so that `discretisation` may omit it.
+May change: how properties are computed. Must stay: names of fields and properties, which effects (of users too),
+solvers and observables read; a default for a new field, so that `discretisation` may omit it; that a net is never
+changed in place. Bodies' and internal rows stand behind the nodes. Tests: ``tests/net/test_elements.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
 A corner of a face has numbers for position, texture and normal, ``f 1/4/2 ...``; only the first is used. A negative
 number counts backwards from the last point above it.
 
-`mesh_readers` and `boundary.surface_file` unpack the five parts of `read_obj` by position.
+May change: private functions, texts of errors, and `NO_GROUP`, names that count as no group. Must stay: the five parts
+of `read_obj` (points, lines, faces, groups of both) in this order, which `mesh_readers` and `boundary.surface_file`
+unpack. Tests: ``tests/net/test_faces.py``, ``tests/net/test_boundary.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Keys of lines that yield: yield stress, and hardening, a number or a curve of stress over plastic strain.
 
-`effects.plastic` needs equally many points in all curves; `LAW` is a name in `registry.LAWS`.
+May change: private functions and texts of errors. Must stay: names in `KEYS`, which are fields of `Cable` and `Group`;
+equally many points in the curves of all lines, which `effects.plastic` needs; `LAW`, a name in `registry.LAWS`. Tests:
+``tests/effects/test_plastic.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Rotations as quaternions (w, x, y, z) of any length but zero, and as rotation vectors [rad], in Python.
 
-`net.rotation` has those of compiled code; motions over time and attitudes of controls use these.
+May change: how they are computed. Must stay: the order (w, x, y, z) and rotation vectors in rad, which scenes,
+`effects.motion` and `dynamics.controllers` have. `net.rotation` has the same for compiled code. Tests:
+``tests/dynamics/test_attitude.py``, ``tests/effects/test_moved_bodies.py``.
 """
 
 from __future__ import annotations

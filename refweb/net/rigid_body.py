@@ -46,7 +46,11 @@ refuses a shape without one. An entry point of your package makes it known to sc
     wall = "my_webs.wall:Wall"
 """
 
-# This docstring is a page of the site, `test_body_shape` runs its code, and kernels read `Grown` by name.
+# This docstring is a page of the site and of `refweb help own-shape`. May change: its prose. Must stay: its code, which
+# tests/how_to/test_body_shape.py runs; names of fields and methods of `Shape` and `Grown`, which shapes of users give
+# and kernels of effects.contact read; names of fields of `RigidBody`, which effects, system and results read; rows of
+# bodies behind the nodes and rows of rotation behind these, which checkpoints name by `row_names`. Other tests:
+# tests/effects/test_contact.py, tests/effects/test_tumbling.py.
 
 from __future__ import annotations
 

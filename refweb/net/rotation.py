@@ -19,7 +19,11 @@ body. A body on an axle of direction n has W = n⊗n, and I about the axle: mome
 centre of mass is off the axle, a fixed row of the axle carries the row of the body as a node, and the kinetic energy
 counts its part of I once. The second component of the second row of rotation is the angle about the axle.
 
-Names in `apart` are keys of `dynamics.integrators.features`; the order of sums decides bits of bodies that turn.
+May change: private functions, `TURN`, `TERMS` and `SMALL`, as long as the flow stays exact to rounding. Must stay: the
+meaning of both rows of rotation (quaternion, q₀ − 1, angle about an axle), which `effects`, `system`,
+`results.observables` and checkpoints read; names in ``apart``, keys of `dynamics.integrators.features`; the order of
+sums, which decides the last digits of bodies that turn. Tests: ``tests/net/test_rotation.py``,
+``tests/effects/test_tumbling.py``, ``tests/effects/test_axles.py``.
 
 References
 ----------

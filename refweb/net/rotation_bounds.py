@@ -2,7 +2,9 @@
 
 See `refweb.net.rotation`.
 
-Names in `apart` are keys of `dynamics.integrators.features`; no bound may fall below the exact value.
+May change: a bound, if it stays above the exact value. Must stay: names in ``apart``, keys of
+`dynamics.integrators.features`; arguments and results, which `step_bound`, `ccd`, `explicit_loop` and `neighbour_list`
+of `dynamics.integrators` use. Tests: ``tests/net/test_rotation.py``.
 """
 
 from __future__ import annotations

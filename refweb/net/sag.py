@@ -3,7 +3,8 @@
 An inextensible rope under its weight is a catenary: with u half of the distance of its ends over the parameter of the
 curve, the sag over the distance is sinh²(u/2)/u and the length over the distance sinh(u)/u.
 
-`net.cable` alone calls `over_chord`; all else here is free.
+May change: all but `over_chord`, its argument (sag over distance) and its result (length over distance): `net.cable`
+alone calls it. Tests: ``tests/studies/test_form.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Single cables, straight or hanging on an arc.
 
-`registry.WEBS` names this class, `net.groups` makes the groups, and the class docstring is text of `refweb help`.
+May change: private functions, texts of errors, and `_PARALLEL`, a tolerance. Must stay: keys and docstring of
+`SingleCable` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); the order of nodes from
+end to end; the class name in `registry.WEBS`. Tests: ``tests/net/test_webs.py``.
 """
 
 from __future__ import annotations

@@ -8,7 +8,10 @@ it would count several times.
 A rim consists of two rows of arcs, shifted by half an arc. Each arc has one contact with the weight sin²(π ξ). The
 weights of both rows add up to 1 at the deepest point of the rim, so that a rolling rim has a constant force.
 
-`effects.contact` reads `PART` by name and width; other parts, or another order, change the bits of contact.
+May change: `MOST`, above which a mesh is refused; `FLAT`, which changes contact of meshes with bodies. Must stay:
+fields of `PART`, which `effects.contact` reads by name and width; numbers of `POINT`, `SEGMENT` and `ARC`; `ARCS`, on
+which contact of rims depends; the order of parts, which decides the last digits of contact between bodies. Tests:
+``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

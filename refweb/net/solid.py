@@ -3,7 +3,9 @@
 By Steiner's formula, a grown box consists of the box, its faces times a length, its edges times a disc and its corners
 times a ball. The moments of each part follow from those of the ball of that dimension.
 
-`Shape.volume` and `Shape.inertia` use these: a change moves mass and inertia of bodies that a density gives.
+May change: private functions and how sums are written, with the integrals in `BALLS`. Must stay: volume and tensor of
+inertia, which `Shape.volume` and `Shape.inertia` return: they are mass and inertia of bodies that a density gives.
+Tests: ``tests/net/test_rotation.py``.
 """
 
 from __future__ import annotations

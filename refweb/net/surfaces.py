@@ -1,6 +1,7 @@
 """Surfaces of a sphere and a tube as points and triangles, outward, for drawing.
 
-Pictures, frames and `commands.doubts` alone use surfaces: their resolution is free.
+May change: private functions, the number of triangles: only pictures, frames and `commands.doubts` use surfaces. Must
+stay: points and triangles that face outward, which `rigid_body` and `shapes.ring` return as ``boundary``.
 """
 
 from __future__ import annotations

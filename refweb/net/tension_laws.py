@@ -2,7 +2,9 @@
 
 Each law is a class of `refweb.net.laws`; `Law` evaluates one of them over arrays, without a net.
 
-`refweb` exports `Law`; `cable`, `law_keys` and `effects.thread` find laws by `law_of`.
+May change: texts of errors. Must stay: `Law` with its arguments and methods, which `refweb` exports; `law_of` and
+`names_in`, by which `cable`, `discretisation`, `law_keys` and `effects.thread` find laws. Tests:
+``tests/net/test_laws.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,10 @@
 """Threads of a net: lines through several nodes, with one tension.
 
-`effects.thread` makes the `ThreadLine`; results and statics read its properties by name.
+May change: `NEAR`, which decides when rings count as together; `TAUT` upwards, by which explicit steps are shorter.
+Must stay: fields and properties of `ThreadLine`, which `effects.thread` makes and effects, `results.observables` and
+`statics` read by name; the order in ``numbers`` (record, 1/A, then four columns for each segment), which
+`effects.thread_segments` reads; `COLUMNS`, the first numbers that a thread observes. Tests:
+``tests/effects/test_thread.py``, ``tests/effects/test_thread_friction.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Webs: nodes, lines between them and their natural lengths, and the selection of nodes and lines by name.
 
-`refweb` exports `Web`, whose arrays are read-only; words in `SELECTIONS` are the scene format.
+May change: private functions and texts of errors; `_TIE` decides which node is the centre. Must stay: fields and
+methods of `Web`, which `refweb` exports, with arrays that are read-only; words in `SELECTIONS`, which are the scene
+format; the order in which `find` and `find_lines` return numbers. Tests: ``tests/net/test_webs.py``,
+``tests/net/test_groups.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Drawn sections of a page: pictures, plots, and the three-dimensional view with its controls, as HTML.
 
-Scripts of the page find elements by ids in `_view` and read keys that `space` adds; `page.css` knows the classes.
+May change: sentences, `PEAK`, `HEAVIEST`, `LIKE_STRESS`, and the number of plots (`FIRST_PLOTS`, `LAST_PLOTS`). Must
+stay: ids of elements in `_view`, which ``view.js`` and ``hand.js`` find; keys that `space` adds to the head, which
+these scripts read; classes, which ``page.css`` knows. Tests: ``tests/pages/test_page.py``,
+``tests/pages/test_browser.py``.
 """
 
 from __future__ import annotations

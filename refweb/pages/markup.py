@@ -2,7 +2,9 @@
 
 A template engine, jinja2, would need 24 lines for the same elements in place of 23 here, and 5 more to load it.
 
-Notebooks escape their texts in `results.notebook`; `page.css` reads `wide`, `last` and `data-label`.
+May change: private functions and attributes that no style or script reads. Must stay: that each text that is no `Html`
+is escaped here (notebooks do so in `results.notebook`); ``wide``, ``last`` and ``data-label``, which ``page.css``
+reads; the form of `section`, by which `page` finds contents. Tests: ``tests/pages/test_page.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
 Positions become integers of 16 bits, values for colours integers of 8 bits, see `levels`. The page unpacks them with
 the ``DecompressionStream`` of the browser; `unpack` does the same in Python.
 
-`model.js` unpacks the same bytes, and repeats the levels of `VALUES` and `UNKNOWN` as numbers.
+May change: nothing on one side alone: ``model.js`` unpacks the same bytes, and repeats the levels of `VALUES` and
+`UNKNOWN` as numbers; `PLACES` fit into 16 bits. Must stay: `unpack` and `summed` as inverses of `pack` and
+`differences`. Tests: ``tests/pages/test_page.py``, ``tests/pages/test_browser.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
 """The page of a run: one HTML file without other files, from a result folder or a solution.
 
-`page.html` has the names that `filled` gives; contents are found by the form of `markup.section`. Scripts run in the
-order of `SCRIPTS`. The hash of a script is that of its text between the tags of `page.html`, line breaks included.
+May change: private functions, the order of sections and sentences. Must stay: names that `filled` gives, which
+``page.html`` has; the order of `SCRIPTS`, in which they run; the hash of a script, which is that of its text between
+the tags of ``page.html``, line breaks included: browsers run no other; `NAME`, the file, and `ENDINGS`. Tests:
+``tests/pages/test_page.py``, ``tests/pages/test_browser.py``.
 """
 
 from __future__ import annotations

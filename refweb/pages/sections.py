@@ -1,6 +1,8 @@
 """Sections of text and tables of a page: results, warnings, model, cost, scene and versions, as HTML.
 
-Keys are those of `run.json` and `scene.toml`, classes those of `page.css`; sentences belong in `results.summary_text`.
+May change: private functions, headings, `KINDS`, `LONGEST` and the order of rows; sentences belong in
+`results.summary_text`. Must stay: keys that are read, those of ``run.json`` and ``scene.toml``; classes, which
+``page.css`` knows; identities of sections, which are links. Tests: ``tests/pages/test_page.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """The sheet of a run as HTML: sizes, largest tension, margin of safety, and verdicts on the results.
 
-`page` puts this first, or alone on a page; sentences belong in `sheet_text`.
+May change: private functions and the order of tables; sentences belong in `sheet_text`. Must stay: `sheet`, which
+`page` puts first, or alone on a page; classes, which ``page.css`` knows; `NAME`, the file. Tests:
+``tests/pages/test_sheet.py``.
 """
 
 from __future__ import annotations

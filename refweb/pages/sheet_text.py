@@ -2,8 +2,10 @@
 
 The input is the content of ``run.json`` and of ``scene.toml``.
 
-Keys are those of ``web``, ``margin`` and ``utilisation`` in `run.json`; sentences are free. The value of `PACKING`
-stands in the help of `commands.report` as well.
+May change: private functions, sentences, and `BESIDE`, a tolerance. Must stay: keys that are read, those of ``web``,
+``margin`` and ``utilisation`` in ``run.json``; the value of `PACKING`, which stands in the help of `commands.report` as
+well, and `decision`, which `sizing.case` calls. Tests: ``tests/pages/test_sheet.py``,
+``tests/results/test_strength.py``.
 """
 
 from __future__ import annotations

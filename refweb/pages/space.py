@@ -8,7 +8,10 @@ translation and rotation in each frame.
 pyvista's ``export_html`` puts 1.0 MB of vtk.js, by trame-vtk 2.11, into each page, and shows one instant without a
 colour bar.
 
-Scripts of the page read keys of `head` and names and types of arrays, and `drawings.space` adds keys.
+May change: private functions, `LARGEST`, `MOST`, `HIDDEN`, `LEFT_OUT` and `FIRST`, which decide how many frames and
+which fields come first. Must stay: keys of `head`, and names and types of arrays, which ``model.js`` and ``view.js``
+read, and to which `drawings.space` adds keys; `places` and `values`, by which tests read them back. Tests:
+``tests/pages/test_page.py``, ``tests/pages/test_browser.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """The page of a study: statistics of its rows, a plot of each result, and the rows, as one HTML file.
 
-Sentences belong in `results.study_text`, classes in `page.css`; the order of sections is free.
+May change: private functions, the order of sections and `MOST_ROWS`; sentences belong in `results.study_text`. Must
+stay: `report`, which `commands.report` and `commands.sweep` call; classes, which ``page.css`` knows. Tests:
+``tests/sweeps/test_study_pages.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Balances of energy and momentum of a run as panels of a plot, with their errors.
 
-Names are those of `results.columns` and, of drifts, those of `run.json`; the drawing is free.
+May change: private functions and all of the drawing, `HATCHES` and `SMALL` among it. Must stay: names of columns that
+are read (`FLOATING`, `STORED`, `LOST`, `GIVEN`, `TOTAL`), those of `results.columns`, and of drifts, those of
+``run.json``; `energy`, `has_momentum` and `momentum`, which `plots` calls. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Cameras: projection of points to a page, and the choice of views that show the deformation of a web.
 
-`pages.space` takes its first view from here; names in `VIEWS` are values of ``--view``.
+May change: private functions, positions on the page (`ALONE` to `BESIDE`), `TANGENT`, `MANY`, and which view is chosen.
+Must stay: names in `VIEWS`, which are values of ``refweb picture --view``; methods of `View`, which `render`,
+`polygons`, `stage` and `pages.space` call; `choose` and `nearby`, from which `pages.space` takes its first view. Tests:
+``tests/pictures/test_pictures.py``, ``tests/pictures/test_large.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Panel of stress, tension or strain of lines over their distance from the point of impact or load.
 
-`FIELDS` are fields of frames, and `plots.kinds` makes names of plots of them; the drawing is free.
+May change: all of the drawing, and `MANY`. Must stay: `FIELDS`, which are fields of frames and of which `plots.kinds`
+makes names of plots (values of ``refweb plot --quantity``). Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

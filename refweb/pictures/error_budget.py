@@ -1,6 +1,8 @@
 """Picture of an error budget: the parts of ± of each result as a stacked bar, relative to its value.
 
-`PARTS` has at most as many entries as `sheet.COLOURS`: a part without a colour is left out silently.
+May change: all of the drawing, `MOST` among it. Must stay: `draw`, which `studies.further_runs` calls; a colour in
+`sheet.COLOURS` for each of `results.error_budget.PARTS`, as a part without one is left out silently. Tests:
+``tests/studies/test_further_runs.py``.
 """
 
 from __future__ import annotations

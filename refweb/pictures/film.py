@@ -3,7 +3,9 @@
 One renderer draws all frames. Title, axes and legend are drawn once, and for each frame only the web and its time.
 Frames are read, drawn and written one after the other, so that memory holds one of them.
 
-`commands.picture` gives its options as keywords to `animate`; sizes, colours and durations are free.
+May change: private functions, sizes, colours and durations, all constants among them. Must stay: names of the arguments
+of `animate`, to which `commands.picture` gives its options as keywords; one camera and one range of colours for all
+frames; one frame in memory at a time. Tests: ``tests/pictures/test_pictures.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,10 @@
 
 `read` reads a frame of a result folder, `frame_of` makes one from meshes in memory.
 
-`results.vtu` gives names of data, `results.folder` keys of the checkpoint; pictures and pages read `Frame` by name.
+May change: private functions and `POINTS_ALONG_A_CURVE`. Must stay: kinds of cells in `CELLS` and names of data that
+are read, which `results.vtu` gives, and keys of the checkpoint, which `results.folder` gives; fields of `Frame`, which
+pictures, pages and `gym.images` read by name. Tests: ``tests/pictures/test_pictures.py``,
+``tests/pictures/test_over_frames.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Panels of histories over time, of results over load steps and of frequencies of modes, with known ±.
 
-`plots` calls a function for each kind of plot, and each gives panels of `sheet`; the drawing is free.
+May change: private functions and all of the drawing, `OF_ALL` and `MOST_TICKS` among it. Must stay: the functions that
+`plots` calls, one for each kind of plot, each of which gives panels of `sheet`; `clock_of`, `tick_steps` and
+`bounds_of`, which `balances` and `distances` call. Tests: ``tests/pictures/test_plots.py``,
+``tests/pictures/test_limits.py``.
 """
 
 from __future__ import annotations

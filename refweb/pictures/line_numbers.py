@@ -1,6 +1,7 @@
 """Numbers of lines on a picture: lines with the largest values first, without overlaps.
 
-`pictures` writes the text that `number_lines` gives below the picture; all else is free.
+May change: all but `number_lines`, its arguments and its result, the text that `pictures` writes below the picture.
+Tests: ``tests/pictures/test_over_frames.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Elements of a model, the list of all that is drawn of a frame: tubes, balls and surfaces.
 
-`opengl` and `polygons` draw each class; a new one needs a function in both.
+May change: `FINE` and `COARSE`, the numbers of sides of tubes. Must stay: fields of `Tubes`, `Balls` and `Surface`,
+which `stage` makes and `opengl` and `polygons` draw: a new class needs a function in both; plain values, which travel
+to a child process. Tests: ``tests/pictures/test_large.py``, ``tests/pictures/test_pictures.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,9 @@ The ``open_gif`` of pyvista records one window of pyvista, but a page here has t
 for each image, the default of imageio and pillow, makes a file of 2.7 MB for the film of ``capture-stage``, with
 colours that change from image to image; one palette for all images makes 1.5 MB.
 
-A new ending needs a branch in `write` and stands in `ENDINGS`; `film` gives images of one size, each with its duration.
+May change: private functions, `COLOURS`, `ALMOST_WHITE` and the palette. Must stay: `write` for images of one size,
+each with its duration, as `film` gives them; `ENDINGS`: a new one needs a branch in `write`. Tests:
+``tests/pictures/test_pictures.py``.
 """
 
 from __future__ import annotations

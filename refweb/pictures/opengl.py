@@ -1,6 +1,9 @@
 """Drawing of models by pyvista, in a window or off screen as an image of each view.
 
-`render` calls `images` in a child process, which finds its window in `_off_screen`; lights and matter are free.
+May change: private functions but `_off_screen`, and all constants: lights, matter and numbers of corners. Must stay:
+`images` and `open_off_screen`, which `render` calls in a child process, and `_off_screen`, in which that finds its
+window; `plotter_of`, `aim`, `show` and `pixels_of`, which `window` calls. Tests: ``tests/pictures/test_large.py``,
+``tests/pictures/test_pictures.py``.
 """
 
 from __future__ import annotations

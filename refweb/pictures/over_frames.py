@@ -1,6 +1,8 @@
 """Fields over all frames of a run: the largest value of each line, and peaks of the run between frames.
 
-Fields have names of `LARGEST` and another field, which `stage` and `line_numbers` take apart.
+May change: private functions, `MISSED` and remarks. Must stay: names of fields, `LARGEST` and another field, which
+`stage` and `line_numbers` take apart; `on_frames`, `on_peak`, `with_largest` and `with_values`, which `pictures`,
+`film` and `commands.gradient` call. Tests: ``tests/pictures/test_over_frames.py``.
 """
 
 from __future__ import annotations

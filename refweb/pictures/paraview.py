@@ -1,6 +1,8 @@
 """Script that shows a run in ParaView: tubes, one range of colours, grey slack lines, bodies, time, camera.
 
-Keys of `given` are names in `for_paraview.template`, whose line `GIVEN = {}  # what is shown` stays letter by letter.
+May change: private functions and `SIZE`. Must stay: keys of ``given`` in `script`, which are names in
+``for_paraview.template``; the line ``GIVEN = {} # what is shown`` of that, which is replaced letter by letter;
+`TEMPLATE`, and `NAME`, the file, which `results.folder.RESULT_FILES` lists. Tests: ``tests/pictures/test_viewers.py``.
 """
 
 from __future__ import annotations

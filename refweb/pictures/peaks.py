@@ -1,6 +1,8 @@
 """The largest value of a quantity over a run, in particular of tension, from ``run.json`` and ``scene.toml``.
 
-Keys are those of `run.json` and `scene.toml`; `pages.sheet_text` reads fields of `Largest` by name.
+May change: words of `when`. Must stay: keys that are read, those of ``run.json`` and ``scene.toml``; fields of
+`Largest`, which `pages.sheet_text` and `over_frames` read. Tests: ``tests/pages/test_sheet.py``,
+``tests/pictures/test_over_frames.py``.
 """
 
 from __future__ import annotations
@@ -37,7 +39,7 @@ class Largest(NamedTuple):
     within: tuple[Any, ...] | None = None
 
     def times(self, factor, source):
-        """The same with all values times a factor."""
+        """A copy with all values times a factor."""
         error = None if self.error is None else factor * self.error
         within = self.within and tuple(factor * end for end in self.within)
         return self._replace(value=factor * self.value, error=error, within=within, source=source)

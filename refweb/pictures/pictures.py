@@ -5,7 +5,10 @@ cable, has one view along the normal of the plane. Colours have one range in all
 of it can be compared. Slack lines are grey if the field is a tension, stress or strain. No display is needed:
 `refweb.pictures.render` renders by OpenGL off screen, and `refweb.pictures.polygons` where it cannot.
 
-`refweb` exports `picture`, and `commands.picture` gives its options as keywords: their names stay.
+May change: private functions, `SIZE`, and `MOST_SCALED`, a limit of what is accepted. Must stay: names in `LABELS`,
+values of ``--labels``; names of the arguments of `picture`, which `refweb` exports and to which `commands.picture`
+gives its options as keywords; `target`, `drawn`, `png` and `record_of`, which pages, `film`, `plots` and
+`commands.gradient` call. Tests: ``tests/pictures/test_pictures.py``.
 """
 
 from __future__ import annotations

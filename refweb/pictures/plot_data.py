@@ -1,6 +1,7 @@
 """Data of a record for plots: history with units, results with ±, and the style among several records.
 
-Names and units come from heads of tables, ``NAME [unit]``; panels read properties of `Shown` by name.
+May change: private functions and texts. Must stay: properties of `Shown`, which panels read by name; names and units
+from heads of tables, ``NAME [unit]``, a file format. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,10 @@
 
 `kinds` lists the plots of a record, `draw` makes a figure of records, and `plot` writes a figure of result folders.
 
-Names of plots are values of ``refweb plot --quantity``; `LETTERS_STAY` and `BESIDE` make equal plots equal files.
+May change: private functions, titles, and which plots are usual. Must stay: names of plots, with `SPECTRUM` and
+`DISTANCE`, which are values of ``refweb plot --quantity``; arguments of `plot`, to which `commands.plot` gives its
+options; `draw`, `kinds` and `as_svg`, which pages call; `LETTERS_STAY` and `BESIDE`, which make equal plots equal
+files. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Tubes, balls and surfaces as depth-sorted polygons of matplotlib, for machines without OpenGL.
 
-`film` and `pictures` draw by this where `render` gives None; the drawing is free.
+May change: all of the drawing, and `PIECES`. Must stay: `polygons` and `flat_images`, which `pictures`, `film` and
+`gym.images` call where `render` gives None; a function for each class of `model`. Tests:
+``tests/pictures/test_pictures.py``.
 """
 
 from __future__ import annotations

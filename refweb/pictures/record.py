@@ -1,6 +1,9 @@
 """Records: summary, history and frames of a run, from a folder or memory, for pictures, plots and pages.
 
-Plots, pages and pictures know a run by `Record` alone; `studies.modes` gives the name ``frequency_N``.
+May change: private functions, `FRAMES_KEPT`, and texts in `OTHERS` and `CLOCKS`. Must stay: fields and methods of
+`Record`, by which alone plots, pages and pictures know a run; the same record by `of_folder` and `of_solution`;
+``frequency_N``, a name that `studies.modes` gives. Tests: ``tests/pictures/test_pictures.py``,
+``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

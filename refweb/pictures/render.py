@@ -5,7 +5,9 @@ process with a segmentation fault. A `Renderer` therefore renders in a child pro
 which it keeps for all frames of a film. It tries each kind of off-screen window in turn and returns None if none works.
 `refweb.pictures.polygons` then draws the same model with the same `refweb.pictures.camera.View`.
 
-None as an answer is a contract: `pictures` and `film` then draw by `polygons`.
+May change: `SECONDS_PER_FRAME` and the order of windows. Must stay: None as the answer where nothing can be rendered,
+as `pictures`, `film` and `gym.images` then draw by `polygons`; the child process, since VTK may end its process. Tests:
+``tests/pictures/test_pictures.py``.
 """
 
 from __future__ import annotations

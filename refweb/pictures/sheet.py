@@ -1,6 +1,8 @@
 """Sheets: layout of the panels of a plot one below the other, styles, labels and fonts, readable on a phone.
 
-All plots take styles from here; `COLOURS` has one for each part of `results.error_budget` at least.
+May change: all constants: sizes, fonts, marks, and colours that colour-blind people can tell apart. Must stay: at least
+as many `COLOURS` as `results.error_budget.PARTS`; names here, from which all plots take styles; extremes in `telling`,
+so that no peak is left out. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Trade-off of a sizing: what is least over the reserve of the tightest requirement, of all designs that were run.
 
-Keys are those of `sizing.size.Sized`; the drawing is free.
+May change: private functions and all of the drawing, `LOWEST` and `MOST_NAMES` among it. Must stay: keys that are read,
+those of `sizing.size.Sized.summary` in ``run.json``, and columns of ``results.csv``; `plot`, which `commands.size`
+calls; `NAME`, the file. Tests: ``tests/sizing/test_size.py`` (`front`).
 """
 
 from __future__ import annotations

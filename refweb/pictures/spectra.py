@@ -1,6 +1,8 @@
 """Spectra of histories with equal intervals: amplitude over frequency.
 
-`plots` offers a spectrum from `FEWEST` rows on; other constants change only the drawing and its texts.
+May change: private functions, the drawing and its texts, `DECADES` among it; `STANDS_OUT` and `WIDTH_OF_A_LINE`, by
+which peaks are named; `EVEN`, up to which rows count as even. Must stay: `FEWEST`, from which on `plots` offers a
+spectrum; amplitudes and frequencies of `spectrum_of`. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """The stage of a picture: the common parts of all pages of a film, and the drawing and labels of a frame.
 
-`pages.space` and `paraview` take colours and `UNITS` from here, so that all show a field alike.
+May change: private functions, colours and sizes here: `paraview` and `pages.space`, which takes `UNITS` as well, have
+them from this file, so that all show a field alike. Must stay: their names; fields of `Look` and methods of `Stage`,
+which `pictures`, `film` and `gym.images` use; `LARGEST`, which `over_frames` and `line_numbers` know. Tests:
+``tests/pictures/test_pictures.py``, ``tests/pictures/test_over_frames.py``.
 """
 
 from __future__ import annotations
@@ -127,7 +130,7 @@ class Seen(NamedTuple):
         )
 
     def spanned(self):
-        """The same limits by fewer points, which span the others to two hundredths of their extent."""
+        """These limits by fewer points, which span all points to two hundredths of their extent."""
         bodies = {name: outermost(points) for name, points in self.bodies.items()}
         return self._replace(points=outermost(self.points), supports=outermost(self.supports), bodies=bodies)
 

@@ -1,6 +1,8 @@
 """Plots of a study: one figure for each result, over the varying parameters, with ± and probabilities.
 
-Columns are those of `results.case_rows`; `pages.study` uses `draw` and `of_folder`; the drawing is free.
+May change: private functions and all of the drawing, `MOST_PANELS` and `MOST_GROUPS` among it. Must stay: columns that
+are read, those of `results.case_rows`; `draw` and `of_folder`, which `pages.study` calls, and `plot`, which
+`commands.sweep` calls. Tests: ``tests/sweeps/test_study_pages.py``, ``tests/pictures/test_limits.py``.
 """
 
 from __future__ import annotations

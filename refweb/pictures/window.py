@@ -1,6 +1,7 @@
 """Window of pyvista for a run: lines as tubes, slack lines grey, bodies, supports, and a slider over frames.
 
-`commands.view` calls `window`, and a test calls `prepared` off screen; all else is free.
+May change: all but `window`, which `commands.view` calls, and `prepared`, which it and a test use. Tests:
+``tests/pictures/test_viewers.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Parts of a docstring in the style of numpydoc.
 
-Docstrings of tables have sections of numpydoc for this; a change here changes `validation/REFERENCE.md`.
+May change: how sections are found. Must stay: titles of sections of numpydoc, which docstrings of tables have; what the
+functions return, of which `pages` and `schema` make help, ``validation/REFERENCE.md`` and the schema. Tests:
+``tests/reference/test_help.py``, ``tests/reference/test_schema.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
 A new word stands here before it stands anywhere else. Each entry is a term of structural mechanics, contact mechanics,
 numerical analysis or orbital mechanics, with the meaning that it has in this package.
 
-After a change ``python -m refweb help --markdown > validation/REFERENCE.md`` writes the reference anew.
+May change: private functions, entries and meanings; ``python -m refweb help --markdown > validation/REFERENCE.md`` then
+writes the reference anew. Must stay: the form of `GLOSSARY`; `explained` and `as_markdown`, which `commands.help`,
+`words` and the site call. Tests: ``tests/reference/test_help.py``, ``tests/reference/test_site.py``.
 """
 
 from __future__ import annotations

@@ -6,7 +6,9 @@ where they belong before anything is checked, so that they are refused, or not, 
 table of an effect, or the list of its tables, is left out where it is ``false``: ``self_contact = false`` is the scene
 whose lines do not touch each other.
 
-Users write these paths in ``--set`` and in study files, so that their form stays.
+May change: private functions, texts of errors and `LONGEST`. Must stay: the form of paths, which users write in
+``--set``, in study files and in requirements; `with_value`, which gives a new dict and changes none, for `scene`,
+`sweeps`, `sizing`, `gym`, `statics.gradients` and `dynamics.parameters`. Tests: ``tests/reference/test_paths.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """The JSON Schema of scene files, made of the tables that check them; of draft 4, which editors of TOML read.
 
-A new key of a table needs no change here, `reference.pages` uses `accepted`, and no file of the schema is stored.
+May change: private functions and descriptions. Must stay: `DRAFT`, draft 4 of JSON Schema, which editors of TOML read;
+that it accepts what the checks accept; `accepted`, which `pages` uses. A new key of a table needs no change here, and
+no file of the schema is stored. Tests: ``tests/reference/test_schema.py``.
 """
 
 from __future__ import annotations

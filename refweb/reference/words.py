@@ -1,6 +1,9 @@
 """Pages of the reference as text for a terminal and as Markdown.
 
-`as_markdown` makes `validation/REFERENCE.md`, which a test compares with it; `as_text` is free.
+May change: private functions, the layout of `as_text`, and texts in `RULES` and `MATERIALS_TEXT` (then write the
+reference anew). Must stay: `as_markdown` in step with ``validation/REFERENCE.md``, which ``python -m refweb help
+--markdown`` writes anew; keys of `HOW_TO`, which are names of guides on the site and in help. Tests:
+``tests/reference/test_help.py``, ``tests/reference/test_site.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,10 @@
 
 Statics and dynamics write these columns. No observable, event, body or group may have the name of one.
 
-`dynamics.history`, `state` and `pictures.balances` repeat some names of this file format; vectors stay last.
+May change: only with the file format of ``history.csv``. Must stay: names of columns, `FIRST`, `VECTORS` and `AXES`
+among them, some of which `dynamics.history`, `results.state` and `pictures.balances` repeat; vectors as the last;
+`taken`, by which `build` refuses the same name of an observable. Tests: ``tests/test_build.py``,
+``tests/results/test_results.py``.
 """
 
 from __future__ import annotations

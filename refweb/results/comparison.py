@@ -1,6 +1,8 @@
 """Comparison of result folders: agreement of their results within ±, and differences of their scenes.
 
-Keys of the result are those of `refweb compare --json`; `commands.console` prints it as a table.
+May change: private functions, `MEANINGLESS` and other texts. Must stay: keys of what `compare` returns, which are those
+of ``refweb compare --json`` and which `commands.console` prints; the rule of agreement in its docstring. Tests:
+``tests/results/test_comparison.py``.
 """
 
 from __future__ import annotations

@@ -16,8 +16,12 @@ Every verdict follows from ± and the parts alone:
 
 A result has n digits if ± is at most 10^−n of its value. There is no verdict if ± is small and a part is not estimated.
 
-Parts and verdicts stand in `run.json` and `results.csv`; a new part needs words, and a colour of `pictures.sheet`. The
-runs that show smoothing have `SMOOTHING_SHARE` of it, to which `SMOOTHED` belongs.
+May change: private functions and texts. `ALLOWED`, `FAR_WITHIN`, `ZERO`, `MOST_DIGITS` and `TOUCH` move the border
+between verdicts. Must stay: names of parts and verdicts (`PARTS`, `NONE`, `OPEN`, `VERDICTS`), which stand in
+``run.json`` and ``results.csv`` (a new part needs `WORDS` and a colour of `pictures.sheet.COLOURS`); `SMOOTHED`, which
+follows from `SMOOTHING_SHARE`, the smoothing of the runs in `studies.further_runs` and `statics.smoothing_error`; ± as
+the sum of the known parts; an effect is in `EXACT` only if more elements change nothing. Tests:
+``tests/results/test_error_budget.py``.
 """
 
 from __future__ import annotations

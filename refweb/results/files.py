@@ -1,6 +1,9 @@
 """Files that are whole or do not exist: they are written under another name and then moved. Numbers as text.
 
-The order of tables in `as_toml` decides the order of sums, and so the bits of a run that starts from the file.
+May change: private functions; names of files while they are written, which begin with ``.refweb-``
+(`results.folder.RESULT_FILES`). Must stay: that a file is whole or not there; `number`, which reads back to the same
+float; the order of tables in `as_toml`, by which forces are added up: another order changes the last digits of a run
+from that file. Tests: ``tests/test_scene.py``, ``tests/test_faults.py``.
 """
 
 from __future__ import annotations

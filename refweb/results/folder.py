@@ -3,7 +3,10 @@
 ``history.csv`` grows by whole rows. Every other file is written under another name and then moved. The row of a frame
 is written first, then the frame and the checkpoint of its state, and then its entry in ``web.pvd``.
 
-A new file belongs in `RESULT_FILES`; `dynamics` and `pictures.frames` read keys of the checkpoint.
+May change: private functions and texts of errors. Must stay: names of files and `TABLES`, each of which `RESULT_FILES`
+lists (``--force`` removes these alone; a new one goes there); keys of the checkpoint, which `dynamics` and
+`pictures.frames` read; the order in which a frame is written; ``run.json`` as last of a copy. Tests:
+``tests/results/test_results.py``, ``tests/test_faults.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Display of a scene and of a solution in a notebook, as HTML.
 
-`Scene` and `Solution` show these parts; all texts of users are escaped here.
+May change: all of the look. Must stay: `of_solution` and `of_scene`, which `solution` and `scene` call; that each text
+of a user is escaped here. Tests: ``tests/results/test_loaded.py``.
 """
 
 from __future__ import annotations

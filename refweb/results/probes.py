@@ -6,8 +6,11 @@ strain of each element, shape (cells, 2 or more). ``rows`` and ``data`` are para
 be the output of a force term for its cells. If ``where[1]`` is `PLACE`, the probe writes the row or element of its
 value to ``where[0]``.
 
-A change of `PROBE` changes all kernels here, in `observables` and in plug-ins; `extremes` has loops of its own for what
-`plain_of` knows.
+May change: private functions; how a value is found, if it stays the same to the last digit. Must stay: the signature
+`PROBE`, which kernels here, in `observables` and in plug-ins have; ``where[0]`` and ``where[1]``; numbers of
+`MAGNITUDE`, `PLACE`, `NODES`, `LINES` and of sources, which kernels read; parameters in ``rows`` as each docstring
+says; `plain_of`, as `dynamics.integrators.extremes` has loops of its own for what it knows. Tests:
+``tests/results/test_probes.py``, ``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

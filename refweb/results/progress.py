@@ -1,6 +1,8 @@
 """Progress of a run: a bar in a terminal, a line in a notebook, and a line now and then where there is neither.
 
-`runner` and verbs pass ``tell(text, share)`` on; a phase is known by its text without numbers, else texts are free.
+May change: `DELAY`, `APART`, `EVERY`, `BEGUN`, private functions and texts. Must stay: `followed` and the call
+``tell(text, share)`` that it yields, which `runner` and verbs pass on; a phase is known by its text without numbers,
+before the first comma. Tests: ``tests/results/test_loaded.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Provenance of a result: sizes of the web, versions of the libraries that solved it.
 
-Keys stand in `run.json`; a file without ``refweb`` in ``versions`` is foreign to `folder.read_summary`.
+May change: private functions; `LIBRARIES`, `OPTIONAL` and `PLOTTING`, the libraries whose versions are noted. Must
+stay: keys of `web_of` and `versions`, which stand in ``run.json``; ``refweb`` among the versions, without which
+`folder.read_summary` takes a file for foreign. Tests: ``tests/results/test_results.py``.
 """
 
 from __future__ import annotations

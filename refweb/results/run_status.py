@@ -1,6 +1,8 @@
 """End of a run and its cost: status, message and time, also after an error.
 
-Status words and keys of `cost` stand in `run.json`; pictures, pages and studies read them by name.
+May change: private functions and how time is measured. Must stay: words of status ("solved", "failed", "interrupted")
+and keys of ``cost`` (``cpu_s``, ``wall_s``, ``compile_s``), which stand in ``run.json`` and which pictures, pages and
+studies read. Tests: ``tests/results/test_run_status.py``.
 """
 
 from __future__ import annotations

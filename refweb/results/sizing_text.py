@@ -1,6 +1,7 @@
 """Results of a sizing as text: its free numbers, requirements and what governs, for the console.
 
-Keys are those of `sizing.size.Sized`; texts are for readers and free.
+May change: all texts, which are for readers. Must stay: keys that are read, those of `sizing.size.Sized.summary`; the
+functions, which `commands.console` calls. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """The data of a solution: attributes that a run fills in, and their form in ``run.json``.
 
-Keys of `summary` and `plain` are the format of `run.json`; statics, dynamics and studies fill fields by name.
+May change: the text that `Names` shows, and words in `OTHER_ERRORS`, not its keys. Must stay: keys of `summary` and
+`plain`, the format of ``run.json``, which `read_results`, pictures, pages and users read; names of fields, which
+statics, dynamics, `studies.modes` and users fill or read (a new one needs a default, so that older files can be read).
+Tests: ``tests/results/test_results.py``, ``tests/results/test_loaded.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """State of a net at an instant, and the quantities that follow from it.
 
-Observables, frames and remarks read properties by name; codes of findings stand in `findings.CODES`.
+May change: `STIFF`, `MUCH` and texts of findings. Must stay: names of properties, which observables (of users too),
+frames and remarks read; keys of `margin_of`, which stand in ``run.json``; codes of findings, which stand in
+`refweb.findings.CODES`. Tests: ``tests/results/test_results.py``, ``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Largest stress over strength of a run, its ±, and findings on it.
 
-`plain` is the format of `run.json`, which `read_utilisation` reads; `UTILISATION` stays a tuple.
+May change: texts of findings, and `ALIKE`, a tolerance. Must stay: keys of ``plain``, which stand in ``run.json`` and
+which `read_utilisation` reads; `UTILISATION`, a tuple, so that no name of a result is equal to it; `Utilisation`, which
+statics and dynamics fill. Tests: ``tests/results/test_strength.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Results of a study as text: rows for each result, condition and index, for the console and the page.
 
-Keys are those of `sweeps.study_result` and `sweeps.chances`; texts are for readers and free.
+May change: all texts, which are for readers. Must stay: keys that are read, those of `sweeps.study_result` and
+`sweeps.chances`; the functions, which `commands.console` and `pages.study` call. Tests:
+``tests/sweeps/test_study_pages.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Numbers of a throw: opening of the mouth of a net over time and distance, and its cover of a target at the end.
 
-Names of numbers stand in `run.json` and in conditions of studies; the class docstring is text of `refweb help`.
+May change: private functions, `NO_TWIN` and other texts. Must stay: keys and docstring of `Throw` (scene format and
+help; after a change write ``validation/REFERENCE.md`` anew); names of numbers in `UNITS`, `FLAGS` and `numbers`, which
+stand in ``run.json`` and in conditions of studies. Tests: ``tests/results/test_throw.py``, against closed forms.
 """
 
 from __future__ import annotations

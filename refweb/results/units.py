@@ -1,6 +1,9 @@
 """Numbers as text for readers: values with their ± in readable units, in one notation.
 
-No program reads these texts, but tests pin their notation; `run.json` has plain numbers.
+May change: private functions; `PREFIXES`, `FIXED` and `MOST_DIGITS` with the tests that pin the notation alone: no
+program reads these texts, ``run.json`` has plain numbers. Must stay: `prefixed`, `scale_of`, `with_error`, `readable`
+and their arguments, which the console, pages and pictures call, so that all show a number alike. Tests:
+``tests/results/test_loaded.py``.
 """
 
 import math

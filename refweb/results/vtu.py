@@ -1,6 +1,8 @@
 """A state as meshes of its web and its bodies: points, cells and data of both; and their VTU files.
 
-Names of data are a file format: `net.mesh_file`, `pictures.frames` and ParaView read them.
+May change: private functions; `SHAPE_SIZE`, the drawn size of a mode. Must stay: names of data, a file format that
+`net.mesh_file`, `pictures.frames` and ParaView read (a new one may be added); points in the order of the net's nodes.
+Tests: ``tests/results/test_frames.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Run of a design in a worker: results, sizes of the web, margin, frequencies, and derivatives by free numbers.
 
-`Task` travels to workers by pickle; its cells are columns of `results.csv`, and `slope_of` names those of derivatives.
+May change: private functions, `NEAR` and `MOST`, how many lines and nodes have derivatives of their own, and `STEP`.
+Must stay: names in `QUANTITIES` (`SIZES`, `STRENGTH`, `FREQUENCY`), which formulas of users have; fields of `Task`,
+which travels by pickle; names of columns by `slope_of` and `part_of`, which `smooth` reads in ``results.csv``. Tests:
+``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

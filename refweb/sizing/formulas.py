@@ -2,6 +2,10 @@
 
 A requirement ``a > b`` has the reserve (a − b)/|b| where b is a number that is not 0, else a − b: it holds where its
 reserve is above 0. Parts of ``and`` have a reserve each, of ``or`` the largest one counts.
+
+May change: private functions and how trees are walked; `FALSE` and `TRUE`, of which only the sign counts. Must stay:
+the sign and scale of a reserve, on which `problem`, `runs` and `smooth` rest; value and gradient of one formula;
+intervals that are never narrower than the exact ones. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

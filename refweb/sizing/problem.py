@@ -1,6 +1,8 @@
 """Problem of a sizing: the space of designs with the formulas of what is least and what is required, checked.
 
-Names in formulas are those of results, of free numbers and of `refweb.sizing.case.QUANTITIES`.
+May change: private functions, texts of errors, and `ALIKE`. Must stay: names in formulas, which are those of results,
+of free numbers and of `refweb.sizing.case.QUANTITIES`; attributes of `Problem`, which `size`, `runs`, `search` and
+`smooth` read; that all of the file is checked before the first run. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Requirements: the table of a requirements file, with a scene, free numbers, conditions and what is least.
 
-Keys are the format of requirements files, and the docstring of `Sizing` is text of `refweb help`.
+May change: private functions, texts of errors, `MOST_RUNS` and `MOST_WHOLE`. Must stay: keys, defaults and docstring of
+`Sizing` (format of requirements files and help; after a change write ``validation/REFERENCE.md`` anew); names in
+`METHODS` and `KEYS`; `SCENE_FILE`, a file of the folder; `Free`, `Listed` and `Catalogue`, which `space` reads. Tests:
+``tests/sizing/test_size.py``, ``tests/sizing/test_shipped_sizings.py``.
 """
 
 from __future__ import annotations

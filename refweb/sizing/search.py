@@ -3,6 +3,11 @@
 Each runs designs by `refweb.sizing.runs.Runs`; all but gradients leave it to `best` to choose among them. In a search
 without gradients undecided requirements count as not met.
 
+May change: private functions; `MOST_COMBINATIONS`, `FEW`, `RESERVES`, `BESIDE` and `VIOLATED`, which decide which
+method runs, how many designs, and which of these is taken. Must stay: `method_of`, `searched` and `best`, which `size`
+calls; names of methods, which are those of `requirements.METHODS`; seeds, by which a sizing that continues finds its
+runs again. Tests: ``tests/sizing/test_size.py``.
+
 References
 ----------
 R. Storn and K. Price, J. Global Optim. 11 (1997) 341–359, doi:10.1023/A:1008202821328.

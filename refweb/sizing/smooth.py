@@ -13,6 +13,11 @@ leave, is a difference of runs.
 A largest value has a kink where two lines or nodes share it. A condition that this value is below a limit is one for
 each of these that is close to it, and each of these is smooth. An objective with a largest value is a further variable
 t, which is least, with t ≥ f of each that is close.
+
+May change: `INSIDE`, `STEP`, `PRECISE`, `BY_DIFFERENCES`, `NEAR`, `ACTIVE`, `ROUNDED` and `FARTHEST`, by which an
+optimum is found within other tolerances and takes more or fewer runs. Must stay: `Smooth` and what it returns, an
+`Optimum`, which `search` takes; columns that are read, by `case.slope_of` and `case.part_of`; conditions of an optimum,
+which tests check. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

@@ -2,6 +2,11 @@
 
 A design is a fraction of its range for each number between bounds, and the number of an option for everything else:
 listed values, whole numbers, rows of a catalogue and scenes.
+
+May change: private functions and texts of errors. Must stay: the order of free numbers and options in a `Design`, which
+`problem`, `runs`, `search` and `smooth` count by; `SCENE`, a name in conditions, and the paths of `DIAMETER`; the
+starts for a seed, by which a sizing that continues finds its runs again. Tests: ``tests/sizing/test_size.py``,
+``tests/sizing/test_shipped_sizings.py``.
 """
 
 from __future__ import annotations

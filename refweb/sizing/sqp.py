@@ -13,6 +13,10 @@ SLSQP of scipy takes μ close to the multiplier, for which this function is near
 the optimum, and steps become a tenth as long again and again: one variable and one active constraint take 100
 evaluations in place of 5. A step is taken as well if the next one is at most half as long: near the optimum differences
 of f are those of rounding, and steps still lead to it.
+
+May change: private functions; `FIRST`, `LONGEST`, `SHORTEST`, `ROUNDS`, `RELAXED` and `CURVED`, by which it takes more
+or fewer evaluations. Must stay: arguments and results of `minimise`, which `smooth` calls; that it takes no random
+numbers, so that a sizing that continues finds its runs again. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,9 @@ The clock of `refweb.studies.trials` measures the time. The more runs a method h
 run may take a third of the remaining budget. A run that is expected to take more is left out, and a run that takes more
 is ended. The coarsest run of a method may always take a twentieth of the budget.
 
-`cost`, `diagram` and `console` read the statuses that are set here by name; all constants are free.
+May change: all constants (`SHARE`, `TURN`, `FAIR`, `CHEAP`, `REPEATS`), which decide the order and the number of runs,
+not their results. Must stay: statuses that are set here, which `cost`, `diagram` and `commands.console` read by name;
+`climb` and `compile_all`, which `work_precision` calls. Tests: ``tests/studies/test_cost.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Cost of correct digits: all runs, their references, the cost in words, and the result folder.
 
-`COLUMNS` are those of `cost.csv`; keys of `summary` are those of `run.json`, which `commands.console` prints.
+May change: private functions; sentences, and `DIGITS`, of which the cost is reported. Must stay: `COLUMNS` of
+``cost.csv``; keys of `summary`, which are those of ``run.json`` and which `commands.console` prints; attributes of
+`Cost`, which `refweb` exports. Tests: ``tests/studies/test_cost.py``.
 """
 
 from __future__ import annotations

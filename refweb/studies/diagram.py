@@ -1,6 +1,7 @@
 """The work–precision diagram: errors against CPU time, one curve per method, with failures and unknown errors.
 
-Statuses and fields are those of `trials.Trial`; the drawing is free.
+May change: all of the drawing, `STYLES` and `OUTSIDER` among it. Must stay: statuses and fields that are read, those of
+`trials.Trial`; `diagram`, which `cost` calls. Tests: ``tests/studies/test_cost.py``.
 """
 
 from __future__ import annotations

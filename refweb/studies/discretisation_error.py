@@ -4,7 +4,9 @@ A scene is solved with two and with four times as many elements. Let the first d
 the error of the scene is q/(q − 1) times the first difference. `MARGIN` is a factor of safety, since q may not be
 constant yet.
 
-`further_runs` uses `left_of` and `MARGIN` for its runs; all constants change ± of results.
+May change: private functions and texts. Must stay: `left_of` and `MARGIN`, which `further_runs` uses for its own runs,
+and `discretisation_errors`, which `runner` calls. `FINER`, `SLOWEST`, `FASTEST` and `MARGIN` change ± of results.
+Tests: ``tests/dynamics/test_accuracy.py``.
 """
 
 from __future__ import annotations

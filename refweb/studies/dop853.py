@@ -1,7 +1,8 @@
 """An independent method for `refweb.studies.work_precision`: scipy's DOP853 with the same forces.
 
 It shares forces, monitors and starts with the methods of refweb and no formula for a step, so that it stays an
-independent reference. `trials`, `cost` and `diagram` read `NAME` and `TOLERANCES`; other tolerances only move points.
+independent reference. May change: `TOLERANCES`, which moves points of the diagram. Must stay: that independence;
+`NAME`, which `trials`, `cost` and `diagram` read. Tests: ``tests/studies/test_cost.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,9 @@ Lines with a force density, T = q l, or a constant force find a shape whatever t
 have these tensions in that shape where their natural lengths are L = l/(1 + ε(T)). The mass of a line follows its
 natural length: where weight acts, shape and natural lengths are found in turn.
 
-`refweb` exports `form`; a new key of a table that selects nodes belongs in `SELECTED`.
+May change: private functions, `ROUNDS`, `SETTLED` and `STAYS`, limits of the iteration. Must stay: `form`, its
+arguments and result, which `refweb` exports; `SELECTED`, which holds all keys that select nodes: a new one goes there.
+Tests: ``tests/studies/test_form.py``.
 
 References
 ----------

@@ -16,7 +16,10 @@ this matrix are forms of φ_i and of (φ_i + φ_j)/√2, in axes that turn of (�
 ± holds besides the errors of the equilibrium those of the shapes, by their residuals and by rounding. A change of L
 bends a shape by δφ with L δφ = −(δL) φ, where as many components as there are equal frequencies stay [2]_.
 
-`modes` calls `FrequencyGradients`; names of results are those of `modes`.
+May change: private functions; `STEPS`, `FIRST`, `SHRINKS` and `ENOUGH`, by which differences are made; `MOST`,
+`ROUNDED` and `OPPOSED`, limits of what has a gradient. Must stay: `FrequencyGradients`, which `modes` calls, and
+`NAME`, by which `commands.gradient` knows a frequency; names of results, which are those of `modes`; ± that covers the
+error. Tests: ``tests/studies/test_frequency_gradients.py``.
 
 References
 ----------
@@ -143,7 +146,7 @@ class Equal:
         return [Mode(self.squared, shape, self.sign) for shape in (*shapes, *(m / np.sqrt(2.0) for m in mixed))]
 
     def change(self, rest):
-        """Change of a shape where L of it is a rest, without a share of these shapes."""
+        """Change δφ of a shape with L δφ = −``rest``, without parts along the shapes of this frequency."""
         bent = np.zeros(len(self.shapes), dtype=np.result_type(rest, self._matrix))
         if self._lu is not None:
             bent[self._bent] = -self._lu.solve(rest[self._bent].astype(self._matrix.dtype))

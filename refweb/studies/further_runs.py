@@ -15,7 +15,10 @@ small nets that are thrown at a sphere. Its median is 2.4 and 3.9 times the true
 "determined" has an error that its digits do not allow. The four results of captures outside ± are forces of contact:
 three peaks and a mean.
 
-Texts of variants are keys in `TELLING`; keys of `report` are those of `trust.json`, which `commands.console` prints.
+May change: private functions and texts of `report`. All constants change ± of results: ``python -m validation trust``
+is to be run after that. Must stay: texts of variants, which are keys in `TELLING`; keys of `report`, which are those of
+``trust.json`` and which `commands.console` prints; `FurtherRuns` and `write`, which `runner` calls. Tests:
+``tests/studies/test_further_runs.py``.
 """
 
 from __future__ import annotations

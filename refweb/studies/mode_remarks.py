@@ -1,6 +1,7 @@
 """Findings on natural frequencies: on each equilibrium, and on effects that the modes leave out.
 
-Codes stand in `findings.CODES`; texts are free.
+May change: texts. Must stay: codes of findings, which stand in `refweb.findings.CODES`; `remarks_on` and `left_out`,
+which `modes` calls. Tests: ``tests/studies/test_modes.py``.
 """
 
 from __future__ import annotations

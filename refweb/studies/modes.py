@@ -1,6 +1,9 @@
 """Natural frequencies and mode shapes of a scene: an equilibrium, and the small vibrations about it.
 
-`_rows` has the order of `COLUMNS`; `summary_text` reads names of `_described`, and `pictures.record` `frequency_N`.
+May change: `MAX_MODES`, and texts. Must stay: `COLUMNS` of ``modes.csv``, whose order `_rows` has; names of
+`_described`, which stand in ``run.json`` and which `results.summary_text` reads; ``frequency_N``, which
+`pictures.record` and `sizing.case` know; `modes` and `Modes`, which `refweb` exports. Tests:
+``tests/studies/test_modes.py``, ``tests/studies/test_modes_with_bodies.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,10 @@ on (K − σM)⁻¹ with σ just below the wanted ω², so that a thousand slack
 none is missed, which matters where symmetry makes frequencies double. Nodes without mass have no frequency and follow
 the others.
 
-`spectrum` and `turning` call these methods; without the count of pivots after a search modes may be missed. Methods
-that use a factor need a shift before, by `bend` or `above`. `DENSE` decides only what is quicker.
+May change: `DENSE`, which decides only what is quicker. Must stay: `STRAIN` and `ROUNDING`, which say what counts as no
+stiffness; the count of pivots after a search, without which modes may be missed; the order of calls (a shift by `bend`
+or `above` before what uses a factor); methods of `Pencil`, which `spectrum` and `turning` call. Tests:
+``tests/studies/test_modes.py``.
 """
 
 from __future__ import annotations

@@ -6,7 +6,9 @@ act on its own state. The separation of the two motions shows how errors of this
 integrator. After the time at which less than one digit is left, results are statistical: several runs have a mean and a
 spread, and no run has more.
 
-Keys of `horizon` and `ensemble` stand in `run.json`; `further_runs` and `sweeps.case` read them by name.
+May change: private functions and texts. Must stay: keys of `horizon` and `ensemble`, which stand in ``run.json`` and
+which `further_runs` and `sweeps.case` read; `PERTURBATION`, with which the horizon in ``run.json`` changes; equal steps
+of both runs. Tests: ``tests/studies/test_horizon.py``, ``tests/dynamics/test_control.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,9 @@ No method alone can be a reference. All runs are compared with one of the two, a
 the two mean nothing. If all finest runs differ by about as much, as in chaotic motions, the best agreement may be luck,
 and the median difference counts. If all runs are of one kind, the references are the two finest of one method.
 
-`cost` and `diagram` read the attributes that `compare` sets.
+May change: private functions; `LUCK`, which decides when an agreement counts as luck. Must stay: the attributes that
+`compare` sets, which `cost` and `diagram` read; two methods of different kinds where there are any. Tests:
+``tests/studies/test_cost.py``.
 """
 
 from __future__ import annotations

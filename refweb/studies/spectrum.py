@@ -9,7 +9,9 @@ step.
 
 In a rotating frame K includes the centrifugal force, and `refweb.studies.turning` finds the modes with Coriolis forces.
 
-`modes` writes fields of `Spectrum` by name to `modes.csv` and `run.json`.
+May change: private functions; how bounds are found, if they cover the error. Must stay: names of fields of `Spectrum`,
+which `modes` writes to ``modes.csv`` and ``run.json``, and the order of frequencies; `spectrum`, which `modes` and
+`frequency_gradients` call. Tests: ``tests/studies/test_modes.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,10 @@ A `Trial` is a method at one setting. The methods of dynamics are those of `refw
 `refweb.dynamics.integrators.integrator.Variant` s, and scipy's DOP853. They run with one probe, the observable, and
 without peaks, files or step refinement.
 
-`budget` sets statuses and catches `OverBudget`; fields of `Trial` and keys of `work` are columns of `cost.csv`.
+May change: private functions, `SETTINGS`, from coarse to fine, and `PIECES`; `UNKNOWN`, `OUTSIDE` and `CALL`, which
+only guess times. Must stay: fields of `Trial` and keys of ``work``, which are columns of ``cost.csv``; `OverBudget`,
+which `budget` catches, and `clock`, its measure; labels of methods, those in `STATIC_LADDERS` among them. Tests:
+``tests/studies/test_cost.py``.
 """
 
 from __future__ import annotations

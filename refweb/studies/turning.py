@@ -14,7 +14,9 @@ straight line, which is a double frequency ω = Ω with one shape. For such nets
 of the first order system are computed. Here ω is a root of κ + ωγ − ω²μ = 0. A change of κ = φ*Kφ by e changes ω by at
 most the root δ of μδ² + √(γ² + 4κμ) δ = e. This is an estimate, which takes the shapes as exact.
 
-`spectrum` unpacks `Pairs` by position; the seed lets a run give the same result again.
+May change: private functions; `MOST`, up to which all eigenvalues are computed, and `SMALL`. Must stay: the order of
+the fields of `Pairs`, which `spectrum` unpacks; the seed, by which a run gives the same result again; `coriolis`, which
+`frequency_gradients` calls. Tests: ``tests/studies/test_turning.py``.
 
 References
 ----------

@@ -4,7 +4,8 @@ Trials of all methods, from coarse to fine, run within a budget, see `refweb.stu
 from one of two references of different kinds, see `refweb.studies.references`. A message says if all runs are of one
 kind.
 
-`refweb` exports `cost`, and `commands.cost` gives its options as keywords: their names stay.
+May change: private functions and texts of messages. Must stay: names of the arguments of `cost`, which `refweb` exports
+and to which `commands.cost` gives its options as keywords. Tests: ``tests/studies/test_cost.py``.
 """
 
 from __future__ import annotations

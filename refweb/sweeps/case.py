@@ -3,7 +3,10 @@
 The worker may be a process on another machine. The job contains the files that it needs. The outcome contains the cells
 of a row, and on demand ``run.json`` or an archive of the result folder.
 
-Jobs and outcomes travel by pickle as plain values and bytes; `cells_of` gives columns of `results.case_rows`.
+May change: private functions; how files are packed, on both sides (`packed`, `unpacked`) at once. Must stay: fields of
+`Job` and `Outcome`, which travel by pickle to other machines as plain values and bytes; columns of `cells_of`, which
+are those of `results.case_rows`; `solve`, which workers call. Tests: ``tests/sweeps/test_sweep.py``,
+``tests/sweeps/test_workers.py``.
 """
 
 from __future__ import annotations
@@ -69,7 +72,7 @@ class Outcome(NamedTuple):
 
 
 def machine():
-    """This machine and process."""
+    """(Name of this machine, number of this process)."""
     return socket.gethostname(), os.getpid()
 
 

@@ -1,6 +1,8 @@
 """The cases of a study: the values of each case, and its scene, made of the base scene.
 
-Another digest by `key_of`, or another order of samples, runs all cases of stored studies again.
+May change: private functions and texts of errors. Must stay: the digest by `key_of`, its length `KEY`, and the order of
+samples and of cases: with others all cases of stored studies run again. `sizing`, `episodes` and `sweep` call this
+file. Tests: ``tests/sweeps/test_sweep.py``, ``tests/sweeps/test_chances.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
 """Learning environments of scenes: the table ``[gym]``, with inputs, observations, reward, end and draws of episodes.
 
 It knows no Gymnasium: a scene with the table is read, run and swept without that library. `refweb.gym` makes episodes.
-Keys are the format of scenes, and the docstring of `Gym` is text of `refweb help`.
+May change: private functions and texts of errors. Must stay: keys and docstring of `Gym` (scene format and help; after
+a change write ``validation/REFERENCE.md`` anew); `TIME` and `BEFORE`, names that formulas of users have. Tests:
+``tests/gym/test_environment.py``.
 """
 
 from __future__ import annotations

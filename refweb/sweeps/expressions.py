@@ -13,7 +13,10 @@ and x = 2 it leaves ``y > 2 and x > 3`` undecided, though it is false. Its metho
 are private, and it checks an expression only during evaluation. The library asteval gives a condition access to 387
 names.
 
-Operators and `FUNCTIONS` are the language of `skip` and `conditions` in study files of users: none is removed.
+May change: private functions, texts of errors, `LONGEST` and `DEEPEST` upwards. Must stay: operators and `FUNCTIONS`,
+the language of ``skip`` and ``conditions`` in study files and of formulas in requirements files: none is removed;
+intervals that are never narrower than the exact ones; that nothing but what was read here is run. Tests:
+``tests/sweeps/test_expressions.py``.
 """
 
 from __future__ import annotations
@@ -205,7 +208,7 @@ class Expression:
             raise self._refused(values) from None
 
     def _refused(self, values):
-        """The error of values of which it cannot be computed."""
+        """The error for values with which the expression cannot be computed."""
         return InputError(f"{quote(self.text)}: cannot be computed of {_values_text(values, self.used)}")
 
     def _truth(self, node, values):

@@ -1,6 +1,9 @@
 """Studies: the table of a study file, with a scene, its varying values, their sampling and conditions on results.
 
-Keys are the format of study files, and the docstring of `Study` is text of `refweb help`.
+May change: private functions, texts of errors and `MOST_CASES`. Must stay: keys, defaults and docstring of `Study`
+(format of study files and help; after a change write ``validation/REFERENCE.md`` anew); names in `DESIGNS`, `SAMPLES`
+and of distributions; `Range`, `Distribution` and `read_parameters`, which `sizing.requirements`, `episodes` and `gym`
+use. Tests: ``tests/sweeps/test_sweep.py``, ``tests/sweeps/test_study_pages.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Results of a study in memory: its rows, their statistics, and the content of its ``run.json``.
 
-`refweb` exports `Sweep`; keys of `summary` are those of `run.json`, which `study_text` and pictures read.
+May change: the text that a `Sweep` shows. Must stay: attributes of `Sweep`, which `refweb` exports; keys of `summary`,
+which are those of ``run.json`` and which `results.study_text`, pages and pictures read. Tests:
+``tests/sweeps/test_sweep.py``.
 """
 
 from __future__ import annotations

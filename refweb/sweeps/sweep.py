@@ -4,7 +4,10 @@ A study can continue from the state of its folder at any time. The files of a ca
 is appended as a whole. Therefore a study that is killed loses only the cases that its workers were running. The key of
 a row is a digest of its scene: another study with the same case finds it.
 
-`holds_rows` knows a message of `results.folder.check_folder` by its words "is not empty", which stay.
+May change: private functions and texts, `STUDIES` among them. Must stay: `sweep`, its arguments and result, which
+`refweb` exports; files of a case before its row, and rows that are appended as a whole; `holds_rows`, which knows a
+message of `results.folder.check_folder` by its words "is not empty"; `job_of` and `tidy`, which `sizing.runs` calls.
+Tests: ``tests/sweeps/test_sweep.py``.
 """
 
 from __future__ import annotations

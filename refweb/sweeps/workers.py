@@ -4,7 +4,9 @@
 find the job that kills its worker among those that ran at the same time. A job that has killed `TRIES` workers is given
 up.
 
-Of an executor of a user only `submit`, standard futures and, where it exists, ``_max_workers`` are used.
+May change: private functions, `TRIES` and `GLANCE`. Must stay: each outcome once from `through`; of an executor of a
+user only ``submit``, standard futures and, where it exists, ``_max_workers`` are used; `THREADS`, by which rows are the
+same in all processes. Tests: ``tests/sweeps/test_workers.py``.
 """
 
 from __future__ import annotations
@@ -100,7 +102,7 @@ class Processes:
 
 
 class Given:
-    """An executor that the caller has made and ends."""
+    """An executor that the caller has made, and shuts down."""
 
     local = False
 

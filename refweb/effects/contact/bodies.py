@@ -4,7 +4,10 @@ A cell is two bodies: the rows of both, and two rows of rotation of each. If a b
 position row fills their columns and is not read. The skeleton of a sphere is one point with the whole thickness. It
 determines the contact with another body, whose skeleton is then left out.
 
-`_pair` and `_side` write numbers in the order in which `BODIES`, `SIDE` and `pair` name them.
+May change: `MORE`, the space for further contacts, upwards, and messages. Must stay: `force_terms`, which `table`
+calls; the order in which `_pair` and `_side` write numbers, which is that of `BODIES`, `SIDE` and `pair`, read by
+`body_body_detection`; the six rows of a cell and `FELT_BY_BOTH`, which counts them; `PER_PART`, the limit of contacts
+in `contact_points`; the names "contact" and "body_contact_energy". Tests: ``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

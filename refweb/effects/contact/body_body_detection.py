@@ -7,8 +7,11 @@ sin²(π ξ). Each contact has the energy k/(p + 1) W δ^(p + 1). Since ξ is an
 With G = ∂δ/∂y at the contact point y, it is −k W δ^p G on the body with the skeleton, and the opposite on the other
 body, both at y. Therefore momentum and angular momentum are conserved to rounding.
 
-`bodies` writes `BODIES` and `SIDE` by position, `BEHIND` follows from two nodes of a line; friction remembers forces by
-``slot``, of which a part has three. Fields of `BODY_CONTACT` are read by name, and more `SAMPLES` only cost time.
+May change: `SAMPLES`, and how an extreme is searched. Must stay: the order of the fields of `SIDE` and `BODIES`, which
+`bodies` writes by position; the fields of `BODY_CONTACT`, which `body_body_penalty` and `body_body_friction` read by
+name; columns that are counted from these (`BEHIND`, `PAIR_WIDTH`, `TOUCHED`, …); the three values of ``slot`` of a
+part, by which friction finds its force of the step before; the order of contacts, which decides the last digits of
+results. Tests: ``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,9 @@ u is the velocity of the first body relative to the second at the contact point,
 each, so that a rolling sphere has no slip. F acts there on both bodies, with the moment a × F about the first body's
 row at the arm a. `refweb.effects.contact_solver` solves for F in a kick; such a contact moves two rotations.
 
-The law is that of `friction` and of `contact_solver`; `SLOTS` is the number of values of ``slot`` of a part.
+May change: how the kernels are written. Must stay: the law, which is that of `friction` and `contact_solver` and
+changes in all three; `SLOTS`, the number of values of ``slot`` of a part in `body_body_detection`; the order of what
+`kernels` returns, which `bodies` unpacks; kernel signatures. Tests: ``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

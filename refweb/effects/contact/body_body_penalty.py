@@ -5,8 +5,10 @@ y of a body is F on its row and the moment y × F on that of its rotation, y fro
 two bodies are differences of these forces, of order 2. Only iterations of implicit methods use them; results do not
 depend on them. With steps of `STEP` of the size of the bodies their errors are some 1e-9 of the largest entry.
 
-Force, energy and bound follow from one energy; `STEP` is free, and the bound may be too large, never too small. The
-bound covers damping and friction of `body_body_friction` as well, whose term has none of its own.
+May change: `STEP` and `FARTHEST`; `INWARD` and `CURVED` upwards alone, since the bound may be too large and never too
+small. Must stay: one energy from which force and bound follow; that the bound covers damping and friction, whose term
+has none; `force_of` and `slopes_of`, which `body_body_friction` calls, and the order of what `kernels` returns, which
+`bodies` unpacks. Tests: ``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

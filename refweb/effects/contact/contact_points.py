@@ -8,8 +8,11 @@ concave. It does not jump, and its force vanishes near an end, where the contact
 that bends away from the body may have two such ξ; the deeper one counts. Where both are equal, the energy has a kink
 and the force jumps.
 
-`penalty`, `friction`, `line_body_friction`, `line_body_ccd` and `body_body_detection` unpack `Places` by position, and
-its limit of 3 is `SLOTS` of `line_body_friction`.
+May change: how ξ is searched, and limits of the iterations. Must stay: the four entries of `Places` in their order,
+which `penalty`, `friction`, `line_body_friction` and `body_body_detection` unpack; three contacts of an element on a
+convex body, which is `SLOTS` of `line_body_friction`; the fields of `ContactPoint` and the mark `NOWHERE`; that
+`in_reach` and `reaching` miss no contact. Tests: ``tests/effects/test_contact.py``,
+``tests/dynamics/integrators/test_nearby.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -12,10 +12,11 @@ ring rotates about its normal only, other bodies as in `refweb.net.rotation`. Th
 matrices A = ∂F/∂y and B = ∂F/∂u, tangents follow from dF = A dy + B du + F dW/W, where dy, du and dW include the change
 of ξ. `refweb.effects.contact_solver` solves for F in explicit kicks.
 
-`contact_solver.friction_law` solves the same law in explicit kicks, so that both change together; `pair` has the layout
-of ``data``, and ``out`` has the power [W] and the force on the body [N]. `table` unpacks force, stiffness, bound and
-damping in this order; numbers of the bound may grow, and make steps shorter then. `facing` gives −n, as the law has
-only products of two n.
+May change: numbers of the bound upwards alone, which makes steps shorter; how tangents are written. Must stay: the law,
+which `contact_solver.friction_law` has once more for explicit kicks, so that both change together; the layout of
+``data``, which is that of `pair`; ``out`` with the power [W] and the force on the body [N]; the order force, stiffness,
+bound, damping, which `table` unpacks. `facing` gives −n: the law has only products of two n. Tests:
+``tests/test_contract.py``, ``tests/effects/test_contact_losses.py``.
 
 References
 ----------

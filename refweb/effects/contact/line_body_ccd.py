@@ -11,8 +11,10 @@ times the depth of the contacts. Let ξ be that of the largest W δ^(p + 1), W =
 ≤ δ/((p + 1) ξ), and the deepest point is at most ξ away: (p + 2)/(p + 1) ≤ `SHOWN`. In a body that is not convex, the
 largest gradient of depth gives a bound.
 
-``met`` gets two nodes, the row of the body and 1 where the line is in the core, which `integrators.ccd` and
-`penetration` read by position; `MIDDLE` and `SHOWN` follow from geometry.
+May change: `PARTS`. Must stay: the four entries of ``met`` (two nodes, the row of the body, 1 where the line is in the
+core), which `integrators.ccd` and `penetration` read by position; `MIDDLE` and `SHOWN`, which follow from geometry: the
+first may only fall, the second only rise; that no line which may pass is left out. Tests:
+``tests/effects/test_passage.py``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,10 @@ A sphere has one contact with a line, at the line's point nearest its centre, fo
 
 `far` and `touched` are inlined: a line out of reach then costs 4 ns, and 20 ns with calls.
 
-Shape functions are flat, by power and then node; `far` may say False of what is far, and never True of what may touch.
+May change: `SAMPLES` upwards. Must stay: shape functions as a flat tuple, by power of ξ and then by node, as `table`
+makes it; that `far` and `near` say no only where nothing can touch; what each function returns, as most files of this
+folder call them. Another order of sums changes the last digits of all results with contact. Tests:
+``tests/effects/test_contact.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations
@@ -142,7 +145,7 @@ def in_sphere(skin, x, cells, data, c, nodes, functions):
 
 @functools.cache
 def in_box(spins):
-    """The same of the sphere and of the box about the axes of a body, which it fills; spins as in `pairing`."""
+    """Kernel as `in_sphere`, for the sphere and the box around a body along its axes; spins as in `pairing`."""
     paired = pairing(spins)
 
     @kernel(forceinline=True)

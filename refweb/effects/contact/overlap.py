@@ -29,7 +29,11 @@ one for all lines at a node in place of their ends, with (1 − 2 ξ)²     0.00
 A line that turns by an angle θ round an edge with r θ < 2 L is pushed along by θ/4 (1 − r θ/(2 L))² of the push on
 average, whatever the stiffness, see `refweb.effects.contact.sharp_edges`.
 
-Keys of `plain` stand in ``run.json``, `runner` reads the stiffness of `too_soft`, and `line_body_ccd` uses `CORE`.
+May change: private functions and messages. Of the constants `SHARE`, `AIM`, `STIFFER`, `DEEPER` and `MOST_TIMES` decide
+which stiffness is chosen or refused, so that results of scenes without one move; `ROUGH`, `NOTED` and `TOLD` only when
+a finding comes; `ALONG` is measured. Must stay: keys of `Deepest.plain`, which stand in ``run.json``; the stiffness in
+the `PenetrationError` of `too_soft`, with which `runner` runs again; `CORE`, which `line_body_ccd`, `pair_overlap` and
+`statics.body_penetration` use; rows of `kept_edges`, which checkpoints keep. Tests: ``tests/effects/test_overlap.py``.
 """
 
 from __future__ import annotations

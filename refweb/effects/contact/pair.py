@@ -3,7 +3,10 @@
 Data of a cell begin with a `SPHERE` and the vectors from the centre to the cell's nodes in the web's position; behind
 these stands a `SURFACE`, which spheres alone do not need, and at the end a `TURNING` of a body that turns in space.
 
-`pair_data`, and `bodies` for bodies, write by position what `SPHERE`, `SURFACE` and `TURNING` name.
+May change: how the kernels are written. Must stay: names and order of the fields of `SPHERE`, `SURFACE` and `TURNING`:
+`pair_data` here and `bodies` write them by position, all kernels of this folder and `system.contact_shares` read them.
+A new field goes to all three; `AWAY` and `WIDTH` count them. Fields of `LINE_CONTACT` are read by name. Tests:
+``tests/effects/test_tumbling.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

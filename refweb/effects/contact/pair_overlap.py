@@ -8,7 +8,10 @@ The bound of explicit steps limits the approach to 0.2 times that distance times
 given size, it follows from the step and the largest speed of the run. Steps of CVODE and IDA are checked one by one,
 see `refweb.dynamics.integrators.passages`.
 
-Texts of `passage` and keys of `plain` stand in ``run.json``; `WAY` follows from the bound of `body_body_penalty`.
+May change: messages of findings. Must stay: "certified" and "not certified" of `passage` and the keys of ``plain``,
+which stand in ``run.json``; `WAY`, which follows from the bound of `body_body_penalty` (10 × speed over thickness);
+`record`, `note_way` and `note_met`, which `dynamics.simulation` and `statics.body_penetration` call. Tests:
+``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ class DeepestPair(Deepest):
 
     @property
     def name(self):
-        """Names of both."""
+        """Names of both bodies."""
         return " and ".join(f'"{body.name}"' for body in self.bodies)
 
     @property
@@ -111,7 +114,7 @@ class PairOverlaps:
         )
 
     def note_met(self, met):
-        """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.IntegratorState.crossings`."""
+        """Note the first pair that has met, a row of ``crossings`` of the state of an integrator."""
         self._met = met
 
     def refuse(self):
@@ -139,7 +142,7 @@ class PairOverlaps:
         return "certified"
 
     def _text(self, time, body_a, body_b, *_):
-        """The same of steps that were followed, of which two bodies have met at a time, or none."""
+        """Text of `passage` for steps that were checked one by one: two bodies have met at a time, or none have."""
         if not math.isfinite(time):
             return "certified"
         pair = next(pair for pair in self.deepest if [body.row for body in pair.bodies] == [body_a, body_b])

@@ -10,8 +10,11 @@ for the body, g = ∂δ/∂x and the matrix H = ∂²δ/∂x² at the contact po
 A rotating body has the moment y × F of its push F about its centre, with y from the centre to the line's point.
 `refweb.effects.contact.rotational_stiffness` has the stiffness of this moment.
 
-Layout of ``cells`` and ``data`` stands in `pair`; `friction`, `line_body_ccd`, `line_body_friction` and
-`body_body_penalty` import helpers, and `table` unpacks force, energy, stiffness and bound in this order.
+May change: `SPREAD`, `HOLLOW` and `SHALLOW` upwards alone, since bounds (those of `friction` and `body_body_penalty`,
+too) may be too large and never too small. Must stay: layout of ``cells`` and ``data``, which is that of `pair`; the
+order force, energy, stiffness, bound, which `table` unpacks; the helpers that `friction`, `line_body_ccd`,
+`line_body_friction` and `body_body_penalty` import. Force and stiffness follow from the energy. Tests:
+``tests/test_contract.py``, ``tests/results/test_contact_force.py``.
 """
 
 from __future__ import annotations

@@ -8,7 +8,9 @@ the start of a run, it is proven that nothing has passed. A line in the core at 
 The middle of a mesh is that of its field, see `refweb.net.boundary.field`. Walls that are thinner than nearly all of
 the surface are not checked.
 
-Texts of `status` stand in ``run.json``; `record` takes a row of the crossings, `would_pass` one without its time.
+May change: other words of messages. Must stay: texts of `status`, which stand in ``run.json``; the entries of a row of
+``crossings``, which `record` reads, and the same without its time for `would_pass`, which
+`integrators.central_difference` calls. Tests: ``tests/effects/test_passage.py``.
 """
 
 from __future__ import annotations

@@ -9,7 +9,9 @@ the centre and velocities v_b of all rows. Then the stiffness against a rotation
 The rows of the moment on the body follow from −Σ p_a × f_a with the forces f_a on nodes. A change of the quaternion
 rotates the body by δθ = 2 (q₀ δq − δq₀ q + q × δq)/|q|². All but the last is along the axes of the body.
 
-Blocks have nodes, body and rotation in this order, along the axes of the body: callers turn them afterwards.
+May change: how the sums are written. Must stay: blocks with nodes, body and rotation in this order, along the axes of
+the body, which `penalty` and `friction` turn to space afterwards; what the functions add, as tangents of both rely on
+it. Tests: ``tests/effects/test_tumbling.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -15,7 +15,9 @@ measured               1.00   0.77   0.58   0.47   0.39   0.15
 (1 − r θ/(2 L))²       0.97   0.81   0.64   0.42   0.36   0.09
 =====================  =====  =====  =====  =====  =====  =====
 
-`refweb.effects.contact.overlap` tells the `Edge` of a body.
+May change: private functions, `PRESSED` and how the edge is searched. Must stay: the fields of `Edge` in their order,
+since checkpoints keep them as rows by `overlap`, and the call of `sharpest_edge` there; the formula of the share, which
+``tests/statics/test_sharp_edges.py`` checks. Results do not depend on this file: `overlap` makes a finding of it.
 """
 
 from __future__ import annotations

@@ -5,8 +5,10 @@ the radius R the energy is ½ k (R − d)₊². The shape functions N of the ele
 Contact is thus the same for any number of elements. Let p be the vector from the centre to that point, ξ its coordinate
 on the element, p' = ∂p/∂ξ, and m = ∂(p·p')/∂q. Then the Hessian of ½ d² is BᵀB − m mᵀ/(|p'|² + p·p'') while 0 < ξ < 1.
 
-Force, energy and stiffness change together, ``out`` is a `TOUCH`, and the order of sums decides the bits of impacts.
-`friction` computes the push of spheres by kernels of its own: a change of the law is made in both.
+May change: how the bound is found, if it is not smaller. Must stay: one energy for force and stiffness; ``out`` as a
+`TOUCH`; the order of sums, which decides the last digits of all impacts of balls; the order force, energy, stiffness,
+bound, which `table` unpacks. `friction` finds the push of spheres by kernels of its own: a change of the law is made in
+both. Tests: ``tests/test_contract.py``, ``tests/effects/test_contact.py``.
 """
 
 from __future__ import annotations

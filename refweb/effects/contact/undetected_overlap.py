@@ -4,7 +4,9 @@ The overlap is checked once for every block of rows, for all shapes but rings, w
 the spheres around two bodies meet, points of the skeleton of each are compared with the depth in the other. This costs
 very little, and it may miss a short overlap.
 
-Checkpoints keep the array of `kept`, which counts pairs in their order here; constants are free.
+May change: private functions, `PLACES`, `LEAST` and `MOST`, which decide when a finding comes, and not results. Must
+stay: rows of `kept`, which checkpoints keep and `restore` reads: the number of a pair counts them in their order here;
+`silent_of`, which `dynamics.simulation` calls. Tests: ``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

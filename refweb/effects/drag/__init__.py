@@ -1,1 +1,4 @@
-"""Drag of a fluid on lines and bodies: its table, its force, and how explicit kicks solve for it."""
+"""Drag of a fluid on lines and bodies: its table, its force, and how explicit kicks solve for it.
+
+This file has no code. Must stay: its sentence, which ``tests/test_architecture.py`` compares.
+"""

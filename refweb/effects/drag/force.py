@@ -8,7 +8,9 @@ the velocity u = v − w of the node relative to the wind, u_t = (t·u) t and u_
 −∂F/∂u = c_n (|u_n| (I − t⊗t) + u_n⊗u_n/|u_n|) + 2 c_t |u_t| t⊗t is positive semidefinite, and F·u ≤ 0. A cell without
 direction, such as a body or an element without length, has t = 0, and all of u counts as u_n.
 
-``out`` is the power [W]; `table` zeroes the first two fields of `end_of`, and `implicit_drag` uses `drag_on`.
+May change: how the kernels are written. Must stay: the law in `drag_on` and `slope_of`, which `implicit_drag` solves in
+explicit kicks; ``out`` with the power [W]; the two coefficients as the first numbers of `end_of`, which `table` sets to
+0 at a break. Tests: ``tests/test_contract.py``, ``tests/effects/test_drag.py``.
 """
 
 from __future__ import annotations

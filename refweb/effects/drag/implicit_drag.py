@@ -11,7 +11,9 @@ without drag, or with the drag of the sweep before. Equations of different nodes
 solves all of them. Nodes that are attached to one body are an exception: M⁻¹ is then the block J M⁻¹ Jᵀ of
 `refweb.effects.contact_solver`, and their equations are coupled, which takes a few sweeps.
 
-The force is that of `force`; contacts of a row stand together, and the first has their number as ``group``.
+May change: `MOST_STEPS` and `CLOSE`. Must stay: the force, which is that of `force`; that contacts of a row stand
+together and the first has their number as ``group``, which `contact_solver` reads; signatures `DETECT` and `LAW`.
+Tests: ``tests/effects/test_drag.py``.
 """
 
 from __future__ import annotations

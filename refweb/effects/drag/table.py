@@ -2,7 +2,10 @@
 
 The force is in `refweb.effects.drag.force`, and its solver for explicit steps in `refweb.effects.drag.implicit_drag`.
 
-Cells of a node stand together for `implicit_drag`; `without` zeroes the first two numbers of `force.end_of`.
+May change: private functions, messages, and the coefficient of spheres `SPHERE`, which moves results. Must stay: keys
+and docstring of `Drag` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); cells of a node
+one after another, which `implicit_drag` takes as one group; the order of numbers of a cell, read by `force.end_of`, of
+which `without` sets the first two to 0. Tests: ``tests/effects/test_drag.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -10,8 +10,10 @@ Two elements that share a node meet if one folds flat onto the other: their dist
 from the other element. They do not push each other, nor do elements that are near along the net. Such meetings are
 reported, not prevented. A pair with a distance d needs no new check before rows have moved by d relative to each other.
 
-`meets` and `soon` have the signatures `MEETS` and `TIME_TO_CONTACT`; cells are pairs or single elements,
-`integrators.ccd` uses the last three entries of ``due``, and no change may miss a meeting.
+May change: `AHEAD`, which decides time alone; `LOOKS` upwards, by which fewer pairs count as meeting in doubt; `TRAVEL`
+downwards, which makes steps of implicit methods shorter. Must stay: signatures `MEETS` and `TIME_TO_CONTACT` of `meets`
+and `soon`; cells that are pairs or single elements; the last three entries of ``due``, which `integrators.ccd` uses;
+that no meeting is missed, which `MEETING` defines. Tests: ``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

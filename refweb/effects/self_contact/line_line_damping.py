@@ -11,8 +11,10 @@ motion does not change it. Its power m f·v is not positive. With K = −∂f/�
 
     −∂F/∂v = d f f/|f| where m > −1,        −∂F/∂x = m K − f ∂m/∂x,        ∂δ̇/∂x = K v/|f| − (f·v) K f/|f|³.
 
-Forces follow from `line_line_penalty.pushed`; `table` takes `force`, `stiffness` and `bound` by these names.
-`add_bounds` finds the depth from the energy of `line_line_penalty`, by 1.875 and the power 0.4: both change together.
+May change: how the kernels are written; `SHALLOW` upwards, by which explicit steps are shorter. Must stay: `pushed` of
+`line_line_penalty` as the source of all forces; the names `force`, `stiffness`, `damping` and `damping_bound` and
+`bound`, which `table` takes from this module; 1.875 and the power 0.4 in `add_bounds`, which find the depth from the
+energy of `line_line_penalty`: both change together. Tests: ``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

@@ -30,7 +30,9 @@ contact c.
 In explicit kicks `refweb.effects.contact_solver` solves for friction contact by contact, along the two directions for
 which J M⁻¹ Jᵀ has no mixed term. Only iterations of implicit methods use tangents of N, by differences.
 
-`contact_solver.friction_law` has the same law; `table` takes `force`, `stiffness` and `bound` by these names.
+May change: `STEP`. Must stay: the law, which `contact_solver.friction_law` solves in explicit kicks; the names `force`,
+`stiffness`, `bound`, `damping` and `KICKS`, which `table` takes from this module; `SLOTS`, the contacts of an element
+that are remembered. `ALIKE` changes results of parallel lines. Tests: ``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

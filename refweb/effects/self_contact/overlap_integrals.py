@@ -23,7 +23,9 @@ Gauss points on both lines needs many points if r is much smaller than an elemen
 
 An element without length has no direction; then I is 0, which is its limit.
 
-`line_line_penalty` reads the slopes of `first` in this order, and its closed form has the same energy.
+May change: `SHORT`, and how pieces are found; `PLACES` and `WEIGHTS` are exact for the degree above. Must stay: the
+integral I and its derivatives, as the closed form of `line_line_penalty` has the same energy; the order of the slopes
+of `first`, which that file reads by position. Tests: ``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

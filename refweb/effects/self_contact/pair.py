@@ -3,8 +3,10 @@
 Cells of a term are pairs, of the nodes of one element and of another, or elements of which any two may touch: then
 `refweb.effects.self_contact.search` makes pairs of them.
 
-`table` and `search.paired` write these fields by name; an element with the ``scale`` 0 is broken.
-`line_line_ccd.neighbours` writes `PAIR` as well, and only `touch`, `scale` and `vectors`.
+May change: how the kernels are written. Must stay: fields of `ELEMENT` and `PAIR` by name: `table` writes elements,
+`search.paired` pairs, and `line_line_ccd.neighbours` of pairs ``touch``, ``scale`` and ``vectors`` alone; `APART`, the
+column behind `ELEMENT`; the ``scale`` 0 of a broken element; that `apart` says so only of pairs that do not touch, for
+which `ROUNDING` may only rise. Tests: ``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

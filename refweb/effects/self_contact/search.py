@@ -4,7 +4,9 @@ A cell of the grid is as wide as the longest element plus the distance of the se
 element have their middles in the same cell or in a neighbouring cell, and the time is proportional to the number of
 elements. Elements that share a node make no pair, nor do those that are listed as near along the net.
 
-No change may miss a pair within reach, and the order of pairs decides the bits of results.
+May change: `BOXES`, the size of the grid. Must stay: that no pair within reach is missed, `REACH` included; what
+`near_pairs` and `paired` return, for all kernels of this folder; the order of pairs, which decides the last digits of
+results. Tests: ``tests/effects/test_self_contact.py`` compares with all pairs.
 """
 
 from __future__ import annotations

@@ -1,6 +1,10 @@
 """Contact of lines with lines: its table and its terms.
 
-`scene` calls `with_stiffness`; with more than `LISTED` pairs explicit steps alone take a web.
+May change: private functions, messages, `ROUNDING`, `LISTED`, `FAR` and `SOME`: with more than `LISTED` pairs explicit
+steps alone take a web. Must stay: keys and docstring of `SelfContact` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); `with_stiffness`, which `scene` calls; `BROKEN`, the column that breaks set to 0;
+"self_contact_energy", a column of ``history.csv``. Tests: ``tests/effects/test_self_contact.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,10 @@ The moments are those of tetrahedra from one point to each triangle [1]_: with t
 + c⊗c)/20. The point is the middle of the box around the surface. The library trimesh 5.2 takes the origin, and the
 inertia of a box at a distance of 1 km then has an error of 1e-5; here it is 3e-13.
 
-`shapes.mesh` repairs a surface that raises `NotClosedError`; any other `InputError` refuses the file.
+May change: private functions, texts of errors, and how triangles are turned outward. Must stay: `NotClosedError` for
+what `shapes.mesh` may repair (any other `InputError` refuses the file); fields of `Closed` and `Moments`, which
+`repair`, `shapes.mesh` and `shapes.terrain` read by name. `SAME`, `THIN` and `DENT` decide which files are taken.
+Tests: ``tests/net/test_boundary.py``.
 
 References
 ----------

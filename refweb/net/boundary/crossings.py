@@ -3,7 +3,9 @@
 Two triangles cross if an edge of one passes through the other. Each edge is compared with the triangles in the cells of
 a grid that the edge crosses, except triangles with a common corner.
 
-`winding` reads the lists of `triangles_by_cell`, in which cell (i, j, k) has the number (i n₁ + j) n₂ + k.
+May change: private functions; `MOST`, the size of the grid, which costs time alone. Must stay: what `triangles_by_cell`
+returns, with cell (i, j, k) as number (i n₁ + j) n₂ + k, which `winding` reads; the pair, or (−1, −1), of `crossing`,
+which `closed` reads. `ROUNDING` decides what counts as a touch. Tests: ``tests/net/test_boundary.py``.
 """
 
 from __future__ import annotations

@@ -6,7 +6,9 @@ intersections of the surface with a straight line along the third axis decides i
 normals, so that triangles without area do no harm. Signs of products decide which of two triangles with a common edge a
 line meets. The products of both are exact negatives of each other: no line passes between the triangles.
 
-`winding` calls `meets`, too; without ``fastmath=False`` there and in `_side` products are no exact negatives.
+May change: `SWEEPS` upwards. Must stay: arguments of `signed` and `unsigned`, which `field` calls, and of `meets`,
+which `winding` calls too; ``fastmath=False`` of `meets` and `_side`, without which products are no exact negatives and
+lines pass between triangles. Tests: ``tests/net/test_boundary.py``, with exact distances.
 
 References
 ----------

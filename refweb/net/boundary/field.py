@@ -11,7 +11,11 @@ which reproduces cubic polynomials [1]_: the field misses a smooth surface by O(
 waves beside edges are smaller than those of splines that interpolate δ: on the surface of a box gradients reach 1.09,
 not 1.19.
 
-Shapes keep their `Field`, since kernels read `numbers` at its address, in the order of `ORIGIN` to `HEAD`.
+May change: private functions; `BYTES`, and how thickness is found (`LOOKS`, `OPPOSITE`, `BEYOND`, `THINNER`), which the
+penetration check compares with. Must stay: the numbers of a field in the order of `ORIGIN` to `HEAD`, since kernels
+read them at their address; the `Field`, which shapes keep as long as kernels may read it; `GAP`, which `repair` uses.
+`AROUND` and the formula of c change depth, so contact of all meshes and terrains. Tests:
+``tests/net/test_boundary.py``, ``tests/effects/test_mesh_bodies.py``.
 
 References
 ----------

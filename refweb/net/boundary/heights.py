@@ -1,6 +1,8 @@
 """Terrain from heights: triangles between given points, and the solid block of ground below them.
 
-`shapes.terrain` relies on triangles that face up; its `FORMATS` names the suffixes that `places_of` reads.
+May change: private functions, texts of errors, and `UPRIGHT`. Must stay: triangles that face up, on which
+`shapes.terrain` relies; what `places_of`, `on_rim` and `above_ground` return. A new suffix also goes to `FORMATS` of
+`shapes.terrain`. Tests: ``tests/effects/test_ground.py``.
 """
 
 from __future__ import annotations

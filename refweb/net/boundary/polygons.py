@@ -3,7 +3,9 @@
 An ear is a corner that does not point inward and whose triangle holds no other corner. A polygon whose sides do not
 cross has at least two ears [1]_; the ear with the largest least angle is cut off first.
 
-None for sides that cross is a contract: `repair` then takes a cone, and `surface_file` refuses the file.
+May change: private functions, the choice of the ear, and `TOUCHES`, a tolerance of rounding. Must stay: triangles as
+numbers of corners, and None for sides that cross: `repair` then takes a cone, and `surface_file` refuses the file.
+Tests: ``tests/net/test_repair.py``.
 
 References
 ----------

@@ -3,7 +3,9 @@
 meshio reads STL. VTK reads VTP, in a separate process. `refweb.net.obj_file` reads corners and faces of OBJ: meshio
 does not accept the lists of textured files, and VTK rounds to 7 digits.
 
-A suffix in `READERS` stands in `FORMATS` of `shapes.terrain` and in docstrings of `file` and `heights`, too.
+May change: private functions; texts of errors, and `HARMLESS`, the kinds of cells that are ignored. Must stay: what
+`read` returns, which `heights` and `shapes.mesh` take; the suffixes in `READERS`, a file format: a new one also goes to
+`FORMATS` of `shapes.terrain` and to the help text of ``file`` and ``heights``. Tests: ``tests/net/test_boundary.py``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,9 @@ it is an integer: the number of times that a straight line from the point leaves
 that it enters. Winding numbers of parts add up: the union of overlapping parts is the set with a number above 1/2.
 Lines run along the third axis, and are compared with the triangles in their cell of a grid across that axis.
 
-`repair` unpacks `sums` in this order; `LINES` changes the mass of some repaired solids.
+May change: private functions; `MOST`, the size of the grid, which costs time alone. Must stay: the order of the ten
+integrals of `Winding.sums` (1, x, y, z, xx, xy, xz, yy, yz, zz), which `repair` reads by position. `LINES` changes the
+mass of some repaired solids. Tests: ``tests/net/test_repair.py``.
 
 References
 ----------

@@ -91,4 +91,6 @@ line with more than ``above_floor``; its tangent is exact where there is a ``cur
 A law that refweb ships is a line in `refweb.registry.LAWS` instead, and may have keys of its own in ``[cable]``.
 """
 
-# This docstring is a page of the site, and `tests/how_to/test_law.py` runs the code in it.
+# This docstring is a page of the site and of `refweb help own-law`. May change: the prose. Must stay: the first
+# sentence, which tests/test_architecture.py compares, and the code blocks in their order, which
+# tests/how_to/test_law.py runs.

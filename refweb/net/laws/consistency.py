@@ -6,7 +6,10 @@ Over a short interval of strain, the rise of the energy over that of strain lies
 stress of the interval, and the rise of the stress between the smallest and the largest tangent. This holds at kinks
 too, so that the smoothness of a law does not matter. The intervals have no gaps up to the largest strain.
 
-`net.discretisation` asks it for laws of other packages alone; strains and the tolerance are free, but for the gaps.
+May change: private functions, `STRAINS`, as long as the intervals have no gaps, `HALF_WIDTH`, `TOLERANCE`, `ROUNDING`,
+`PARTS`, `MOST` and texts of errors: all decide only which laws of other packages are refused. Must stay:
+`refuse_inconsistent`, which `net.discretisation` calls for laws that refweb does not ship. Tests:
+``tests/how_to/test_law.py``.
 """
 
 from __future__ import annotations

@@ -8,7 +8,10 @@ beyond the last one the last slope goes on. The energy is the exact integral.
 Kernels read the pieces of a curve from an array at an address that stands among the numbers of a line. The net keeps
 these arrays, `refweb.net.net.Net.kept`.
 
-Kernels here read `pieces` in the order of `WIDTH`; `Net` and `results.state` read ``last_strain`` by name.
+May change: private functions and how pieces are found. Must stay: numbers of a piece in the order of `WIDTH`, which
+kernels here and `statics.monotone_loading` read by position; the arrays, which `Net.kept` keeps alive; ``last_strain``,
+which `Net` and `results.state` read by name; stress, tangent, curvature and energy of one curve. Tests:
+``tests/net/test_curves.py``.
 """
 
 from __future__ import annotations
@@ -101,7 +104,7 @@ def beside(curve, slope):
 
 
 def _check(points, unit):
-    """Refuse points that are no curve of a line."""
+    """Refuse fewer than two points, a first one that is not slack, and a curve that does not rise."""
     kind = "stress" if unit == "Pa" else "tension"
     if len(points) < 2:
         raise InputError(f"{kind} has {len(points)} point, a curve has two or more: [[strain, {unit}], ...]")
@@ -120,7 +123,7 @@ def _check(points, unit):
 
 
 def _slopes(strain, value, chord):
-    """Slopes at the points."""
+    """Slopes at the points, by PCHIP."""
     if len(chord) == 1:
         return np.repeat(chord, 2)
     from scipy.interpolate import PchipInterpolator

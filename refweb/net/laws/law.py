@@ -4,7 +4,11 @@ A law is a class of scalar kernels that take a strain and the numbers of a line 
 `refweb.net.laws.line_data.FIELDS` and the columns of the law. In place of stress and modulus kernels have the tension
 and EA of the line, ``line.ea``.
 
-A new kernel of laws needs a default here and an entry in `Mixed`; `Net.law_is` reads attributes by name.
+May change: private functions; how `Mixed` chooses, and `DOUBLED` and `HALVED`, limits of the search of a strain. Must
+stay: names of kernels and attributes of `TensionLaw`, which laws of users give (a new one needs a default here, and an
+entry in `Mixed`), and which `Net.law_is`, `cable` and `statics` read by name; the signature ``(strain, line)``; `LINE`,
+the dtype of `line_data.FIELDS`. Tests: ``tests/net/test_laws.py``, ``tests/net/test_laws_by_group.py``,
+``tests/how_to/test_law.py``.
 """
 
 from __future__ import annotations
@@ -202,7 +206,7 @@ def record_of(columns, numbers):
 
 @functools.cache
 def _over_lines(scalar, record):
-    """A kernel that writes a scalar kernel of each strain and line."""
+    """A kernel that writes the values of a scalar kernel for each strain and line."""
 
     @kernel(leaf=True, apart=())
     def over_lines(strain: Vector, data: Matrix, out: Vector) -> None:

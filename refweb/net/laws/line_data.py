@@ -1,6 +1,8 @@
 """Numbers of the elements of lines, by name, over the matrix that kernels read.
 
-`discretisation` fills `FIELDS` in this order; effects add columns behind them, and find them by name.
+May change: how the matrix is kept. Must stay: names and order of `FIELDS`, which `discretisation` fills and all kernels
+over lines read; new columns behind them, as effects add theirs by name. Tests: ``tests/net/test_elements.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations
@@ -62,20 +64,20 @@ class LineData(np.recarray):
 
     @classmethod
     def of(cls, columns: Any, fields: Any = None) -> LineData:
-        """Make those of columns in the order of the fields, by default `FIELDS`."""
+        """Make the line data of columns in the order of the fields, by default `FIELDS`."""
         matrix = np.ascontiguousarray(np.column_stack(columns), dtype=float)
         return matrix.view(np.dtype(fields or FIELDS)).reshape(len(matrix)).view(cls)
 
     @classmethod
     def of_law(cls, ea: Any, slackness: Any = 0.0, smoothing: Any = 0.0, **columns: Any) -> LineData:
-        """Make those of lines of length 1 with all that laws read; arrays that broadcast."""
+        """Make the line data of lines of length 1 with all numbers that laws read, from arrays that broadcast."""
         ea, slackness, smoothing = (np.ravel(value) for value in np.broadcast_arrays(ea, slackness, smoothing))
         numbers = [np.ones(len(ea)), ea, slackness, smoothing, *offsets(slackness, smoothing)]
         lines = cls.of([*numbers, np.zeros((len(ea), 4))])
         return lines.with_law(columns)
 
     def with_law(self, columns: dict[str, Any]) -> LineData:
-        """The same with numbers of a law by column: those of `FIELDS` are replaced, others are added."""
+        """Line data with numbers of a law by column: those of `FIELDS` are replaced, others are added."""
         lines = self
         for name, values in columns.items():
             if name in (self.dtype.names or ()):
@@ -86,7 +88,7 @@ class LineData(np.recarray):
 
     @property
     def matrix(self) -> NDArray[np.float64]:
-        """The same numbers as kernels read them, shape (elements, columns)."""
+        """The numbers as kernels read them, shape (elements, columns)."""
         return np.asarray(self).view(float).reshape(len(self), -1)
 
     def column(self, name: str) -> int:
@@ -95,7 +97,7 @@ class LineData(np.recarray):
         return fields[name][1] // self.dtype[name].itemsize
 
     def with_column(self, name: str, values: float | NDArray[np.float64]) -> LineData:
-        """The same with one more field; ``values`` are one number or one for each element."""
+        """Line data with one more field; ``values`` are one number or one for each element."""
         if name in (self.dtype.names or ()):
             raise ValueError(f"there is a column {name} already")
         return self.of([self.matrix, np.broadcast_to(values, len(self))], [*self.dtype.descr, (name, float)])

@@ -7,7 +7,8 @@ compression. With g = (s + r)/2 (for s < 0: 2η²/(r − s)) and g0, r0 its valu
 
 which has a relative error of a few units of round-off everywhere. Under compression the stress tends to the floor −αE.
 
-All formulas here are of one law and change together; `statics.lowest` repeats its inverse and uses its energy.
+May change: only all formulas together, as they are of one law. Must stay: accuracy of a few units of rounding at small
+strains; `Smooth`, whose energy `statics.lowest` uses and whose inverse it repeats. Tests: ``tests/net/test_laws.py``.
 """
 
 # Kernels in classes are no methods:

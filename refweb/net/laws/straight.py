@@ -3,7 +3,9 @@
 Tension of the laws of form finding does not depend on natural length: T = q l of a force density q, and a constant
 force. In place of EA they have q L, L the natural length, and the force, so that T = EA (1 + ε) and T = EA.
 
-`registry.LAWS` has the names; proofs of statics rest on `convex`, `cone`, `bar` and `forming`.
+May change: nothing of the formulas without a change of all results. Must stay: names in `registry.LAWS`, which are the
+scene format; `convex`, `cone`, `bar`, `forming` and `plastic`, on which proofs of errors in statics rest. Tests:
+``tests/net/test_laws.py``, ``tests/test_contract.py``.
 """
 
 # Kernels in classes are no methods:

@@ -1,6 +1,8 @@
 """Capsules: straight lines grown by a radius.
 
-`registry.SHAPES` names the class, and its docstring is text of `refweb help` and of the schema.
+May change: texts of errors. Must stay: keys and docstring of `Capsule` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); what `grown` and `skeleton` return, on which contact, mass and bounds rest; the class
+name in `registry.SHAPES`. Tests: ``tests/effects/test_contact.py``, ``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Cylinders with rounded edges.
 
-`registry.SHAPES` names the class, and its docstring is text of `refweb help` and of the schema.
+May change: texts of errors. Must stay: keys and docstring of `Cylinder` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); what `grown` and `skeleton` return, on which contact, mass and bounds rest; the class
+name, which `registry.SHAPES` and `effects.around.KINDS` have. Tests: ``tests/effects/test_contact.py``,
+``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

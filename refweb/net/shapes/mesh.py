@@ -1,6 +1,9 @@
 """Solids from files of a surface of triangles.
 
-`registry.FILES` names the key `file`, and the docstring of the class is text of `refweb help` and of the schema.
+May change: private functions, texts of errors, and `SIZES`, limits of what is accepted. Must stay: keys and docstring
+of `Mesh` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); ``file``, which
+`registry.FILES` names so that paths count from the scene's folder. Tests: ``tests/effects/test_mesh_bodies.py``,
+``tests/net/test_repair.py``.
 """
 
 from __future__ import annotations

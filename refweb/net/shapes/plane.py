@@ -1,6 +1,8 @@
 """Planes: half spaces of ground.
 
-`grown` makes extent and thickness infinite, on which checks of contact rely; the class docstring is help text.
+May change: the square that is drawn. Must stay: keys and docstring of `Plane` (scene format and help; after a change
+write ``validation/REFERENCE.md`` anew); the infinite extent and thickness that follow from `grown`, by which checks of
+contact know ground; the class name in `registry.SHAPES`. Tests: ``tests/effects/test_ground.py``.
 """
 
 from __future__ import annotations

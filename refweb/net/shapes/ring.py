@@ -1,6 +1,8 @@
 """Rings: rigid circles; a web in the plane of a ring touches it as a disc.
 
-`planar` decides rows of rotation in `rigid_body`; the docstring of the class is text of `refweb help`.
+May change: `TUBE`, which is for pictures alone. Must stay: keys and docstring of `Ring` (scene format and help; after a
+change write ``validation/REFERENCE.md`` anew); ``planar``, by which `rigid_body` gives it one row of rotation; the
+class name, which `registry.SHAPES` and `effects.around.KINDS` have. Tests: ``tests/effects/test_contact.py``.
 """
 
 from __future__ import annotations

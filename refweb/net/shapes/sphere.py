@@ -1,6 +1,8 @@
 """Spheres: points grown by a radius.
 
-With `once`, contact acts once a line, not once an element; the class docstring is text of `refweb help`.
+May change: nothing of what `grown` returns. Must stay: keys and docstring of `Sphere` (scene format and help; after a
+change write ``validation/REFERENCE.md`` anew); ``once``, by which contact acts once a line and not once an element; the
+class name, which `registry.SHAPES` and `effects.around.KINDS` have. Tests: ``tests/effects/test_contact.py``.
 """
 
 from __future__ import annotations

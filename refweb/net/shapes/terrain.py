@@ -1,6 +1,9 @@
 """Terrain: ground with heights from a file.
 
-`registry.FILES` names the key `heights`; the docstring of the class is text of `refweb help` and of the schema.
+May change: private functions and texts of errors. Must stay: keys and docstring of `Terrain` (scene format and help;
+after a change write ``validation/REFERENCE.md`` anew); ``heights``, which `registry.FILES` names so that paths count
+from the scene's folder; `FORMATS`, the suffixes that `boundary.heights` reads. `DEEP` changes the solid under the
+ground. Tests: ``tests/effects/test_ground.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
 A page of ``pages/`` is written by hand and is also what ``refweb help`` prints. All others come from `PAGES`, so that
 nothing is said in a second place.
 
-`mkdocs.yml` names pages of `PAGES`, and titles of sections of the README stand there letter by letter.
+May change: the order of parts and `FIRST`; `PLUG_INS` names what plug-ins are made of. Must stay: names of pages in
+`PAGES`, which ``mkdocs.yml`` has; titles of sections of the README, which stand here letter by letter; `on_config` and
+`on_files`, which mkdocs calls by these names. Tests: ``tests/reference/test_site.py``.
 """
 
 from __future__ import annotations

@@ -58,4 +58,5 @@ have. A sum of energies has weights in place of a probe, as in ``balances.py``. 
 other.
 """
 
-# This docstring is a page of the site, and `tests/how_to/test_observable.py` runs the code in it.
+# This docstring is a page of the site and of `refweb help own-observable`. May change: the prose. Must stay: the first
+# sentence, which tests/test_architecture.py compares, and its code, which tests/how_to/test_observable.py runs.

@@ -1,6 +1,9 @@
 """Angular momentum of web and free bodies about their centre of mass, or the part of nodes or of a body.
 
-`of` and the kernel compute the same and change together; the class docstring is text of `refweb help`.
+May change: how sums are written, in `of` and in the kernel `angular_momentum` together: both have one value. Must stay:
+the class docstring (help; after a change write ``validation/REFERENCE.md`` anew), ``keys`` and ``unit``, and the class
+name in `registry.OBSERVABLES`. Tests: ``tests/results/test_observable_contract.py``,
+``tests/results/test_selections.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Observables of the energy balance: energies, work and step size, sums that need no probe.
 
-Quantities are columns of `results.columns`, `dynamics.history` uses `weights`, and docstrings are help text.
+May change: only docstrings, which are help: then write ``validation/REFERENCE.md`` anew. Must stay: names of energies,
+which are columns of `results.columns` and of `Balance` of effects; `weights` and `lost_by_path`, which
+`dynamics.history`, `dynamics.responses` and `statics.remarks` call; class names in `registry.OBSERVABLES`. Tests:
+``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

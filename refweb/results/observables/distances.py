@@ -1,6 +1,9 @@
 """Observables between nodes: their distance, and perimeter and area of the mouth of a net.
 
-Kernels serve `of` as well; `commands.doubts` uses `MouthArea`; class docstrings are text of `refweb help`.
+May change: private functions; how sums are written: the kernels `distance`, `perimeter` and `area` serve `of` as well.
+Must stay: class docstrings (help; after a change write ``validation/REFERENCE.md`` anew), class names in
+`registry.OBSERVABLES`, `MouthArea`, which `commands.doubts` uses, and `Between`, which `statics.responses`
+differentiates. Tests: ``tests/results/test_distances.py``, ``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
 """Fuel and Δv of a control: the impulse of its force, ∫ |F| dt, and the change of velocity by it.
 
-The force is constant between periods, so that the integral is linear in time. `dynamics.controllers` writes to the data
-of the probes: integral [N s] at a time, size of the force [N], and that time [s]; then comes the factor.
+The force is constant between periods, so that the integral is linear in time. May change: private functions; class
+docstrings, which are help: then write ``validation/REFERENCE.md`` anew. Must stay: the numbers of a probe in this
+order, to which `dynamics.controllers` writes: integral [N s] at a time, size of the force [N], that time [s], factor;
+`Fuel`, which `dynamics.gradients` knows. Tests: ``tests/dynamics/test_control.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Tension, stress and strain of elements of lines, of which one counts, see ``select`` of `refweb.Observe`.
 
-`values` and the probe give the same; `statics.simulation` uses `StressShare`; class docstrings are help text.
+May change: how values are found, in `values` and in the probe together. Must stay: class docstrings (help; after a
+change write ``validation/REFERENCE.md`` anew) and names in `registry.OBSERVABLES`; classes that `statics.simulation`,
+`statics.responses`, `dynamics.responses` and `sizing.case` know. Tests: ``tests/results/test_observable_contract.py``,
+``tests/results/test_selections.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Displacement, position and velocity: of several nodes or bodies one counts, see ``select`` of `refweb.Observe`.
 
-`reaction` and `angular_momentum` build on `Nodal`; `numbers` has the form of `probes.largest_of`.
+May change: how values are found, in `of` and in the probe together. Must stay: ``numbers`` in the form that the
+compiled `probes.largest_of` and `probes.selected_row` read; `Nodal`, on which `reaction` and `angular_momentum` build;
+class docstrings (help; after a change write ``validation/REFERENCE.md`` anew) and names in `registry.OBSERVABLES`.
+Tests: ``tests/results/test_observable_contract.py``, ``tests/results/test_selections.py``.
 """
 
 from __future__ import annotations
@@ -44,7 +47,7 @@ class Nodal(Observable):
         self.rows(system)
 
     def rows(self, system: System) -> NDArray[np.int64]:
-        """Rows it is looked at, shape (k,)."""
+        """Rows of the nodes or bodies of the observable, shape (k,)."""
         net = system.net
         if self.observe.body is not None:
             return np.array([body.row for body in self.bodies(net)])

@@ -1,6 +1,9 @@
 """Observables: a value at an instant, and the probe that follows it through the steps of a run.
 
-Statics, dynamics, plots and plug-ins use these names; kernels of `probes` read the numbers of `SELECTIONS`.
+May change: how defaults are computed. Must stay: names of attributes and methods of `Observable` and fields of `Value`,
+which observables of users give and statics, dynamics and plots call (a new one needs a default); `ANY` and
+`NOT_NEGATIVE`, which are bounds; numbers of `SELECTIONS`, which kernels of `probes` read; `ROUNDING` and `SHARE` belong
+to ±. Tests: ``tests/results/test_observable_contract.py``, ``tests/how_to/test_observable.py``.
 """
 
 from __future__ import annotations
@@ -76,7 +79,7 @@ class Observable:
         """Raise an `InputError` for keys that do not fit a `refweb.system.system.System`."""
 
     def of(self, state: State) -> Value:
-        """Its `Value` in a `refweb.results.state.State`."""
+        """`Value` of the observable in a `refweb.results.state.State`."""
         raise NotImplementedError
 
     def probe(self, system: System) -> Probe:
@@ -84,7 +87,7 @@ class Observable:
         raise NotImplementedError
 
     def body(self, net: Net) -> RigidBody:
-        """The body it is of: the one that is named or the only one. Refused where it is none, or one of several."""
+        """Body of the observable: the one that is named, or the only one of the scene; refused where there is none."""
         names = [body.name for body in net.bodies]
         if self.observe.body is None and len(names) == 1:
             return net.bodies[0]
@@ -95,7 +98,7 @@ class Observable:
         return named[0]
 
     def bodies(self, net: Net) -> list[RigidBody]:
-        """The bodies that are named, a list. Refused where one is none."""
+        """Bodies that are named, a list; `InputError` for a name that no body has."""
         named, bodies = self.observe.body, {body.name: body for body in net.bodies}
         named = (named,) if isinstance(named, str) else named or ()
         for name in named:

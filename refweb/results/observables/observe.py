@@ -1,6 +1,9 @@
 """``[[observe]]``: a quantity with a name, and its reduction over time.
 
-Keys and defaults are the scene format, and docstrings are text of `refweb help` and of the schema.
+May change: private functions and texts of errors. Must stay: keys, defaults and docstring of `Observe` (scene format
+and help; after a change write ``validation/REFERENCE.md`` anew); `SIGN` and `PARTS`, which follow from keys; `default`,
+the observables of a scene without any; `observes_of` and `bounds_by_name`, which read ``scene.toml`` for pictures and
+studies. Tests: ``tests/test_scene.py``, ``tests/results/test_selections.py``.
 """
 
 from __future__ import annotations

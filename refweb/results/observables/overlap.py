@@ -1,6 +1,9 @@
 """Depth of lines in bodies.
 
-`dynamics.history` follows contact by the probes here, whose rows are those of `system.contact_forces`.
+May change: private functions; the class docstring, which is help: then write ``validation/REFERENCE.md`` anew. Must
+stay: rows of the probes, which are those of `system.contact_forces`; `probe_of…` and `probes_between`, by which
+`dynamics.history` follows contact. Tests: ``tests/results/test_contact_force.py``,
+``tests/results/test_every_number.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,11 @@
 
 All components are along the axes x, y and z of the scene.
 
-`support` builds on `Turning`; `of` and kernels change together; class docstrings are text of `refweb help`.
+May change: private functions; how values are computed, in `of` and in the kernels together. Must stay: `W`, the number
+of the component "w"; rows and data of a probe in the order that its kernel reads; `Turning`, on which `support` builds;
+`Orientation`, which `statics.responses` differentiates; class docstrings (help; after a change write
+``validation/REFERENCE.md`` anew) and names in `registry.OBSERVABLES`. Tests:
+``tests/results/test_observable_contract.py``, ``tests/dynamics/test_attitude.py``.
 """
 
 from __future__ import annotations

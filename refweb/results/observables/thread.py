@@ -1,6 +1,9 @@
 """Tension, stress, strain and length of a thread, and the slip over its rings.
 
-`column` counts what `effects.thread` writes; `Observe` finds classes by the capitalised name of a quantity.
+May change: class docstrings, which are help: then write ``validation/REFERENCE.md`` anew. Must stay: columns of ``out``
+that `column` counts, as `effects.thread`, `effects.thread_friction` and `effects.winding` write them; class names,
+which are the capitalised names of quantities: `Observe` finds them so; `of_cell`, which `dynamics.history` calls.
+Tests: ``tests/effects/test_thread.py``, ``tests/effects/test_thread_friction.py``.
 """
 
 from __future__ import annotations
