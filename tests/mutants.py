@@ -313,6 +313,7 @@ MUTANTS = [
     Mutant("net/boundary/repair", "volume * np.outer(centre, centre)", "np.outer(centre, centre)"),
     Mutant("net/boundary/winding", "side != 0 and at > z", "side != 0 and at < z"),
     Mutant("net/boundary/winding", "total[5] += x * y * length", "total[5] += x * x * length"),
+    Mutant("net/boundary/polygons", "(apart & apart.T).any()", "False"),
     Mutant("net/boundary/polygons", "if value > best and not _holds(flat, left, (a, b, c), size)", "if value > best"),
     Mutant("net/discretisation", "quadrature=gauss(element.maxdeg))", "quadrature=gauss(element.maxdeg + 1))"),
     Mutant("system/weak_form", "stiffness * stretching + tension / stretch", "stiffness * stretching + tension"),
