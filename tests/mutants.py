@@ -934,9 +934,7 @@ MUTANTS = [
     Mutant("commands/new", "os.path.relpath(folder / name, target)", "os.path.relpath(folder / name, folder)"),
     Mutant("pages/packed", "[changes >> 8, changes & 0xFF]", "[changes & 0xFF, changes >> 8]"),
     Mutant("pages/packed", "size = written.nbytes + -written.nbytes % 4", "size = written.nbytes"),
-    Mutant(
-        "pages/space", "return (right.T * [1.0, 1.0, sign]) @ left.T", "return left @ (right.T * [1.0, 1.0, sign]).T"
-    ),
+    Mutant("pages/space", "Rotation.align_vectors(after, before)", "Rotation.align_vectors(before, after)"),
     Mutant("pages/markup", 'written.replace("<", "\\\\u003c")', "written"),
     Mutant("pages/page", "hashlib.sha256(script.encode())", "hashlib.sha256(script[1:].encode())"),
     Mutant("pages/page", "if not len(next(iter(history.values()), [])):", "if history is None:"),

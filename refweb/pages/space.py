@@ -13,6 +13,7 @@ Scripts of the page read keys of `head` and names and types of arrays, and `draw
 
 from __future__ import annotations
 
+import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -250,13 +251,12 @@ def _bodies(frames, arrays):
 
 
 def rotation_between(before, after):
-    """The rotation that maps points, shape (n, 3), best to other points, both about the origin.
+    """The rotation that maps points, shape (n, 3), best to other points, both about the origin."""
+    from scipy.spatial.transform import Rotation
 
-    W. Kabsch, Acta Crystallographica A32 (1976) 922.
-    """
-    left, _, right = np.linalg.svd(before.T @ after)
-    sign = np.sign(np.linalg.det(left @ right)) or 1.0
-    return (right.T * [1.0, 1.0, sign]) @ left.T
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of points on one line, any that fits
+        return Rotation.align_vectors(after, before)[0].as_matrix()
 
 
 def _camera(frames, origin, moved):
