@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import InputError
 from ..pictures.camera import choose, nearby
 from ..pictures.stage import BODIES, BROKEN, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, UNITS, colour_map
-from .packed import PLACES, UNKNOWN, VALUES, differences, levels, pack
+from .packed import PLACES, VALUES, differences, levels, pack
 
 LARGEST = 2_400_000
 """Largest size of the frames as text, if no number of frames is given [byte]."""
@@ -272,23 +272,3 @@ def _camera(frames, origin, moved):
     radius = np.clip(0.06 * length, 0.0006 * extent, 0.002 * extent)
     box = [near.min(axis=0).tolist(), near.max(axis=0).tolist()]
     return {"axes": views[0].axes.tolist(), "box": box, "radius": float(radius)}
-
-
-def places(arrays, head, frame):
-    """Points of a frame from the data of the page [m], shape (points, 3)."""
-    from .packed import summed
-
-    points = arrays["origin"].reshape(-1, 3)
-    steps = summed(arrays["moves"], (len(head["numbers"]), 3, len(points)))[frame]
-    low, step = np.array(head["moves"]).T
-    return points + low + steps.T * step
-
-
-def values(arrays, field, frame):
-    """Values of a field in a frame from the data of the page [SI], shape (lines,); NaN if not finite."""
-    low, high = field["ranges"][frame]
-    values_read = arrays[field["array"]].reshape(
-        -1 if field["constant"] else len(field["ranges"]), len(arrays["slack"]) // len(field["ranges"])
-    )
-    values_read = values_read[0 if field["constant"] else frame]
-    return np.where(values_read == UNKNOWN, np.nan, low + (high - low) * values_read / VALUES)
