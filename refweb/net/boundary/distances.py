@@ -6,6 +6,10 @@ intersections of the surface with a straight line along the third axis decides i
 normals, so that triangles without area do no harm. Signs of products decide which of two triangles with a common edge a
 line meets. The products of both are exact negatives of each other: no line passes between the triangles.
 
+On the grid of a body with 48 cells vtkImplicitPolyDataDistance of VTK 9.7 takes 3 times as long for 3 000 triangles and
+11 times for 80 000. It is exact everywhere; a sweep may miss the nearest triangle of a point that is many cells away,
+and is wrong there by up to 5 % of a cell, in the middle of a sphere.
+
 `winding` calls `meets`, too; without ``fastmath=False`` there and in `_side` products are no exact negatives.
 
 References
