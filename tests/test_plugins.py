@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import nets
 import numpy as np
 import packages
 import pytest
@@ -19,9 +20,11 @@ from refweb.__main__ import main
 from refweb.commands import __doc__ as verbs
 from refweb.dynamics.integrators import __doc__ as integrators
 from refweb.effects import __doc__ as effects
+from refweb.kernels import FORCE, kernel
 from refweb.net.laws import __doc__ as laws
 from refweb.net.rigid_body import __doc__ as shapes
 from refweb.results.observables import __doc__ as observables
+from refweb.system.effect_parts import parts_of
 from refweb.tables import Table, real, table
 
 PAGES = {
@@ -304,6 +307,43 @@ def changed(**parts):
     return lambda term: replace(term, **{name: make(getattr(term, name)) for name, make in parts.items()})
 
 
+STIFFNESS = 9
+"""A column that the data of a `Misplaced` load do not have."""
+
+
+@kernel()
+def pulled(x, data):
+    return x * data[1]
+
+
+@kernel(FORCE)
+def slack_spring(t, x, v, f, cells, data, out):
+    for c in range(len(cells)):
+        if x[cells[c, 0], 2] > 0.0:
+            f[cells[c, 0], 2] -= data[c, STIFFNESS] * x[cells[c, 0], 2]
+
+
+@kernel(FORCE)
+def pair_spring(t, x, v, f, cells, data, out):
+    for c in range(len(cells)):
+        if x[cells[c, 0], 2] > 0.0:
+            f[cells[c, 1], 2] -= data[c, 0]
+
+
+@kernel(FORCE)
+def sliced_spring(t, x, v, f, cells, data, out):
+    for c in range(len(cells)):
+        f[cells[c, 0], 2] -= pulled(x[cells[c, 0], 2], data[c, 6:])
+
+
+@kernel(FORCE)
+def wary_spring(t, x, v, f, cells, data, out):
+    for c in range(len(cells)):
+        out[c, 0] = 0.0
+        if data.shape[1] > 9:
+            f[cells[c, 0], 2] -= data[c, 9] * x[cells[c, 0], 2]
+
+
 WRONG_PARTS = {
     "nothing": (lambda term: None, r"on\(net\) returns None and must return a ForceTerm"),
     "a row too large": (changed(cells=lambda c: c + np.int32(2)), "row 3 of cell 1 must be 0 to 2: net.find"),
@@ -312,6 +352,26 @@ WRONG_PARTS = {
     "data of 32 bits": (changed(data=lambda d: d.astype(np.float32)), r"data \(float32, .* array of float64"),
     "columns of another array": (changed(data=lambda d: np.hstack([d, d])[:, ::2]), "not contiguous"),
     "data of fewer cells": (changed(data=lambda d: d[1:]), "data has 2 rows for 3 cells"),
+    "data of fewer columns": (
+        changed(data=lambda d: np.ascontiguousarray(d[:, :-1])),
+        r"force: line \d+ of outer_load.py reaches beyond data, which has 6 columns: give each cell all numbers",
+    ),
+    "no column for the power": (
+        changed(balance=lambda b: b._replace(power=None)),
+        r"force: line \d+ of outer_load.py reaches beyond out, which has 0 columns: .* power = 0",
+    ),
+    "a branch that is not taken": (
+        changed(force=lambda k: slack_spring),
+        r"force: data\[c, STIFFNESS\] reaches beyond data, which has 7 columns",
+    ),
+    "rows of a cell": (
+        changed(force=lambda k: pair_spring),
+        r"force: cells\[c, 1\] reaches beyond cells, which has 1 columns: give each cell all rows",
+    ),
+    "a part of the data": (
+        changed(force=lambda k: sliced_spring),
+        r"force: line \d+ of test_plugins.py reaches beyond data, which has 7 columns",
+    ),
     "cells of no element": (changed(data=lambda d: None), "data = None means that cells are the 2 elements"),
     "no tangent": (changed(tangent=lambda t: None), "tangent = None must be a Tangent: leave it out"),
     "no velocity": (changed(velocity=lambda v: None), "velocity = None must be a VelocityForce: leave it out"),
@@ -335,3 +395,9 @@ def test_an_effect_that_kernels_could_not_read_is_refused(clean, monkeypatch, wr
     )
     with pytest.raises(refweb.InputError, match=f'^effect "misplaced": .*{message}'):
         scene.build()
+
+
+def test_a_kernel_may_ask_how_many_columns_there_are(monkeypatch):
+    monkeypatch.setattr(Misplaced, "change", staticmethod(changed(force=lambda k: wary_spring)))
+    (term,) = parts_of([Misplaced(force=0.1)], nets.skew_net("linear"))
+    assert term.force is wary_spring

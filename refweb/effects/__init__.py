@@ -84,7 +84,8 @@ Kernels of forces work with numbers and tuples: an array that is made in a loop 
 computation with it. ``x`` in a kernel is the displacement of all rows, and ``net.points`` are their reference
 positions. ``cells`` are the rows that each cell couples, of type int32, and ``data`` its numbers, of type float64. A
 kernel adds to ``f`` and to ``rates``. It must write all of ``blocks`` and ``out``, which contain old values before.
-Signatures are in `refweb.kernels`.
+Signatures are in `refweb.kernels`. Compiled kernels do not check indices: Python runs those of your effect on some
+cells before a run, and reads their source, and refuses a column that an array does not have.
 
 ``net.web.find(self.node)`` finds nodes, and ``net.web.find_lines(self.lines)`` finds lines. For "all", ``net.find``
 also finds the nodes that order and subdivision add. `refweb.effects.base.column` makes cells of one row each. A field

@@ -12,9 +12,8 @@ import numpy as np
 
 
 @functools.cache
-def sphere():
-    """Unit sphere as points and triangles; the arrays must not be changed."""
-    level = 24
+def sphere(level=24):
+    """Unit sphere as points and triangles, ``level`` around; the arrays must not be changed."""
     polar = np.linspace(0.0, np.pi, level // 2 + 1)[1:-1]
     around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)
     rings = np.stack(

@@ -1,10 +1,10 @@
 """Arrays as one text: their bytes, deflated and in base64, and a table of positions and types.
 
 Positions become integers of 16 bits, values for colours integers of 8 bits, see `levels`. The page unpacks them with
-the ``DecompressionStream`` of the browser; `unpack` does the same in Python.
+the ``DecompressionStream`` of the browser.
 
 May change: nothing on one side alone: ``model.js`` unpacks the same bytes, and repeats the levels of `VALUES` and
-`UNKNOWN` as numbers; `PLACES` fit into 16 bits. Must stay: `unpack` and `summed` as inverses of `pack` and
+`UNKNOWN` as numbers; `PLACES` fit into 16 bits. Must stay: what ``tests/unpacked.py`` does as inverse of `pack` and
 `differences`. Tests: ``tests/pages/test_page.py``, ``tests/pages/test_browser.py``.
 """
 
@@ -75,16 +75,3 @@ def pack(arrays):
         parts.append(written.tobytes().ljust(size, b"\0"))
         end += size
     return base64.b64encode(zlib.compress(b"".join(parts), 9)).decode(), table
-
-
-def unpack(text, table):
-    """The arrays of a text of `pack`, each one-dimensional."""
-    raw = zlib.decompress(base64.b64decode(text))
-    kind = {name: np.dtype(entry["type"]).newbyteorder("<") for name, entry in table.items()}
-    return {n: np.frombuffer(raw, kind[n], entry["length"], entry["start"]) for n, entry in table.items()}
-
-
-def summed(changes, shape):
-    """The levels from the result of `differences`, of a shape (frames, ...)."""
-    high, low = np.asarray(changes, dtype=int).reshape(2, *shape)
-    return np.cumsum((high << 8) + low, axis=0) & 0xFFFF

@@ -16,6 +16,7 @@ read, and to which `drawings.space` adds keys; `places` and `values`, by which t
 
 from __future__ import annotations
 
+import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ import numpy as np
 from ..errors import InputError
 from ..pictures.camera import choose, nearby
 from ..pictures.stage import BODIES, BROKEN, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, UNITS, colour_map
-from .packed import PLACES, UNKNOWN, VALUES, differences, levels, pack
+from .packed import PLACES, VALUES, differences, levels, pack
 
 LARGEST = 2_400_000
 """Largest size of the frames as text, if no number of frames is given [byte]."""
@@ -253,13 +254,12 @@ def _bodies(frames, arrays):
 
 
 def rotation_between(before, after):
-    """The rotation that maps points, shape (n, 3), best to other points, both about the origin.
+    """The rotation that maps points, shape (n, 3), best to other points, both about the origin."""
+    from scipy.spatial.transform import Rotation
 
-    W. Kabsch, Acta Crystallographica A32 (1976) 922.
-    """
-    left, _, right = np.linalg.svd(before.T @ after)
-    sign = np.sign(np.linalg.det(left @ right)) or 1.0
-    return (right.T * [1.0, 1.0, sign]) @ left.T
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of points on one line, any that fits
+        return Rotation.align_vectors(after, before)[0].as_matrix()
 
 
 def _camera(frames, origin, moved):
@@ -275,23 +275,3 @@ def _camera(frames, origin, moved):
     radius = np.clip(0.06 * length, 0.0006 * extent, 0.002 * extent)
     box = [near.min(axis=0).tolist(), near.max(axis=0).tolist()]
     return {"axes": views[0].axes.tolist(), "box": box, "radius": float(radius)}
-
-
-def places(arrays, head, frame):
-    """Points of a frame from the data of the page [m], shape (points, 3)."""
-    from .packed import summed
-
-    points = arrays["origin"].reshape(-1, 3)
-    steps = summed(arrays["moves"], (len(head["numbers"]), 3, len(points)))[frame]
-    low, step = np.array(head["moves"]).T
-    return points + low + steps.T * step
-
-
-def values(arrays, field, frame):
-    """Values of a field in a frame from the data of the page [SI], shape (lines,); NaN if not finite."""
-    low, high = field["ranges"][frame]
-    values_read = arrays[field["array"]].reshape(
-        -1 if field["constant"] else len(field["ranges"]), len(arrays["slack"]) // len(field["ranges"])
-    )
-    values_read = values_read[0 if field["constant"] else frame]
-    return np.where(values_read == UNKNOWN, np.nan, low + (high - low) * values_read / VALUES)

@@ -91,6 +91,20 @@ class View:
         return float(np.ptp(self.project(points)[0][:, 0]) / (2 * self.half[0]))
 
     @property
+    def eye(self):
+        """Position of the camera [m], shape (3,)."""
+        return self.centre if self.perspective else self.centre + sum(self.half) * self.axes[2]
+
+    @property
+    def angle(self):
+        """Vertical angle [°]; None in parallel projection."""
+        return 2.0 * float(np.degrees(np.arctan(self.half[1]))) if self.perspective else None
+
+    def focus(self, middle=None):
+        """Point on the line of sight [m], shape (3,), at the depth of another point, by default 1 m away."""
+        return self.eye - (1.0 if middle is None else (self.eye - middle) @ self.axes[2]) * self.axes[2]
+
+    @property
     def offset(self):
         """Frame coordinates of the middle of the frame, shape (2,)."""
         return np.zeros(2) if self.perspective else self.axes[:2] @ self.centre

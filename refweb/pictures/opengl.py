@@ -85,12 +85,11 @@ def plotter_of(size, off_screen=False):
 
 def aim(plotter, view, middle=None):
     """Set the camera of a plotter to a `refweb.pictures.camera.View`, with its focus at the depth of ``middle`` [m]."""
-    camera, position = plotter.camera, view.centre + (0 if view.perspective else view.axes[2] * sum(view.half))
-    away = 1.0 if middle is None else (position - middle) @ view.axes[2]
-    camera.position, camera.focal_point, camera.up = position, position - away * view.axes[2], view.axes[1]
+    camera = plotter.camera
+    camera.position, camera.focal_point, camera.up = view.eye, view.focus(middle), view.axes[1]
     camera.parallel_projection = not view.perspective
     if view.perspective:
-        camera.view_angle = 2 * np.degrees(np.arctan(view.half[1]))
+        camera.view_angle = view.angle
     else:
         camera.parallel_scale = view.half[1]
     plotter.renderer.ResetCameraClippingRange()

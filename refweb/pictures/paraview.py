@@ -52,7 +52,8 @@ def script(folder, field=None, out=None):
     number = record.chosen()
     frame = record.frame(number)
     stage = stage_of(record, frame, field, SIZE)
-    options = stage.options
+    options, view = stage.options, stage.views[0]
+    view = view.wider(1.12 * view.half[0] * SIZE[1] / (view.half[1] * SIZE[0]))  # beside it is the colour bar
     factor, unit = scaled_unit(options.field, max(map(abs, options.limits)))
     points, cells = _arrays(folder, number)
     given = {
@@ -77,7 +78,11 @@ def script(folder, field=None, out=None):
         "bodies": list(frame.bodies),
         "supports": "support" in points,
         "radius": float(np.min(stage.radius)),
-        **camera_of(stage, SIZE),
+        "eye": view.eye.tolist(),
+        "focus": view.focus(stage.middle).tolist(),
+        "up": view.axes[1].tolist(),
+        "angle": view.angle,
+        "half_height": float(view.half[1]),
     }
     text = TEMPLATE.read_text(encoding="utf-8")
     write_text(out, text.replace("GIVEN = {}  # what is shown", f"GIVEN = {pprint.pformat(given, width=118)}", 1))
@@ -90,27 +95,3 @@ def _arrays(folder, number):
 
     mesh = meshio.read(listed(folder)[number].paths["web"])
     return {name: int(values[0].size) for name, values in mesh.point_data.items()}, set(mesh.cell_data)
-
-
-def camera_of(stage, size, margin=1.0):
-    """The first view of a stage in a window of some size [pixel], as plain values.
-
-    The window leaves space for a colour bar, and a ``margin`` relative to its height.
-
-    Returns
-    -------
-    dict
-        ``eye``, ``focus`` and ``up``, each of shape (3,); the vertical ``angle`` [°], None in parallel projection; and
-        ``half_height`` [m] of parallel projection.
-    """
-    view = stage.views[0]
-    half = max(margin * float(view.half[1]), 1.12 * float(view.half[0]) * size[1] / size[0])
-    eye = view.centre + (0.0 if view.perspective else 3.0 * sum(view.half)) * view.axes[2]
-    away = float((eye - stage.middle) @ view.axes[2])
-    return {
-        "eye": eye.tolist(),
-        "focus": (eye - away * view.axes[2]).tolist(),
-        "up": view.axes[1].tolist(),
-        "angle": 2.0 * float(np.degrees(np.arctan(half))) if view.perspective else None,
-        "half_height": half,
-    }

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..net.surfaces import sphere
 from .model import Balls, Surface
 
 PIECES = 3000
@@ -56,7 +57,7 @@ def _flat(part, view, pixel):
     if isinstance(part, Surface):
         return _flat_surface(part, view)
     if isinstance(part, Balls):
-        unit = _sphere(8, 12)
+        unit = sphere(12)
         points = (part.centres[:, None] + part.radius * unit[0]).reshape(-1, 3)
         triangles = (np.arange(len(part.centres))[:, None, None] * len(unit[0]) + unit[1]).reshape(-1, 3)
         return _flat_surface(Surface(points, triangles, part.colour), view)
@@ -102,13 +103,3 @@ def _flat_tubes(part, view, pixel):
     corners = np.stack([strip(1.0), strip(0.5)], axis=1).reshape(-1, 4, 2)
     shades = np.stack([0.72 * colours, 0.15 + 0.85 * colours], axis=1).reshape(-1, 3)
     return corners, np.clip(shades, 0, 1), np.repeat(depth.mean(axis=1), 2)
-
-
-def _sphere(rings, sectors):
-    """Unit sphere: points, shape (points, 3); triangles, shape (triangles, 3)."""
-    theta, phi = np.meshgrid(np.linspace(0, np.pi, rings + 1), 2 * np.pi * np.arange(sectors) / sectors, indexing="ij")
-    points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-    number = np.arange(theta.size).reshape(theta.shape)
-    a, b = number[:-1].ravel(), number[1:].ravel()
-    c, d = (np.roll(x, -1, axis=1).ravel() for x in (number[:-1], number[1:]))
-    return points.reshape(-1, 3), np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])

@@ -83,22 +83,18 @@ def spectrum_of(time, values, name="history"):
     amplitude = 2.0 * np.abs(np.fft.rfft(window * (values - mean))) / window.sum()
     frequency = np.fft.rfftfreq(len(time), step)
     resolution = WIDTH_OF_A_LINE / (step * len(time))
-    inner = amplitude[1:-1]
-    high = 1 + np.flatnonzero((inner > amplitude[:-2]) & (inner > amplitude[2:]) & (frequency[1:-1] >= resolution))
-    falling = high[np.argsort(-amplitude[high], kind="stable")]
-    peak = next((int(number) for number in falling if _stands_out(amplitude, number)), None)
+    high = peaks_of(amplitude)
+    high = high[frequency[high] >= resolution]
+    peak = int(high[amplitude[high].argmax()]) if len(high) else None
     return Spectrum(frequency, amplitude, resolution, peak)
 
 
-def _stands_out(amplitude, number):
-    """Tell if both minima between a peak and higher values are low; frequency 0 does not count, without the mean."""
-    height = amplitude[number]
-    for side in (amplitude[number - 1 : 0 : -1], amplitude[number + 1 :]):
-        higher = np.flatnonzero(side > height)
-        valley = side[: higher[0]] if len(higher) else side
-        if not len(valley) or STANDS_OUT * valley.min() > height:
-            return False
-    return True
+def peaks_of(amplitude):
+    """Indices of the peaks that stand out; frequency 0, which lacks the mean, is no valley beside them."""
+    from scipy.signal import find_peaks
+
+    height = np.log(np.maximum(amplitude[1:], np.finfo(float).tiny))
+    return 1 + find_peaks(height, prominence=np.log(STANDS_OUT) * (1.0 - 1e-12))[0]
 
 
 def spectrum(runs, name):

@@ -54,7 +54,7 @@ def overview():
     listed = [f"{header:{width}}  {line}" for header, line in lines.items()]
     hint = "refweb help TABLE says what a table may hold, such as refweb help web"
     more = ["refweb help glossary explains terms", "refweb help materials lists materials"]
-    more.append(f"refweb help GUIDE prints a guide: {', '.join(guides())}")
+    more.append(f"refweb help quick-start says how to begin; further guides: {', '.join(guides())}")
     return "\n".join([*listed, "", hint, *more])
 
 

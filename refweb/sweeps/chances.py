@@ -126,26 +126,19 @@ def _spread(study, result, rows, sampled):
 
 
 def _quantile(values, errors, q, level):
-    """A quantile; its bounds from ±, since quantiles increase with the values; its confidence interval by ranks."""
-    ordered, n = np.sort(values), len(values)
+    """A quantile; its bounds from ±, since quantiles increase with the values; its confidence interval by ranks.
+
+    The number of samples below a quantile is binomial: no distribution of the values is assumed. With few samples there
+    is no interval.
+    """
+    from scipy.stats import quantile_test
+
     at = {"q": q, "value": float(np.quantile(values, q)), "least": None, "most": None, "interval": None}
     if errors is not None:
         at["least"], at["most"] = (float(np.quantile(values + sign * errors, q)) for sign in (-1.0, 1.0))
-    if (ranks := _ranks(n, q, level)) is not None:
-        at["interval"] = [float(ordered[rank]) for rank in ranks]
+    ends = [float(end) for end in quantile_test(values, p=q).confidence_interval(level)]
+    at["interval"] = ends if all(map(math.isfinite, ends)) else None
     return at
-
-
-def _ranks(n, q, level):
-    """Ranks of the ordered samples that enclose a quantile with a probability; None if there are too few samples.
-
-    The number of n samples below a quantile is binomial: no distribution of the values is assumed.
-    """
-    from scipy.stats import binom
-
-    low = int(binom.ppf(0.5 * (1.0 - level), n, q)) - 1
-    high = int(binom.ppf(0.5 * (1.0 + level), n, q))
-    return (low, high) if 0 <= low and high < n else None
 
 
 def bounds(row, results, values, sampled):

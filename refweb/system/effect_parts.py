@@ -39,8 +39,13 @@ def parts_of(effects: Sequence[Any], net: Net) -> list[Any]:
     for effect in effects:
         if hasattr(effect, "on"):
             given = effect.on(net)
+            title = f'effect "{_name_of(effect)}"'
             for part in given if isinstance(given, list) else [given]:
-                _check(part, net, f'effect "{_name_of(effect)}"')
+                _check(part, net, title)
+                if isinstance(part, ForceTerm) and _is_foreign(effect):
+                    from .kernel_trial import refuse_overruns
+
+                    refuse_overruns(part, net, title)
                 parts.append(part)
     return parts
 
@@ -49,6 +54,11 @@ def _name_of(effect):
     """Name of an effect in scenes, else that of its class."""
     effect = getattr(effect, "effect", effect)  # of a table among several, see `refweb.build`
     return name_of(EFFECTS, effect) or type(effect).__name__
+
+
+def _is_foreign(effect):
+    """True for an effect whose class is not one of refweb."""
+    return not type(getattr(effect, "effect", effect)).__module__.startswith("refweb.")
 
 
 def _check(part, net, title):

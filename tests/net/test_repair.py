@@ -215,3 +215,25 @@ def test_ears_cover_a_polygon():
         assert len(triangles) == 10 and 0.5 * np.linalg.norm(across, axis=1).sum() == pytest.approx(11.0)
         assert (across @ across[0] > -1e-12).all()
     assert ears(np.array([[0, 0, 0], [1, 1, 0], [1, 0, 0], [0, 1, 0.0]])) is None  # a bow tie
+    hole = np.array([[0, 0], [4, 0], [4, 4], [0, 4], [0, 0], [1, 1], [1, 3], [3, 3], [3, 1], [1, 1]])
+    corners = np.column_stack([hole, np.zeros(10)]) @ turn
+    a, b, c = (corners[ears(corners)[:, k]] for k in range(3))
+    assert 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() == pytest.approx(16.0 - 4.0)
+
+
+@pytest.mark.parametrize("count", [4, 7])
+def test_ears_refuse_sides_that_cross(count):
+    """Random polygons, some of which cross: two sides do where each has the ends of the other on both sides."""
+    rng = np.random.default_rng(count)
+
+    def apart(p, q, r, s):
+        return np.linalg.det(np.array([q - p, r - p])) * np.linalg.det(np.array([q - p, s - p])) < 0.0
+
+    crossed = []
+    for _ in range(60):
+        p = rng.random((count, 2))
+        sides = list(zip(p, np.roll(p, -1, axis=0), strict=True))
+        pairs = [(one, two) for n, one in enumerate(sides) for two in sides[:n]]
+        crossed.append(any(apart(*one, *two) and apart(*two, *one) for one, two in pairs))
+        assert (ears(np.column_stack([p, np.zeros(count)])) is None) == crossed[-1]
+    assert 0 < sum(crossed) < 60

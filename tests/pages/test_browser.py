@@ -8,10 +8,10 @@ import shutil
 import nets
 import numpy as np
 import pytest
+from unpacked import positions, unpack
 
 import refweb
 from refweb.pages import page
-from refweb.pages.packed import unpack
 from refweb.pages.space import space_of
 from refweb.pictures.record import of_folder
 
@@ -171,11 +171,9 @@ def test_fields_ranges_and_the_undeformed_web(opened):
 
 
 def test_points_are_where_they_are_in_python(opened, hit):
-    """Unpacked by the browser as by `refweb.pages.space`, to single precision."""
-    from refweb.pages.space import places
-
+    """Unpacked by the browser as in Python, to single precision."""
     found = space_of(of_folder(hit))
-    there = places(unpack(found.text, found.head["arrays"]), found.head, 10)
+    there = positions(unpack(found.text, found.head["arrays"]), found.head, 10)
     got = opened.evaluate("(refweb.show(10), refweb.draw(1), [...refweb.model.points])")
     np.testing.assert_allclose(np.reshape(got, (-1, 3)), there, atol=1e-6)
 

@@ -18,6 +18,7 @@ import tomllib
 import nets
 import numpy as np
 import pytest
+from unpacked import positions, summed, unpack, values
 
 import refweb
 from refweb.__main__ import main
@@ -25,7 +26,7 @@ from refweb.errors import InputError
 from refweb.pages import drawings, page, sections, space
 from refweb.pages.markup import data, table, tag
 from refweb.pages.markup import html as as_html
-from refweb.pages.packed import PLACES, VALUES, differences, levels, pack, summed, unpack
+from refweb.pages.packed import PLACES, VALUES, differences, levels, pack
 from refweb.pictures.record import of_folder
 from refweb.registry import EFFECTS
 
@@ -183,11 +184,11 @@ def test_places_and_values_are_within_the_errors_it_states(hit):
     assert found.error < 1e-4 * found.extent and found.numbers == list(record.times) and not found.missing
     segments = arrays["segments"].reshape(-1, 2)
     for i, number in enumerate(found.numbers):
-        frame, points = record.frame(number), space.places(arrays, found.head, i)
+        frame, points = record.frame(number), positions(arrays, found.head, i)
         assert np.linalg.norm(points[segments] - frame.paths, axis=-1).max() <= found.error * (1 + 1e-6)
         for field in found.head["fields"]:
             low, high = field["ranges"][i]
-            off = np.abs(space.values(arrays, field, i) - frame.fields[field["name"]]).max()
+            off = np.abs(values(arrays, field, i) - frame.fields[field["name"]]).max()
             assert off <= (high - low) / (2 * VALUES) * (1 + 1e-6) < 0.0021 * (high - low) or high == low
         held = points[arrays["supports"]]
         assert np.abs(held[np.lexsort(held.T)] - frame.supports[np.lexsort(frame.supports.T)]).max() <= found.error

@@ -14,7 +14,7 @@ from refweb.errors import InputError
 from refweb.pictures import balances, distances, plots, sheet
 from refweb.pictures.plot_data import Shown
 from refweb.pictures.record import of_folder, of_solution
-from refweb.pictures.spectra import FEWEST, _peak, _stands_out, spectrum_of
+from refweb.pictures.spectra import FEWEST, _peak, peaks_of, spectrum_of
 
 SOLVE = '[solve]\nkind = "static"\nload_steps = [1, 2, 3]'
 THROWN = """
@@ -253,9 +253,9 @@ def test_a_peak_stands_out():
     alone = spectrum_of(time, ring)
     assert _peak(alone, "m") == "highest peak that stands out at 20.00 ± 0.25 Hz: 200 mm"
     amplitude = np.array([0.0, 9.0, 5.0, 2.0, 2.08, 1.0, 0.5])  # a wave 4 % above the valley to its left
-    assert not _stands_out(amplitude, 4) and _stands_out(np.where(amplitude == 2.08, 4.1, amplitude), 4)
-    assert not _stands_out(amplitude[::-1], 2)
-    assert not _stands_out(np.array([0.0, 4.0, 2.0]), 1)  # the mean, which is left out, is no valley
+    assert not len(peaks_of(amplitude)) and peaks_of(np.where(amplitude == 2.08, 4.1, amplitude)).tolist() == [4]
+    assert peaks_of(amplitude[::-1]).tolist() == [5]  # and not the wave at 2
+    assert not len(peaks_of(np.array([0.0, 4.0, 2.0])))  # the mean, which is left out, is no valley
     assert _peak(spectrum_of(time, np.exp(time)), "m") == "no peak stands out"
 
 

@@ -190,7 +190,7 @@ def test_markdown_has_all_of_it(capsys):
 def test_overview_has_a_line_for_each_table(capsys):
     assert main(["help"]) == 0
     *lines, empty, hint, glossary, materials, guide = capsys.readouterr().out.splitlines()
-    assert "help materials" in materials and "help GUIDE" in guide
+    assert "help materials" in materials and "help quick-start" in guide
     assert len(lines) == len(names()) and empty == "" and "refweb help TABLE" in hint and "help glossary" in glossary
     for line, name in zip(lines, names(), strict=True):
         header = line.split("  ")[0]

@@ -79,7 +79,13 @@ LONG = ("learning", "size-a-net")
 
 
 @pytest.mark.ordinary(
-    "capture-False", "feedback-False", "own-net-False", "plug-ins-False", "python-False", "theory-False"
+    "capture-False",
+    "feedback-False",
+    "own-net-False",
+    "plug-ins-False",
+    "python-False",
+    "quick-start-False",
+    "theory-False",
 )
 @pytest.mark.parametrize(
     "path, slow",

@@ -91,7 +91,7 @@ def far(x, cells, data, c, nodes):
     return first > 2.0 * (radius * radius + length)  # then |first| > radius + length
 
 
-@kernel()
+@kernel(forceinline=True)  # force and penetration check would each have a copy, and call that which was loaded first
 def closest(x, cells, data, c, nodes, functions):
     """(place of the point of cell c nearest the centre, its squared distance)."""
     xi = 0.0

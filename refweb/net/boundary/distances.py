@@ -6,6 +6,10 @@ intersections of the surface with a straight line along the third axis decides i
 normals, so that triangles without area do no harm. Signs of products decide which of two triangles with a common edge a
 line meets. The products of both are exact negatives of each other: no line passes between the triangles.
 
+On the grid of a body with 48 cells vtkImplicitPolyDataDistance of VTK 9.7 takes 3 times as long for 3 000 triangles and
+11 times for 80 000. It is exact everywhere; a sweep may miss the nearest triangle of a point that is many cells away,
+and is wrong there by up to 5 % of a cell, in the middle of a sphere.
+
 May change: `SWEEPS` upwards. Must stay: arguments of `signed` and `unsigned`, which `field` calls, and of `meets`,
 which `winding` calls too; ``fastmath=False`` of `meets` and `_side`, without which products are no exact negatives and
 lines pass between triangles. Tests: ``tests/net/test_boundary.py``, with exact distances.

@@ -29,7 +29,7 @@ KNOWN = {
     "CONTRIBUTING.md": "",
 }
 """Pages of the site for what the README links to."""
-FIRST = """[Quick start](start.md) · [A net of your own](own-net.md) · [How far can I trust it?](trust.md) ·
+FIRST = """[Quick start](quick-start.md) · [A net of your own](own-net.md) · [How far can I trust it?](trust.md) ·
 [Scene files](scene-files.md) · [Python](api.md) · [Theory](theory.md) · [Plug-ins](plug-ins.md)"""
 """Pages to begin with."""
 PLUG_INS = (
@@ -106,8 +106,7 @@ def text_of(name):
 
 
 PAGES = {
-    "index.md": lambda: f"{readme('')}\n\n{FIRST}\n\n{readme('More')}",
-    "start.md": lambda: "# Quick start\n\n" + readme("Two commands", "What it prints", "An example", "Recipes"),
+    "index.md": lambda: "\n\n".join([readme(""), FIRST, readme("What it prints", "Recipes", "More")]),
     "trust.md": lambda: readme("How far can I trust it?").replace("## ", "# ", 1),
     "command-line.md": lambda: readme("Command line", "What it does not do").replace("## ", "# ", 1),
     "gallery.md": lambda: readme("Gallery").replace("## ", "# ", 1),
