@@ -251,6 +251,16 @@ def test_at_a_bound(tmp_path):
     found = sized(tmp_path, parameters={"cable.area": {"from": 2e-5, "to": 1e-4}}, starts=1)
     assert found.values == {"cable.area": 2e-5} and not found.requirements[0]["governs"]
     assert list(found.optimality["at_bound"]) == ["cable.area"] and found.optimality["residual"] < 1e-12
+    (gain,) = found.optimality["at_bound"].values()
+    assert gain == pytest.approx(found.objective["value"] * (1e-4 - 2e-5) / 2e-5, rel=1e-9)  # mass over the fraction
+
+
+def test_all_numbers_at_a_bound(tmp_path):
+    """Mass falls with the area, and does not know a force: both bounds are named, the second with a multiplier of 0."""
+    force = {"paths": ["load.0.force.0"], "from": 0.0, "to": 100.0, "start": 0.0}
+    parameters = {"force": force, "cable.area": {"from": 2e-5, "to": 1e-4}}
+    at_bound = sized(tmp_path, parameters=parameters, starts=1).optimality["at_bound"]
+    assert at_bound["force"] == 0.0 < at_bound["cable.area"] and len(at_bound) == 2
 
 
 @pytest.mark.slow
