@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, quote, short
+from ..messages import nearest, quote, row_of, short
 from ..reference.paths import with_value
 from ..results.state import State
 from ..system.static_system import at_rest
@@ -242,6 +242,7 @@ class Gradients:
 
     def gradient(self, result, path, by=None):
         """The `Gradient` of a result, see `refweb.Solution.gradient`."""
+        refuse_no_texts(result, path, self._observed, self._given)
         if by not in (None, "line", "group", "node"):
             raise InputError(f'by = {quote(by)} must be "line", "group" or "node", or be left out')
         if path in BY_NODE:
@@ -498,6 +499,14 @@ def _with_error(parts):
     (value, _), (change, _), *beside = parts
     error = np.abs(change) + sum((share * np.abs(changed - value) for changed, share in beside), 0.0)
     return value, error + 8.0 * np.finfo(float).eps * np.abs(value)
+
+
+def refuse_no_texts(result, path, results, given):
+    """Refuse a result or a path that is no text; the message has ``results`` and paths of the dict of a scene."""
+    if not isinstance(result, str):
+        raise InputError(f"result = {quote(result)} must be the name of a result: {row_of(list(results))}")
+    if not isinstance(path, str):
+        raise InputError(f"path = {quote(path)} must be the path of a number: {row_of(numbers_of(given))}")
 
 
 def number_and_size(given, path):
