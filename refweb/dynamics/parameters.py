@@ -48,6 +48,8 @@ class Parameter:
         Its change in the ``systems``.
     systems : tuple of refweb.system.system.System
         Systems with a value below and above.
+    differing : list of int
+        Numbers of the terms of the system whose forces depend on it.
     start : ndarray, shape (2, rows, 3)
         Derivatives of displacement and velocity at the start.
 
@@ -63,15 +65,15 @@ class Parameter:
         if path.partition(".")[0] in FIXED:
             raise InputError(f"path {quote(path)} is no number of the motion: it sets what is computed of it, or how")
         self.number, self.size = number_and_size(self._given, path)
-        self.step, self.systems = self._changed()
+        self.step, self.systems = self._beside = self._changed()
         low, high = self.systems
         self.start = (_start_of(high) - _start_of(low)) / (2.0 * self.step)
         if equilibrium is not None:
             self.start[0] = self._moved(equilibrium)
-        self._differing = [n for n, pair in enumerate(zip(low.terms, high.terms, strict=True)) if _differ(*pair)]
+        self.differing = [n for n, pair in enumerate(zip(low.terms, high.terms, strict=True)) if _differ(*pair)]
         if _relative(low.net.line_data.matrix, high.net.line_data.matrix) or _tables(low) != _tables(high):
             over = [n for n, term in enumerate(system.terms) if term.over_lines]
-            self._differing = sorted({*self._differing, *over})
+            self.differing = sorted({*self.differing, *over})
         self._lighter = self._inverse_of(high) - self._inverse_of(low)
         self._outs = system.per_cell()
 
@@ -100,6 +102,12 @@ class Parameter:
             if not np.array_equal(changed.corners, self._system.corners):
                 raise InputError(f"{self.path} changes times at which steps end, and has no gradient")
         return systems
+
+    def beside(self, step):
+        """Systems with the number less and more a step; the last ones are kept."""
+        if step != self._beside[0]:
+            self._beside = step, self.systems if step == self.step else self._built(step)
+        return self._beside[1]
 
     def system_at(self, value):
         """The system with another value of the number."""
@@ -130,11 +138,11 @@ class Parameter:
         """Add ∂(M⁻¹f)/∂p at a state with the force f to ``rate``, all of shape (rows, 3)."""
         if self._lighter.any():
             rate += np.where(inverse > 0.0, self._lighter / (2.0 * self.step), 0.0) * f
-        if self._differing:
+        if self.differing:
             by_side = []
             for system in self.systems:
                 force = np.zeros_like(x)
-                for n in self._differing:
+                for n in self.differing:
                     term = system.terms[n]
                     term.force(t, x, v, force, term.cells, system.data_of(term, t), self._outs[n])
                 by_side.append(force)

@@ -16,7 +16,7 @@ has the limit of this: over a kick of size h it decays as δv' = b − M⁻¹C �
 
 with δv⁻ before the kick. It is that of the steps to order 2, not to rounding.
 
-`Steps` follows a run, and calls `Tangent.step` behind each step; `refweb.dynamics.gradients` is its user.
+`Steps` follows a run, and calls `Tangent.step` behind each step; `refweb.dynamics.linear_run` is its user.
 """
 
 from __future__ import annotations
