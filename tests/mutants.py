@@ -428,6 +428,7 @@ MUTANTS = [
     Mutant("dynamics/responses", "np.where(kink, (high - part) / step, rate)", "rate"),
     Mutant("dynamics/responses", "values - (values * along).sum(axis=-1, keepdims=True) * along", "values"),
     Mutant("dynamics/kinks", "bent & (np.abs(second - 2.0 * half) < 0.1 * second)", "bent"),
+    Mutant("dynamics/parameters", "self.number + share * self.size", "self.number"),
     Mutant("dynamics/linear_run", "sorted(kinks & before[n])[:1]", "()"),
     Mutant("dynamics/responses", "tied = scores >= scores[best] - TIED * abs(scores[best])", "tied = scores != scores"),
     Mutant("dynamics/integrators/tangent", "inverse * (start @ matrix.T)", "0.0 * inverse * (start @ matrix.T)"),

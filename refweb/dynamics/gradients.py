@@ -33,7 +33,7 @@ from ..statics.gradients import BY_LINE, Gradient, refuse_no_texts
 from .divergence import divergence, lost_before
 from .history import SPREAD
 from .linear_run import LinearRun
-from .parameters import Parameter
+from .parameters import SELF, Parameter
 from .peaks import kept, pooled
 from .schedule import blocks, times_of
 from .simulation import Simulation
@@ -138,7 +138,18 @@ class Gradients:
             )
         unit = f"{observe.unit} per {BY_LINE[path]}" if path in BY_LINE else observe.unit
         arrays: list[Any] = [None if part is None else np.array([part]) for part in (value, error, left)]
-        return Gradient(result, path, "", ("",), *arrays, unit=unit, number=number.number)
+        return Gradient(result, path, "", ("",), *arrays, unit=unit, number=number.number, notes=self._notes(number))
+
+    def _notes(self, number):
+        """Texts on stiffness of contact that refweb chose by a number."""
+        texts = []
+        for name, stiffness in number.chosen.items():
+            of = f"[{SELF}]" if name == SELF else f'the contact of body "{short(name)}"'
+            texts.append(
+                f"stiffness = {stiffness:g} of {of} is one that refweb chose by this number among others, and the "
+                "derivative is that without its change: give it, so that runs with other numbers have it as well"
+            )
+        return tuple(texts)
 
     def refuse(self, result):
         """Refuse a result without a gradient, and one behind the horizon; return its `refweb.Observe`."""

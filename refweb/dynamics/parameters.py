@@ -8,6 +8,9 @@ motion, are differences of order 2 of those terms alone whose data differ.
 
 from __future__ import annotations
 
+import copy
+from functools import cached_property
+
 import numpy as np
 
 from ..errors import InputError
@@ -20,6 +23,8 @@ CHANGE = 3e-7
 """Largest relative change of data by a step: its square and rounding over it leave errors of 1e-9 of a derivative."""
 PROBED, SHRINKS, TRIES = 1e-3, 100.0, 3
 """First step over the size of a number, ratio of further steps where a value is refused, number of steps."""
+SELF, OTHERWISE = "self_contact", 0.5
+"""Name of the contact of lines in ``chosen`` of a scene; change of a number, over its size, by which choices differ."""
 FIXED = ("schema", "title", "seed", "solve", "output", "accuracy", "observe", "event")
 """Tables whose numbers are none of the motion."""
 
@@ -103,6 +108,25 @@ class Parameter:
                 raise InputError(f"{self.path} changes times at which steps end, and has no gradient")
         return systems
 
+    @cached_property
+    def chosen(self):
+        """Stiffness of contact that refweb chose and would choose otherwise at other numbers, by name of its body."""
+        if not self._scene.chosen:
+            return {}
+        given = copy.deepcopy(self._given)
+        bodies = given.get("contact", {}).get("bodies", {})
+        for name in self._scene.chosen:
+            (given if name == SELF else bodies)[name].pop("stiffness")
+        by_number = []
+        for share in (0.0, -OTHERWISE, OTHERWISE):
+            try:
+                changed = with_value(given, self.path, self.number + share * self.size)
+                by_number.append(_stiffness_of(type(self._scene).from_dict(changed, self._scene.folder).settled()))
+            except InputError:  # a number on one side alone
+                continue
+        now = _stiffness_of(self._scene)
+        return {n: now[n] for n in self._scene.chosen if len({chosen[n] for chosen in by_number}) > 1}
+
     def beside(self, step):
         """Systems with the number less and more a step; the last ones are kept."""
         if step != self._beside[0]:
@@ -158,6 +182,13 @@ class Parameter:
             ends.append((x[rows], v[rows]))
         (x_low, v_low), (x_high, v_high) = ends
         return (x_high - x_low) / (2.0 * self.step), (v_high - v_low) / (2.0 * self.step)
+
+
+def _stiffness_of(scene):
+    """Stiffness of contact by the name of the body, and of lines with each other by `SELF`."""
+    given = scene.to_dict()
+    bodies = {name: body.get("stiffness") for name, body in given.get("contact", {}).get("bodies", {}).items()}
+    return {**bodies, SELF: given.get(SELF, {}).get("stiffness")}
 
 
 def _start_of(system):

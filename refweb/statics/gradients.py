@@ -84,6 +84,8 @@ class Gradient:
     equal : tuple of str
         Natural frequencies that are equal within ±, of which the result is one; empty for other results. They keep
         their order: the lowest has the least derivative for a number that rises, and the largest for one that falls.
+    notes : tuple of str
+        In dynamics, stiffness of contact that refweb chose by the number; the derivative is that without its change.
     """
 
     result: str
@@ -96,6 +98,7 @@ class Gradient:
     unit: str
     number: float | None = None
     equal: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __float__(self) -> float:
         """The derivative by one number."""

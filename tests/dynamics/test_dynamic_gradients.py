@@ -206,6 +206,32 @@ def test_a_ball_that_falls_on_one_spring():
         assert gradient.error[0] < 0.05 * abs(exact)
 
 
+def test_a_stiffness_that_refweb_chose():
+    """It goes as the energy of the ball, m v²/2, and does not know the tension of the line: a note says so.
+
+    The derivative is that at this stiffness k, with the largest force v √(km) on what is fixed.
+    """
+    ball = refweb.Body(name="ball", shape="sphere", radius=0.1, mass=0.5, position=(0.5, 0, 0.11), velocity=(0, 0, -2))
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1]),
+        cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=1000.0),
+        effects=(ball, refweb.Contact()),
+        observe=[refweb.Observe(name="force", quantity="reaction", body="ball", reduce="max")],
+        solve=refweb.Dynamic(duration=0.01, safety=0.02),
+        output=refweb.Output(interval=1e-3),
+    )
+    solution = refweb.run(scene, progress=False)
+    force, gradient = solution.results["force"].value, solution.gradient("force", "body.0.mass")
+    assert abs(float(gradient) - 0.5 * force / 0.5) <= gradient.error[0] < 0.05 * force
+    (note,) = gradient.notes
+    k = solution.scene.contact.law_of(ball)[0]
+    assert note.startswith(f'stiffness = {k:g} of the contact of body "ball" is one that refweb chose by this number')
+    assert not solution.gradient("force", "cable.density").notes
+    given = refweb.run(scene.replace(effects=(ball, refweb.Contact(stiffness=k))), progress=False)
+    again = given.gradient("force", "body.0.mass")
+    assert not again.notes and float(again) == float(gradient)
+
+
 def on_a_rail(duration, step, contact, velocity, height, observe):
     """A ball on one line whose ends are held, under gravity."""
     return refweb.Scene(
