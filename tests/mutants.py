@@ -877,6 +877,8 @@ MUTANTS = [
     Mutant("sizing/sqp", "penalty = max(penalty, 2.0 *", "penalty = min(penalty, 2.0 *"),
     Mutant("sizing/formulas", "_less(a.low, b.high) / scale", "_less(a.low, b.low) / scale"),
     Mutant("sizing/runs", " and run[0].key not in self.rows", ""),
+    Mutant("sizing/formulas", "isinstance(node.op, ast.Or) is not false", "isinstance(node.op, ast.Or)"),
+    Mutant("sizing/search", "min(ends, key=lambda end: end[0])", "ends[-1]"),
     Mutant("sizing/case", "if gradient.left is None:", "if gradient.left is not gradient:"),
     Mutant("sizing/smooth", "value - point.wide[part]", "value"),
     Mutant("sizing/case", "factor=-part.factor", "factor=part.factor"),

@@ -90,13 +90,16 @@ class Smooth:
         Runs of designs.
     options : tuple of int
         The choice.
+    requirements : dict of str to refweb.sizing.formulas.Criterion, optional
+        Conditions by name, of ``or`` one side; by default those of the problem, of ``or`` the side that is nearest.
     """
 
-    def __init__(self, runs, options):
+    def __init__(self, runs, options, requirements=None):
         self.runs, self.options, self.problem = runs, options, runs.problem
+        self._requirements = requirements or self.problem.requirements
         self.count, self.coarse, self._points = len(self.problem.space.free), False, {}
         self.size: Any = None
-        self.parts = [name for name, f in self.problem.requirements.items() for _ in f.parts]
+        self.parts = [name for name, f in self._requirements.items() for _ in f.parts]
         self._keys = {(n, None): n for n in range(len(self.parts))}
 
     def design(self, u):
@@ -130,7 +133,7 @@ class Smooth:
         self.size = self.size or abs(f) or 1.0
         r, wide, lines = [], [], self._lines(row, design)
         rows = self._of_objective(numbers, slopes, lines, self.problem.objective.number(values).high)
-        for formula in self.problem.requirements.values():
+        for formula in self._requirements.values():
             each = self._by_line(formula, numbers, slopes, lines)
             pairs = zip(formula.slopes(numbers, slopes), formula.reserves(values), strict=True)
             for part, ((value, slope), reserve) in enumerate(pairs):
