@@ -412,6 +412,20 @@ def test_one_sided_where_lines_share_the_largest_value():
     assert gained == pytest.approx(1e-4 * float(aside), rel=0.02)  # the second order of a large sag
 
 
+def test_a_ring_that_slides_on_a_thread():
+    """On an ellipse with the half axes 1 and b = 0.8 m from φ = 0.5 on, v²/2 = b g (1 − cos φ) − p sin φ at its lowest.
+
+    By the force p aside v has −sin φ/v, by gravity v/(2 g); the height has no derivative but by the stretch of the
+    thread, which is some 1e-5 of the pull.
+    """
+    solution, phi, g = refweb.run(refweb.Scene.load("ring-on-thread"), progress=False), 0.5, 9.81
+    v = np.sqrt(2.0 * 0.8 * g * (1.0 - np.cos(phi)))
+    for path, exact in (("gravity.acceleration.0", -np.sin(phi) / v), ("gravity.acceleration.2", -0.5 * v / g)):
+        speed, lowest = solution.gradient("speed", path), solution.gradient("lowest", path)
+        assert abs(float(speed) - exact) <= speed.error[0] + 1e-5 and speed.error[0] < 1e-3 * abs(exact)
+        assert abs(float(lowest)) <= lowest.error[0] + 1e-5 < 1e-4
+
+
 def pushed_spring(step_size, *effects):
     """The oscillator of two largest excursions, and a load of p t/0.4 up to 0.4 s and of p behind, with p = 0."""
     load = refweb.Load(node=[1], force=(0.0, 0.0, 0.0), factor=[(0.0, 0.0), (0.4, 1.0)])
