@@ -6,7 +6,8 @@ at the time t* of its largest value, has the derivative of its value there: dJ/d
 changes as well, but J is stationary there.
 
 Peaks in time that ± does not tell apart count as lines that share a largest value, see `refweb.dynamics.peaks`. A size
-that is 0 has a derivative to each side; a largest value that is kept for a time in which derivatives differ has none.
+that is 0, or another value at a kink, has a derivative to each side, see `refweb.dynamics.responses`. A largest value
+that is kept for a time in which derivatives differ has none, nor has a motion at a kink, see `refweb.dynamics.kinks`.
 
 ± is the difference from the gradient of the step-refinement run, with the factors of the results themselves, see
 `refweb.dynamics.twin_error`. At a kink of the force, of a first contact or a line that snaps taut, derivatives have

@@ -179,7 +179,7 @@ def _both_sides(observed, parts, number, system, t, instant, n):
             first, second = np.abs(high[name] - low[name]), np.abs(high[name] + low[name] - 2.0 * part)
             if what[0] and (first + second).any():
                 depends.add(name)
-            if (second > BENT * first).any():
+            if _is_bent(part, first, second).any():
                 bent.add(name)
     sides = {name: (rate, rate) for name, rate in sums.items()}
     for by_number in (True, False) if bent else ():  # together, as a kink knows no sum
@@ -194,13 +194,18 @@ def _both_sides(observed, parts, number, system, t, instant, n):
     return sides
 
 
+def _is_bent(part, first, second):
+    """True where the second difference of a part is neither small against the first one nor rounding."""
+    return (second > BENT * first) & (second > ROUNDED * np.abs(part))
+
+
 def _sides(part, low, high, lower, higher, step, rate):
     """Derivatives (right, left) of a part, by values at a step and at half of it: at a kink, else ``rate`` for both.
 
     At a kink the second difference goes as the step, elsewhere as its square.
     """
     first, second, half = np.abs(high - low), np.abs(high + low - 2.0 * part), np.abs(higher + lower - 2.0 * part)
-    kink = (second > BENT * first) & (second > ROUNDED * np.abs(part)) & (np.abs(second - 2.0 * half) < 0.1 * second)
+    kink = _is_bent(part, first, second) & (np.abs(second - 2.0 * half) < 0.1 * second)
     return np.where(kink, (high - part) / step, rate), np.where(kink, (part - low) / step, rate)
 
 

@@ -75,8 +75,8 @@ class Gradient:
         Derivative and ± of each entry, shape (entries,), by node (nodes, 3).
     left : ndarray, optional
         Derivative for a number that falls, where that is another one than for one that rises, of the same shape: two
-        lines or nodes share the largest value, or in dynamics two peaks, or a size is 0. None where there is one
-        derivative.
+        lines or nodes share the largest value, or in dynamics two peaks, or a size is 0, or a value has a kink. None
+        where there is one derivative.
     unit : str
         Unit of the derivative; of numbers of other tables that of the result, per unit of the number.
     number : float, optional
