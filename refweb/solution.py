@@ -173,8 +173,10 @@ class Solution(SolutionData):
         of both, as that of a result. The largest value of a run has the derivative at its time.
 
         Where two lines or nodes share the largest value, a derivative is that for a number that rises, and ``left``
-        that for one that falls; in dynamics also where two peaks in time are equal, and where a size is 0. Peaks that
-        differ by less than ± of the result count in ± of its derivative.
+        that for one that falls; in dynamics also where two peaks in time are equal, where a size is 0, and where a
+        value has a kink, as a tension between slack and taut. Peaks that differ by less than ± of the result count in ±
+        of its derivative. A stiffness of contact that refweb chose stays as it is; ``notes`` say so where it depends on
+        the number.
 
         Parameters
         ----------
@@ -204,7 +206,8 @@ class Solution(SolutionData):
             that depends on parts without stiffness, and a kink: a line that is neither slack nor taut, or between
             yielding and not, or a size that is 0. In dynamics for methods other than central differences, effects that
             have no derivative, largest values that are kept while their derivatives change, as of a web at rest,
-            and results behind the time at which the run and its step refinement have no digit in common, where motion
+            motions that stay at a kink of a force, as of lines at rest that are neither slack nor taut, and results
+            behind the time at which the run and its step refinement have no digit in common, where motion
             is chaotic.
 
         Examples

@@ -413,6 +413,10 @@ def print_gradients(solution, result, gradients, refused, limit):
     if equal:
         text = "they keep their order, so that one derivative holds where a number rises, and another where it falls"
         rows.append(("note", f"{', '.join(equal)} are equal within ±: {text}"))
+    by_text = {}
+    for path, text in [(gradient.path, text) for gradient in numbers for text in gradient.notes]:
+        by_text.setdefault(text, []).append(path)
+    rows += [("note", f"by {', '.join(paths)}: {text}") for text, paths in by_text.items()]
     _box(
         f"{solution.scene.title}: gradient of {result} = {readable(computed.value, computed.error, computed.unit)}",
         rows,

@@ -139,4 +139,5 @@ def _plain(gradient):
         "left": left,
         "unit": gradient.unit,
         "equal": list(gradient.equal),
+        "notes": list(gradient.notes),
     }

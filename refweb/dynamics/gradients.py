@@ -6,7 +6,8 @@ at the time t* of its largest value, has the derivative of its value there: dJ/d
 changes as well, but J is stationary there.
 
 Peaks in time that ± does not tell apart count as lines that share a largest value, see `refweb.dynamics.peaks`. A size
-that is 0 has a derivative to each side; a largest value that is kept for a time in which derivatives differ has none.
+that is 0, or another value at a kink, has a derivative to each side, see `refweb.dynamics.responses`. A largest value
+that is kept for a time in which derivatives differ has none, nor has a motion at a kink, see `refweb.dynamics.kinks`.
 
 ± is the difference from the gradient of the step-refinement run, with the factors of the results themselves, see
 `refweb.dynamics.twin_error`. At a kink of the force, of a first contact or a line that snaps taut, derivatives have
@@ -34,14 +35,12 @@ from ..registry import load
 from ..results.observables.fuel import Fuel
 from ..results.observables.observe import SIGN
 from ..results.observables.slack_fraction import SlackFraction
-from ..results.state import State
-from ..statics.gradients import BY_LINE, Gradient
+from ..statics.gradients import BY_LINE, Gradient, refuse_no_texts
 from .divergence import divergence, lost_before
 from .history import SPREAD
-from .integrators.tangent import Steps, Tangent
-from .parameters import Parameter
-from .peaks import Peak, Peaks, kept, pooled
-from .responses import Instant, between, rates_of, slopes_of, value_of
+from .linear_run import LinearRun
+from .parameters import SELF, Parameter
+from .peaks import kept, pooled
 from .schedule import blocks, times_of
 from .simulation import Simulation
 from .twin_error import largest_mean
@@ -124,6 +123,7 @@ class Gradients:
 
     def gradient(self, result, path, by=None):
         """The `refweb.statics.gradients.Gradient` of a result, see `refweb.Solution.gradient`."""
+        refuse_no_texts(result, path, self._observed, self._simulation.scene.to_dict())
         if by is not None:
             raise InputError(f"by = {quote(by)} is of statics: in dynamics name one number of the scene")
         observe = self.refuse(result)
@@ -132,7 +132,7 @@ class Gradients:
         known = by_name[result]
         value, left, error, times, errors = known[:5]
         size, moved = abs(self._runs[0].results[result].value), abs(number.number) or number.size
-        limit = max(abs(value), AMPLIFIED * size / moved)
+        limit = max(abs(value), AMPLIFIED * (size + self._error_of(result)) / moved)
         if known.kept is not None or size > 0.0 and error > limit and known.rivals is not None:
             raise InputError(f'gradient of "{result}" by {path}: {known.kept or known.rivals}')
         if size > 0.0 and error > limit:
@@ -144,7 +144,18 @@ class Gradients:
             )
         unit = f"{observe.unit} per {BY_LINE[path]}" if path in BY_LINE else observe.unit
         arrays: list[Any] = [None if part is None else np.array([part]) for part in (value, error, left)]
-        return Gradient(result, path, "", ("",), *arrays, unit=unit, number=number.number)
+        return Gradient(result, path, "", ("",), *arrays, unit=unit, number=number.number, notes=self._notes(number))
+
+    def _notes(self, number):
+        """Texts on stiffness of contact that refweb chose by a number."""
+        texts = []
+        for name, stiffness in number.chosen.items():
+            of = f"[{SELF}]" if name == SELF else f'the contact of body "{short(name)}"'
+            texts.append(
+                f"stiffness = {stiffness:g} of {of} is one that refweb chose by this number among others, and the "
+                "derivative is that without its change: give it, so that runs with other numbers have it as well"
+            )
+        return tuple(texts)
 
     def refuse(self, result):
         """Refuse a result without a gradient, and one behind the horizon; return its `refweb.Observe`."""
@@ -213,87 +224,19 @@ class Gradients:
         return SPREAD / (1.0 - (self._runs[0].nsteps / self._runs[1].nsteps) ** 2)
 
     def _linear(self, integrator, run, numbers):
-        """The `Linear` run of a method."""
+        """The `LinearRun` of a method."""
         simulation, observed = self._simulation, [o for o in self._observed.values() if _is_smooth(o)]
-        system, schedule = simulation.system, simulation.schedule
-        times = times_of(schedule, 0.0, 0, len(schedule.times))
+        times = times_of(simulation.schedule, 0.0, 0, len(simulation.schedule.times))
         ends = times[(times > 0.0) & (times <= run.time)]
         sampled = set(ends[np.linspace(0, len(ends) - 1, min(len(ends), SAMPLES)).astype(int)].tolist())
-        results = {o.name: run.results[o.name] for o in observed}
-        waiting = sorted({*sampled, *(result.time for result in results.values())})
-        steps = Steps(integrator, simulation.begin.motion)
-        course, linear = steps.course, Linear([], {name: [] for name in results}, {o.name: [] for o in observed}, {})
-        tangent = Tangent(integrator, numbers, 0.0, course.x, course.v, course.force)
-        errors = {o.name: self._error_of(o.name) for o in observed}
-        reduced = [o for o in observed if SIGN[o.reduce]]
-        linear.samples.update({o.name: [] for o in reduced})
-        searches = {
-            o.name: Peaks(SIGN[o.reduce], results[o.name].value - SIGN[o.reduce] * errors[o.name]) for o in reduced
-        }
-
-        def instant():
-            inverse = integrator.model.inertia.inverse
-            return Instant(course.x, course.v, inverse * course.force, tangent.x, tangent.v, tangent.a).copied()
-
-        def at(time):
-            """The instant at a time of the last two steps."""
-            (t0, before), (t1, now) = trail[:2] if time <= trail[1][0] else trail[-2:]
-            return now if time == t1 else between((time - t0) / (t1 - t0), t1 - t0, before, now)
-
-        def record(time, now):
-            rates = rates_of(observed, numbers, system, time, now)
-            if time in sampled:
-                linear.times.append(time)
-            for o in observed:
-                if time in sampled:
-                    linear.rows[o.name].append(slopes_of(o, rates[o.name], 0.0).value)
-                if time == results[o.name].time:
-                    linear.peaks[o.name].append(_peak(o, time, rates[o.name], errors[o.name]))
-                elif time in sampled and o in reduced:
-                    linear.samples[o.name].append(_peak(o, time, rates[o.name], 0.0))
-
-        def search(t, h):
-            state = State(system, t, trail[-1][1].x, trail[-1][1].v)
-            for o in reduced:
-                beside(o, searches[o.name].step(t, value_of(o, state)), h)
-
-        def beside(o, time, h):
-            if time is not None and abs(time - results[o.name].time) > 2.0 * h:
-                rates = rates_of([o], numbers, system, time, at(time))[o.name]
-                linear.peaks[o.name].append(_peak(o, time, rates, errors[o.name]))
-
-        def on_step(t, h):
-            tangent.step(t, h, course.x, course.v, course.force)
-            trail[:] = [*trail[-2:], (t, instant())]
-            while waiting and waiting[0] <= t:
-                time = waiting.pop(0)
-                record(time, at(time))
-            search(t, h)
-
-        trail = [(0.0, instant())]
-        while waiting and waiting[0] <= 0.0:
-            record(waiting.pop(0), trail[0][1])
-        search(0.0, 0.0)
-        steps.follow(times, on_step)
-        for time in waiting:  # that of the end, but for rounding
-            record(time, trail[-1][1])
-        for o in reduced:
-            beside(o, searches[o.name].end(), trail[-1][0] - trail[-2][0])
-        return linear
+        results, errors = ({o.name: of(o.name) for o in observed} for of in (run.results.get, self._error_of))
+        linear = LinearRun(integrator, simulation.begin.motion, numbers, observed, results, errors)
+        return linear.follow(times, sampled)
 
     def _error_of(self, name):
         """± of a result, of the solution where it has one."""
         first, finer = (run.results[name].value for run in self._runs)
         return max(self._given[name], self._factor * abs(first - finer))
-
-
-class Linear(NamedTuple):
-    """Derivatives of a run: at times (k,), rows by name (k, numbers), and `Peak` of results and samples by name."""
-
-    times: list[float]
-    rows: dict[str, list[np.ndarray]]
-    peaks: dict[str, list[Peak]]
-    samples: dict[str, list[Peak]]
 
 
 class Known(NamedTuple):
@@ -309,11 +252,6 @@ class Known(NamedTuple):
     errors: np.ndarray
     rivals: str | None
     kept: str | None
-
-
-def _peak(observe, time, rates, error):
-    """The `Peak` of `refweb.dynamics.responses.Rates`."""
-    return Peak(time, observe.observable.selected(rates.values)[0], slopes_of(observe, rates, error))
 
 
 def _with_errors(observe, first, finer, factor, result, sizes):
@@ -348,6 +286,11 @@ def _with_errors(observe, first, finer, factor, result, sizes):
             stays = (
                 f"it keeps {main.value:.6g} {unit} for a time, in which its derivatives are from {low[n]:.3g} to "
                 f"{high[n]:.3g}: take a result of an instant, or another start"
+            )
+        if n in first.kinks and first.kinks[n][0] < end:
+            stays = (
+                f"at {first.kinks[n][0]:.4g} s {first.kinks[n][1]}, and stays so; a number that rises changes the "
+                "motion otherwise than one that falls: change the start or the number a little, or use refweb sweep"
             )
         known.append(Known(value, left if left != value else None, total, before, errors[n], rivals, stays))
     return known

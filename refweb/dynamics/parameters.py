@@ -13,6 +13,9 @@ in `FIXED`. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 
 from __future__ import annotations
 
+import copy
+from functools import cached_property
+
 import numpy as np
 
 from ..errors import InputError
@@ -25,6 +28,8 @@ CHANGE = 3e-7
 """Largest relative change of data by a step: its square and rounding over it leave errors of 1e-9 of a derivative."""
 PROBED, SHRINKS, TRIES = 1e-3, 100.0, 3
 """First step over the size of a number, ratio of further steps where a value is refused, number of steps."""
+SELF, OTHERWISE = "self_contact", 0.5
+"""Name of the contact of lines in ``chosen`` of a scene; change of a number, over its size, by which choices differ."""
 FIXED = ("schema", "title", "seed", "solve", "output", "accuracy", "observe", "event")
 """Tables whose numbers are none of the motion."""
 
@@ -53,6 +58,8 @@ class Parameter:
         Its change in the ``systems``.
     systems : tuple of refweb.system.system.System
         Systems with a value below and above.
+    differing : list of int
+        Numbers of the terms of the system whose forces depend on it.
     start : ndarray, shape (2, rows, 3)
         Derivatives of displacement and velocity at the start.
 
@@ -68,15 +75,15 @@ class Parameter:
         if path.partition(".")[0] in FIXED:
             raise InputError(f"path {quote(path)} is no number of the motion: it sets what is computed of it, or how")
         self.number, self.size = number_and_size(self._given, path)
-        self.step, self.systems = self._changed()
+        self.step, self.systems = self._beside = self._changed()
         low, high = self.systems
         self.start = (_start_of(high) - _start_of(low)) / (2.0 * self.step)
         if equilibrium is not None:
             self.start[0] = self._moved(equilibrium)
-        self._differing = [n for n, pair in enumerate(zip(low.terms, high.terms, strict=True)) if _differ(*pair)]
+        self.differing = [n for n, pair in enumerate(zip(low.terms, high.terms, strict=True)) if _differ(*pair)]
         if _relative(low.net.line_data.matrix, high.net.line_data.matrix) or _tables(low) != _tables(high):
             over = [n for n, term in enumerate(system.terms) if term.over_lines]
-            self._differing = sorted({*self._differing, *over})
+            self.differing = sorted({*self.differing, *over})
         self._lighter = self._inverse_of(high) - self._inverse_of(low)
         self._outs = system.per_cell()
 
@@ -105,6 +112,31 @@ class Parameter:
             if not np.array_equal(changed.corners, self._system.corners):
                 raise InputError(f"{self.path} changes times at which steps end, and has no gradient")
         return systems
+
+    @cached_property
+    def chosen(self):
+        """Stiffness of contact that refweb chose and would choose otherwise at other numbers, by name of its body."""
+        if not self._scene.chosen:
+            return {}
+        given = copy.deepcopy(self._given)
+        bodies = given.get("contact", {}).get("bodies", {})
+        for name in self._scene.chosen:
+            (given if name == SELF else bodies)[name].pop("stiffness")
+        by_number = []
+        for share in (0.0, -OTHERWISE, OTHERWISE):
+            try:
+                changed = with_value(given, self.path, self.number + share * self.size)
+                by_number.append(_stiffness_of(type(self._scene).from_dict(changed, self._scene.folder).settled()))
+            except InputError:  # a number on one side alone
+                continue
+        now = _stiffness_of(self._scene)
+        return {n: now[n] for n in self._scene.chosen if len({chosen[n] for chosen in by_number}) > 1}
+
+    def beside(self, step):
+        """Systems with the number less and more a step; the last ones are kept."""
+        if step != self._beside[0]:
+            self._beside = step, self.systems if step == self.step else self._built(step)
+        return self._beside[1]
 
     def system_at(self, value):
         """The system with another value of the number."""
@@ -135,11 +167,11 @@ class Parameter:
         """Add ∂(M⁻¹f)/∂p at a state with the force f to ``rate``, all of shape (rows, 3)."""
         if self._lighter.any():
             rate += np.where(inverse > 0.0, self._lighter / (2.0 * self.step), 0.0) * f
-        if self._differing:
+        if self.differing:
             by_side = []
             for system in self.systems:
                 force = np.zeros_like(x)
-                for n in self._differing:
+                for n in self.differing:
                     term = system.terms[n]
                     term.force(t, x, v, force, term.cells, system.data_of(term, t), self._outs[n])
                 by_side.append(force)
@@ -155,6 +187,13 @@ class Parameter:
             ends.append((x[rows], v[rows]))
         (x_low, v_low), (x_high, v_high) = ends
         return (x_high - x_low) / (2.0 * self.step), (v_high - v_low) / (2.0 * self.step)
+
+
+def _stiffness_of(scene):
+    """Stiffness of contact by the name of the body, and of lines with each other by `SELF`."""
+    given = scene.to_dict()
+    bodies = {name: body.get("stiffness") for name, body in given.get("contact", {}).get("bodies", {}).items()}
+    return {**bodies, SELF: given.get(SELF, {}).get("stiffness")}
 
 
 def _start_of(system):

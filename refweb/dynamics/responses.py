@@ -18,6 +18,7 @@ import numpy as np
 from ..results.observables.balances import Booked, weights
 from ..results.observables.line import Line
 from ..results.observables.nodal import Nodal
+from ..results.observables.observe import SIGN
 from ..results.observables.reaction import Reaction
 from ..results.state import State
 
@@ -25,7 +26,12 @@ MOVED = 1e-7
 """Displacement of a difference of values over the shortest natural length; small against strains in tension."""
 TIED = 1e-6
 """Relative difference below which lines or nodes share the largest value, as symmetric ones do."""
-
+BENT = 0.1
+"""Change of a difference across a state, over it, from which on the state may be at a kink."""
+ROUNDED = 1e-12
+"""The same over the value, up to which it is rounding."""
+HALVINGS = 60
+"""Number of halvings of the time in which two lines change places."""
 KINK = 1e-9
 """Change over its size of a number that makes up for a size, or a difference of values, that counts as 0."""
 
@@ -81,51 +87,131 @@ def value_of(observe, state):
 
 
 class Rates(NamedTuple):
-    """Values of the lines or nodes of an observable, shape (k,), and derivatives for numbers that rise and that fall.
+    """Values of the lines or nodes of an observable, and their derivatives by some numbers and by time.
 
-    ``right`` and ``left``, shape (numbers, k), differ where a size is 0.
+    Attributes
+    ----------
+    parts : ndarray, shape (k,) or (k, 3)
+        Values, of sizes of vectors the vectors.
+    right, left : ndarray, shape (numbers, k) or (numbers, k, 3)
+        Derivatives for numbers that rise and that fall, which differ at a kink, as of a line between slack and taut.
+    speeds : ndarray, shape (k,) or (k, 3)
+        Derivatives by time; 0 of an observable to which `turns_back` does not apply.
+    sizes : ndarray, shape (numbers,)
+        Sizes of the numbers.
     """
 
-    values: np.ndarray
+    parts: np.ndarray
     right: np.ndarray
     left: np.ndarray
+    speeds: np.ndarray
+    sizes: np.ndarray
+
+    @property
+    def values(self):
+        """Values, of vectors their sizes, shape (k,)."""
+        return np.linalg.norm(self.parts, axis=1) if self.parts.ndim == 2 else self.parts
 
 
-def _sided(observe, part, rates, sizes):
-    """The `Rates` of parts with smooth derivatives, shape (numbers, k) or (numbers, k, 3): a size has a kink at 0."""
-    if part.ndim == 1 and observe.select != "abs":
-        return Rates(part, rates, rates)
-    if part.ndim == 1:
-        size, change, along, values = np.abs(part), np.abs(rates), np.sign(part) * rates, part
-    else:
-        size = values = np.linalg.norm(part, axis=1)
-        change = np.linalg.norm(rates, axis=2)
-        along = (rates * part).sum(axis=2) / np.where(size > 0.0, size, 1.0)
-    still = size <= KINK * change * sizes[:, None]
-    return Rates(values, np.where(still, change, along), np.where(still, -change, along))
+class Margins(NamedTuple):
+    """Times before and behind an instant in which a motion may turn back [s]; less than ``reach`` at an end of it."""
+
+    before: float
+    behind: float
+    reach: float
+
+
+def turns_back(observe):
+    """Tell if a largest value in time is that of the smallest of several, or the reverse: where two change places."""
+    return SIGN[observe.reduce] * (-1.0 if observe.select == "min" else 1.0) < 0.0
+
+
+def _parts(observed, state):
+    return {o.name: parts_of(o, state) for o in observed}
+
+
+def step_of(system, v, dx, dv):
+    """Step of a difference along dx and dv, None where both are 0."""
+    if not (dx.any() or dv.any()):
+        return None
+    size = np.abs(dx).max()
+    if size > 0.0:
+        return MOVED * system.net.natural_length.min() / size
+    return MOVED * max(np.abs(v).max(), 1.0) / max(np.abs(dv).max(), 1e-300)
 
 
 def rates_of(observed, numbers, system, t, instant):
     """The `Rates` of observables at an instant, a dict by name."""
-    x, v, shortest = instant.x, instant.v, system.net.natural_length.min()
-    state = State(system, t, x, v)
-    parts = {o.name: parts_of(o, state) for o in observed}
-    rates = {name: np.zeros((len(numbers), *part.shape)) for name, part in parts.items()}
-    for n, (number, dx, dv) in enumerate(zip(numbers, instant.dx, instant.dv, strict=True)):
-        low, high = number.systems
-        pairs = [((low, x, v), (high, x, v), number.step)]
-        size = np.abs(dx).max()
-        size = (
-            MOVED * shortest / size if size > 0.0 else MOVED * max(np.abs(v).max(), 1.0) / max(np.abs(dv).max(), 1e-300)
-        )
-        if dx.any() or dv.any():
-            pairs.append(((system, x - size * dx, v - size * dv), (system, x + size * dx, v + size * dv), size))
-        for first, second, step in pairs:
-            states = [State(changed, t, *moved) for changed, *moved in (first, second)]
-            for o in observed:
-                rates[o.name][n] += (parts_of(o, states[1]) - parts_of(o, states[0])) / (2.0 * step)
+    parts = _parts(observed, State(system, t, instant.x, instant.v))
+    speeds = _speeds([o for o in observed if turns_back(o)], system, t, instant)
+    sides = {name: np.zeros((2, len(numbers), *part.shape)) for name, part in parts.items()}
+    for n, number in enumerate(numbers):
+        for name, pair in _both_sides(observed, parts, number, system, t, instant, n).items():
+            sides[name][:, n] = pair
     sizes = np.array([number.size for number in numbers])
-    return {o.name: _sided(o, parts[o.name], rates[o.name], sizes) for o in observed}
+    return {
+        name: Rates(part, *sides[name], speeds.get(name, np.zeros_like(part)), sizes) for name, part in parts.items()
+    }
+
+
+def _speeds(observed, system, t, instant):
+    """Derivatives of the parts of observables by time, a dict by name."""
+    step = step_of(system, instant.v, instant.v, instant.a) if observed else None
+    if step is None:
+        return {}
+    low, high = (
+        _parts(observed, State(system, t + s, instant.x + s * instant.v, instant.v + s * instant.a))
+        for s in (-step, step)
+    )
+    return {name: (high[name] - low[name]) / (2.0 * step) for name in low}
+
+
+def _both_sides(observed, parts, number, system, t, instant, n):
+    """Derivatives of parts by a number for one that rises and for one that falls, pairs by name."""
+    x, v, dx, dv = instant.x, instant.v, instant.dx[n], instant.dv[n]
+
+    def ends(step, by_number, moves):
+        """Parts with the number, and with the state where it ``moves``, less and more a step."""
+        pairs = zip((-step * moves, step * moves), number.beside(step) if by_number else (system, system), strict=True)
+        return [_parts(observed, State(changed, t, x + s * dx, v + s * dv)) for s, changed in pairs]
+
+    moved, bent, depends = step_of(system, v, dx, dv), set(), set()
+    sums = {name: np.zeros_like(part) for name, part in parts.items()}
+    for step, *what in [(number.step, True, 0.0), *([(moved, False, 1.0)] if moved else [])]:
+        low, high = ends(step, *what)
+        for name, part in parts.items():
+            sums[name] += (high[name] - low[name]) / (2.0 * step)
+            first, second = np.abs(high[name] - low[name]), np.abs(high[name] + low[name] - 2.0 * part)
+            if what[0] and (first + second).any():
+                depends.add(name)
+            if _is_bent(part, first, second).any():
+                bent.add(name)
+    sides = {name: (rate, rate) for name, rate in sums.items()}
+    for by_number in (True, False) if bent else ():  # together, as a kink knows no sum
+        names = {name for name in bent if (name in depends) is by_number}
+        step = number.step if moved is None else moved
+        if by_number and moved is not None:
+            step = 10.0 ** np.floor(np.log10(min(moved, MOVED * number.size)))
+        if names:
+            wide, narrow = (ends(share * step, by_number, 1.0) for share in (1.0, 0.5))
+        for name in names:
+            sides[name] = _sides(parts[name], *(end[name] for end in (*wide, *narrow)), step, sums[name])
+    return sides
+
+
+def _is_bent(part, first, second):
+    """True where the second difference of a part is neither small against the first one nor rounding."""
+    return (second > BENT * first) & (second > ROUNDED * np.abs(part))
+
+
+def _sides(part, low, high, lower, higher, step, rate):
+    """Derivatives (right, left) of a part, by values at a step and at half of it: at a kink, else ``rate`` for both.
+
+    At a kink the second difference goes as the step, elsewhere as its square.
+    """
+    first, second, half = np.abs(high - low), np.abs(high + low - 2.0 * part), np.abs(higher + lower - 2.0 * part)
+    kink = _is_bent(part, first, second) & (np.abs(second - 2.0 * half) < 0.1 * second)
+    return np.where(kink, (high - part) / step, rate), np.where(kink, (part - low) / step, rate)
 
 
 class Slopes(NamedTuple):
@@ -144,19 +230,87 @@ class Slopes(NamedTuple):
     spread: np.ndarray
 
 
-def slopes_of(observe, rates, error):
-    """The `Slopes` of an observable from its `Rates`, whose value is known to an ``error``."""
+def _of_sizes(observe, rates, margins):
+    """(Right, left, speeds) of values, of sizes those of the sizes, which have a kink at 0.
+
+    Where a vector comes close to 0 between steps, its smallest size is that of what is across its velocity.
+    """
+    part, right, left, speeds, sizes = rates
+    if part.ndim == 1 and observe.select != "abs":
+        return right, left, speeds
+    if part.ndim == 1:
+        part, right, left, speeds = (values[..., None] for values in (part, right, left, speeds))
+    elif margins is not None and min(margins) > 0.0:
+        fast = np.linalg.norm(speeds, axis=1, keepdims=True)
+        close = np.linalg.norm(part, axis=1, keepdims=True) <= margins.reach * fast
+        along = np.where(close, speeds / np.where(fast > 0.0, fast, 1.0), 0.0)
+        part, right, left, speeds = (
+            values - (values * along).sum(axis=-1, keepdims=True) * along for values in (part, right, left, speeds)
+        )
+    size = np.linalg.norm(part, axis=1)
+    to = part / np.where(size > 0.0, size, 1.0)[:, None]
+    ends = []
+    for sign, side in ((1.0, right), (-1.0, left)):
+        change = np.linalg.norm(side, axis=2)
+        ends.append(np.where(size <= KINK * change * sizes[:, None], sign * change, (side * to).sum(axis=2)))
+    return *ends, np.where(size > 0.0, (speeds * to).sum(axis=1), np.linalg.norm(speeds, axis=1))
+
+
+def slopes_of(observe, rates, error, margins=None):
+    """The `Slopes` of an observable from its `Rates`, whose value is known to an ``error``.
+
+    At the time of a result reduced over time, its ``margins`` are given.
+    """
+    right, left, speeds = _of_sizes(observe, rates, margins)
     scores = observe.observable.scores(rates.values)
     best = int(scores.argmax())
+    turned = margins is not None and turns_back(observe)
+    if turned and (sides := _where_two_turn(observe, scores, right, left, speeds, margins)) is not None:
+        return Slopes(*sides, np.zeros(len(right)))
     tied = scores >= scores[best] - TIED * abs(scores[best])
     near = tied | (scores >= scores[best] - error)
-    right, left = rates.right[:, tied].max(axis=1), rates.left[:, tied].min(axis=1)
     if observe.select == "min":
-        right, left = rates.right[:, tied].min(axis=1), rates.left[:, tied].max(axis=1)
-    equal = np.abs(right - left) <= 1e-6 * np.maximum(np.abs(right), np.abs(left))
-    right, left = (np.where(equal, rates.right[:, best], side) for side in (right, left))
-    every = np.concatenate([rates.right[:, near], rates.left[:, near]], axis=1)
-    return Slopes(right, left, excess(every.min(axis=1), every.max(axis=1), right, left))
+        value, below = right[:, tied].min(axis=1), left[:, tied].max(axis=1)
+    else:
+        value, below = right[:, tied].max(axis=1), left[:, tied].min(axis=1)
+    equal = np.abs(value - below) <= 1e-6 * np.maximum(np.abs(value), np.abs(below))
+    value, below = np.where(equal, right[:, best], value), np.where(equal, right[:, best], below)
+    every = np.concatenate([right[:, near], left[:, near]], axis=1)
+    return Slopes(value, below, excess(every.min(axis=1), every.max(axis=1), value, below))
+
+
+def _where_two_turn(observe, scores, right, left, speeds, margins):
+    """Derivatives (right, left) where the largest score is least between instants, None where it has a smooth top.
+
+    The scores c_i change by ċ_i τ + c_i' dp with the time τ. Where one that rises and one that falls are equal, the
+    least largest one changes by the largest Σ w c' dp of all weights w with Σ w = 1 and Σ w ċ = 0; at the start or end
+    of the run with Σ w ċ ≥ 0 or ≤ 0 (linear programming).
+    """
+    sign = -1.0 if observe.select == "min" else 1.0
+    speeds, right, left = sign * speeds, sign * right, sign * left
+    if observe.select == "abs":  # the larger one of a value and its negative
+        scores, speeds = np.append(scores, -scores), np.append(speeds, -speeds)
+        right, left = (np.concatenate([side, -side], axis=1) for side in (right, left))
+    low, high = -margins.before, margins.behind
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        falls = speeds[(scores + speeds * middle).argmax()] < 0.0
+        low, high = (middle, high) if falls else (low, middle)
+    moved = scores + speeds * high
+    active = np.flatnonzero(moved >= moved.max() - TIED * (abs(moved.max()) + margins.reach * np.abs(speeds).max()))
+    rising, falling = active[speeds[active] > 0.0], active[speeds[active] < 0.0]
+    if not (len(rising) and len(falling)):
+        return None
+    starts = low == -margins.before > -margins.reach
+    ends = high == margins.behind < margins.reach
+    single = rising if starts else falling if ends else active[:0]
+    r, f = (part.ravel() for part in np.meshgrid(rising, falling))
+    weight = speeds[r] / (speeds[r] - speeds[f])
+    mixed = [
+        np.concatenate([(1.0 - weight) * side[:, r] + weight * side[:, f], side[:, single]], axis=1)
+        for side in (right, left)
+    ]
+    return sign * mixed[0].max(axis=1), sign * mixed[1].min(axis=1)
 
 
 def excess(low, high, right, left):

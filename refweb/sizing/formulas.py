@@ -1,7 +1,8 @@
 """Formulas: what is least and what is required, as intervals, and with their derivatives.
 
 A requirement ``a > b`` has the reserve (a − b)/|b| where b is a number that is not 0, else a − b: it holds where its
-reserve is above 0. Parts of ``and`` have a reserve each, of ``or`` the largest one counts.
+reserve is above 0. Parts of ``and`` have a reserve each, of ``or`` the largest one counts. A condition holds as well
+where all parts of one of its sides do, each without ``or``: its disjunctive normal form.
 
 May change: private functions and how trees are walked; `FALSE` and `TRUE`, of which only the sign counts. Must stay:
 the sign and scale of a reserve, on which `problem`, `runs` and `smooth` rest; value and gradient of one formula;
@@ -11,12 +12,16 @@ intervals that are never narrower than the exact ones. Tests: ``tests/sizing/tes
 from __future__ import annotations
 
 import ast
+import copy
+import itertools
 import math
 
 import numpy as np
 
 from ..sweeps.expressions import Expression, Interval, exact
 
+MOST_SIDES = 16
+"""Largest number of sides that are told apart."""
 FALSE, TRUE = exact(-1.0), exact(1.0)
 """Reserves of what has no number, such as an equation."""
 
@@ -37,6 +42,20 @@ class Criterion(Expression):
     def __init__(self, text, names, compares):
         super().__init__(text, names, compares)
         self.parts = list(_parts(self.tree)) if compares else [self.tree]
+        self._sides = _sides_of(self.tree) if compares else [self.parts]
+
+    @property
+    def count(self):
+        """Number of sides, one of which is enough."""
+        return len(self._sides)
+
+    def side(self, number):
+        """The criterion with the parts and names of a side alone, for reserves and slopes."""
+        alone = copy.copy(self)
+        alone.parts = self._sides[number]
+        names = [node.id for part in alone.parts for node in ast.walk(part) if isinstance(node, ast.Name)]
+        alone.used = {self._aliases[name] for name in names if name in self._aliases}
+        return alone
 
     def number(self, values):
         """The `refweb.sweeps.expressions.Interval` of an arithmetic expression, with values by name."""
@@ -62,7 +81,7 @@ class Criterion(Expression):
             inner = self._reserve(node.operand, values)
             return Interval(-inner.high, -inner.low)
         if isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
-            upper, lower, scale = _sides(node)
+            upper, lower, scale = _compared(node)
             a, b = (self._value(side, values) for side in (upper, lower))
             return Interval(_less(a.low, b.high) / scale, _less(a.high, b.low) / scale)
         truth = self._truth(node, values)
@@ -83,8 +102,8 @@ class Criterion(Expression):
     def _dual(self, node, values, slopes):
         dual = lambda inner: self._dual(inner, values, slopes)  # noqa: E731
         if isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
-            (a, da), (b, db) = (dual(side) for side in _sides(node)[:2])
-            scale = _sides(node)[2]
+            (a, da), (b, db) = (dual(side) for side in _compared(node)[:2])
+            scale = _compared(node)[2]
             return (a - b) / scale, (da - db) / scale
         if isinstance(node, ast.BoolOp):
             among = min if isinstance(node.op, ast.And) else max
@@ -121,7 +140,24 @@ def _parts(node):
         yield node
 
 
-def _sides(node):
+def _sides_of(node, false=False):
+    """Lists of conditions of which all of one list must hold; with ``false`` those under which a node does not."""
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        return _sides_of(node.operand, not false)
+    if isinstance(node, ast.BoolOp):
+        inner = [_sides_of(operand, false) for operand in node.values]
+        if isinstance(node.op, ast.Or) is not false:
+            return list(itertools.chain(*inner))
+        return [
+            list(itertools.chain(*chosen)) for chosen in itertools.islice(itertools.product(*inner), MOST_SIDES + 1)
+        ]
+    parts = list(_parts(node))
+    if false:
+        return [[ast.UnaryOp(ast.Not(), part)] for part in parts]
+    return [parts]
+
+
+def _compared(node):
     """(Side that must be larger, smaller side, scale) of a comparison."""
     left, right = node.left, node.comparators[0]
     scales = [abs(ast.literal_eval(side)) for side in (right, left) if _is_number(side)]

@@ -8,6 +8,7 @@ of free numbers and of `refweb.sizing.case.QUANTITIES`; attributes of `Problem`,
 from __future__ import annotations
 
 import ast
+import itertools
 import math
 from typing import Any
 
@@ -16,7 +17,7 @@ from ..messages import quote, short
 from ..results.observables.observe import bounds_by_name
 from ..sweeps.expressions import ANY, Interval
 from .case import QUANTITIES, SIZES, sizes_of
-from .formulas import Criterion
+from .formulas import MOST_SIDES, Criterion
 from .requirements import Free
 from .space import Design, Space, setting
 
@@ -89,6 +90,16 @@ class Problem:
         self.results = tuple(name for name in (*names, *QUANTITIES) if name in self.used)
         with in_file("minimise"):
             self._refuse_constant(first)
+
+    def sides(self):
+        """Requirements by name for each choice of the sides of conditions with ``or``; none where they are too many."""
+        names, counts = list(self.requirements), [range(f.count) for f in self.requirements.values()]
+        if math.prod(map(len, counts)) > MOST_SIDES:
+            return []
+        return [
+            {name: self.requirements[name].side(n) for name, n in zip(names, chosen, strict=True)}
+            for chosen in itertools.product(*counts)
+        ]
 
     def _each_scene(self, first):
         """The first design with each of the scenes."""

@@ -261,9 +261,9 @@ class Sizing(Table):
         Title, by default the name of the file. Results are written to a folder of that name.
     method : {"auto", "gradients", "enumeration", "evolution", "direct"}
         "gradients" is for numbers between bounds in statics, for each combination of the others; it finds an optimum
-        near each start, and of a condition with ``or`` it follows one side alone. "enumeration" takes
-        all designs, "evolution" is differential evolution, and "direct" divides rectangles. "auto" takes the first of
-        gradients, enumeration, direct, for up to three numbers between bounds, and evolution that fits.
+        near each start, for each side of conditions with ``or``. "enumeration" takes all designs, "evolution" is
+        differential evolution, and "direct" divides rectangles. "auto" takes the first of gradients, enumeration,
+        direct, for up to three numbers between bounds, and evolution that fits.
     starts : int
         Number of starts of "gradients".
     trade_off : bool

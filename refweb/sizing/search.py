@@ -16,6 +16,7 @@ J. M. Gablonsky and C. T. Kelley, J. Global Optim. 21 (2001) 27–37, doi:10.102
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -79,22 +80,26 @@ def searched(runs, method):
 
 
 def _gradients(runs, optima):
-    """Least design of each combination of options from all starts, and further ones with a reserve."""
+    """Least design of each combination of options from all starts and by all sides, and further ones with a reserve."""
     sizing, space, solved = runs.problem.sizing, runs.problem.space, []
     for options in space.choices():
-        smooth = Smooth(runs, options)
+        sides = [Smooth(runs, options, requirements) for requirements in runs.problem.sides() or [None]]
         starts, ends = space.starts(sizing.starts, sizing.seed), []
         for start in starts:
-            u = smooth.optimise(start)
-            (judged,) = runs.of([smooth.design(u)], slopes=True)
-            runs.ends.append((options, judged.value if judged.feasible is True else None))
-            if judged.feasible is True:
-                ends.append(u)
+            values = []
+            for smooth in sides:
+                u = smooth.optimise(start)
+                (judged,) = runs.of([smooth.design(u)], slopes=True)
+                if judged.feasible is True:
+                    ends.append((judged.value, smooth, u))
+                    values.append(judged.value)
+            runs.ends.append((options, min(values, default=None)))
         if ends:
-            solved.append((smooth, min(ends, key=lambda u: smooth.at(u).f)))
-            optima.append(smooth.optimum(solved[-1][1]))
+            _, smooth, u = min(ends, key=lambda end: end[0])
+            solved.append((smooth, u))
+            optima.append(smooth.optimum(u))
             continue
-        for start in starts:
+        for start, smooth in itertools.product(starts, sides):
             runs.of([smooth.design(smooth.nearest(start))], slopes=True)
     for smooth, u in solved if sizing.trade_off else ():
         for reserve in RESERVES:

@@ -8,7 +8,6 @@ those of ``run.json`` and which `results.sizing_text` and `pictures.sizing` read
 
 from __future__ import annotations
 
-import ast
 import math
 import pathlib
 from collections.abc import Callable
@@ -24,6 +23,7 @@ from ..results.provenance import versions
 from ..results.run_status import Clock, recorded
 from ..sweeps.study_result import finite
 from ..sweeps.workers import crew_of
+from .formulas import MOST_SIDES
 from .problem import Problem
 from .requirements import Sizing, load
 from .runs import Runs
@@ -314,10 +314,10 @@ def _note_starts(sized, runs, judged):
         text += f", others at {', '.join(f'{value:.4g}' for value in others)}" if others else ""
         text += f", {ends.count(None)} at no design that meets the requirements" if None in ends else ""
         sized.notes.append(f"{text}: gradients find an optimum near each start")
-    for name, formula in runs.problem.requirements.items() if sized.method == "gradients" else ():
-        if any(isinstance(node, ast.Or) for node in ast.walk(formula.tree)):
-            text = 'holds "or": each start follows one side alone, and designs of the other may be better'
-            sized.notes.append(f"{name} {text}; size each side by itself")
+    if sized.method == "gradients" and not runs.problem.sides():
+        names = ", ".join(name for name, formula in runs.problem.requirements.items() if formula.count > 1)
+        text = f'"or" has more than {MOST_SIDES} sides together, of which each start follows the nearest one alone'
+        sized.notes.append(f"{names}: {text}: designs of others may be better")
 
 
 def _write(sized, runs):

@@ -61,7 +61,7 @@ class Optimum(NamedTuple):
     multipliers : dict of str to float
         Change of the objective by the reserve of each requirement that is active.
     bounds : dict of str to float
-        The same of numbers at a bound, by their fraction.
+        The same of all numbers at a bound, by their fraction; 0 of one that the bound does not hold.
     residual : float
         Part of the gradient that the multipliers do not balance, over its size.
     """
@@ -95,13 +95,16 @@ class Smooth:
         Runs of designs.
     options : tuple of int
         The choice.
+    requirements : dict of str to refweb.sizing.formulas.Criterion, optional
+        Conditions by name, of ``or`` one side; by default those of the problem, of ``or`` the side that is nearest.
     """
 
-    def __init__(self, runs, options):
+    def __init__(self, runs, options, requirements=None):
         self.runs, self.options, self.problem = runs, options, runs.problem
+        self._requirements = requirements or self.problem.requirements
         self.count, self.coarse, self._points = len(self.problem.space.free), False, {}
         self.size: Any = None
-        self.parts = [name for name, f in self.problem.requirements.items() for _ in f.parts]
+        self.parts = [name for name, f in self._requirements.items() for _ in f.parts]
         self._keys = {(n, None): n for n in range(len(self.parts))}
 
     def design(self, u):
@@ -135,7 +138,7 @@ class Smooth:
         self.size = self.size or abs(f) or 1.0
         r, wide, lines = [], [], self._lines(row, design)
         rows = self._of_objective(numbers, slopes, lines, self.problem.objective.number(values).high)
-        for formula in self.problem.requirements.values():
+        for formula in self._requirements.values():
             each = self._by_line(formula, numbers, slopes, lines)
             pairs = zip(formula.slopes(numbers, slopes), formula.reserves(values), strict=True)
             for part, ((value, slope), reserve) in enumerate(pairs):
@@ -269,7 +272,7 @@ class Smooth:
         return minimise(functions, start, lower, upper, NEAR)[:-1]
 
     def _multipliers(self, u):
-        """(Multipliers of all parts, those of bounds, what they leave of the gradient over its size)."""
+        """(Multipliers of all parts, those of numbers at a bound, what they leave of the gradient over its size)."""
         from scipy.optimize import nnls
 
         point = self.at(u)
@@ -285,21 +288,18 @@ class Smooth:
         scale[scale == 0.0] = 1.0
         solved, left = nnls((normals / scale[:, None]).T, np.append(np.zeros(self.count), size))
         solved = solved / scale
-        multipliers, of_bounds = np.zeros(len(self.parts)), np.zeros(self.count)
+        multipliers, names = np.zeros(len(self.parts)), list(self.problem.space.free)
         parts = self._groups()[active] + OBJECTIVE
         np.add.at(multipliers, parts[~above], solved[: len(active)][~above])
-        of_bounds[at_bound] = solved[len(active) :]
+        of_bounds = {names[n]: float(value) for n, value in zip(at_bound, solved[len(active) :], strict=True)}
         return multipliers, of_bounds, float(left / size)
 
     def optimum(self, u):
         """The `Optimum` at some fractions."""
         multipliers, of_bounds, residual = self._multipliers(u)
-        by_name, at_bound = {}, {}
+        by_name = {}
         for name, value in zip(self.parts, multipliers, strict=True):
             if value > 0.0:
                 by_name[name] = by_name.get(name, 0.0) + float(value * self.size)
-        for name, value in zip(self.problem.space.free, of_bounds, strict=True):
-            if value > 0.0:
-                at_bound[name] = float(value * self.size)
         (judged,) = self.runs.of([self.design(u)], slopes=True)
-        return Optimum(judged, by_name, at_bound, residual)
+        return Optimum(judged, by_name, {name: value * self.size for name, value in of_bounds.items()}, residual)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, quote, short
+from ..messages import nearest, quote, row_of, short
 from ..reference.paths import with_value
 from ..results.state import State
 from ..system.static_system import at_rest
@@ -78,8 +78,8 @@ class Gradient:
         Derivative and ± of each entry, shape (entries,), by node (nodes, 3).
     left : ndarray, optional
         Derivative for a number that falls, where that is another one than for one that rises, of the same shape: two
-        lines or nodes share the largest value, or in dynamics two peaks, or a size is 0. None where there is one
-        derivative.
+        lines or nodes share the largest value, or in dynamics two peaks, or a size is 0, or a value has a kink. None
+        where there is one derivative.
     unit : str
         Unit of the derivative; of numbers of other tables that of the result, per unit of the number.
     number : float, optional
@@ -87,6 +87,8 @@ class Gradient:
     equal : tuple of str
         Natural frequencies that are equal within ±, of which the result is one; empty for other results. They keep
         their order: the lowest has the least derivative for a number that rises, and the largest for one that falls.
+    notes : tuple of str
+        In dynamics, stiffness of contact that refweb chose by the number; the derivative is that without its change.
     """
 
     result: str
@@ -99,6 +101,7 @@ class Gradient:
     unit: str
     number: float | None = None
     equal: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __float__(self) -> float:
         """The derivative by one number."""
@@ -245,6 +248,7 @@ class Gradients:
 
     def gradient(self, result, path, by=None):
         """The `Gradient` of a result, see `refweb.Solution.gradient`."""
+        refuse_no_texts(result, path, self._observed, self._given)
         if by not in (None, "line", "group", "node"):
             raise InputError(f'by = {quote(by)} must be "line", "group" or "node", or be left out')
         if path in BY_NODE:
@@ -501,6 +505,14 @@ def _with_error(parts):
     (value, _), (change, _), *beside = parts
     error = np.abs(change) + sum((share * np.abs(changed - value) for changed, share in beside), 0.0)
     return value, error + 8.0 * np.finfo(float).eps * np.abs(value)
+
+
+def refuse_no_texts(result, path, results, given):
+    """Refuse a result or a path that is no text; the message has ``results`` and paths of the dict of a scene."""
+    if not isinstance(result, str):
+        raise InputError(f"result = {quote(result)} must be the name of a result: {row_of(list(results))}")
+    if not isinstance(path, str):
+        raise InputError(f"path = {quote(path)} must be the path of a number: {row_of(numbers_of(given))}")
 
 
 def number_and_size(given, path):

@@ -124,10 +124,11 @@ class Pencil:
         self._shift, self._solve, unknowns = shift, self._solver(shift), len(self.massive)
         mass = self.M[self.massive][:, self.massive]
         if unknowns <= DENSE or 3 * size >= unknowns:
-            flexible, mass = np.column_stack([self._flexible(e) for e in np.eye(unknowns)]), mass.toarray()
-            product = mass @ flexible @ mass
-            inverse, parts = scipy.linalg.eigh(product + product.T, 2.0 * mass)
-            squared, parts = shift + 1.0 / inverse[: -size - 1 : -1], parts[:, : -size - 1 : -1]
+            root = np.linalg.cholesky(mass.toarray())
+            product = root.T @ np.column_stack([self._flexible(column) for column in root.T])
+            inverse, parts = np.linalg.eigh(0.5 * (product + product.T))
+            parts = scipy.linalg.solve_triangular(root.T, parts[:, : -size - 1 : -1])
+            squared = shift + 1.0 / inverse[: -size - 1 : -1]
         else:
             start = np.random.default_rng(self.seed + attempt).standard_normal(unknowns)
             operator = LinearOperator(mass.shape, matvec=self._flexible, dtype=float)  # pyright: ignore[reportCallIssue]  # as __new__ takes them

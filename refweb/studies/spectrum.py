@@ -107,10 +107,25 @@ def spectrum(system, t, x, number, seed=0):
     SolverError
         If no unknown with mass has stiffness, or a node has neither.
     """
-    pencil = Pencil(system, t, x, seed)
+    pencil, across = Pencil(system, t, x, seed), system.carriers.count_across(system) if system.angles else 0
     if (turned := coriolis(system, x)) is not None:
-        pairs = turning_pairs(pencil, turned, number, lambda v: _rounding(pencil, v) + _left(pencil, v))
-        return _described(pencil, *pairs)
+        lower = lambda v: _rounding(pencil, v) + _left(pencil, v)  # noqa: E731
+        *pairs, unstable, zero = turning_pairs(pencil, turned, number + across, lower)
+    else:
+        *pairs, unstable, zero = _pairs(pencil, number + across)
+    if pairs and across:
+        kept = np.flatnonzero(system.carriers.turns_about_axles(system, pairs[-1]))[:number]
+        pairs = [values[..., kept] for values in pairs] if len(kept) else []
+    if not pairs:
+        raise SolverError(
+            f"no mode at step {t:g}: none of the {len(pencil.massive) - across} unknowns that have mass has stiffness; "
+            "stretch the web by a load, or by a prestrain of its cable"
+        )
+    return _described(pencil, *pairs, unstable, zero)
+
+
+def _pairs(pencil, number):
+    """(ω², bounds, residuals, vectors) of the lowest modes, if there are any, and the numbers of unstable and zero."""
     unstable, low = pencil.below(0.0, 1.0), pencil.below(0.0, -1.0)
     vectors, shift = [], 0.0
     if unstable:
@@ -120,12 +135,7 @@ def spectrum(system, t, x, number, seed=0):
         low = pencil.below(shift)
     if number > unstable and low < len(pencil.massive):
         vectors.append(pencil.above(shift, min(number - unstable, len(pencil.massive) - low)))
-    if not vectors:
-        raise SolverError(
-            f"no mode at step {t:g}: none of the {len(pencil.massive)} unknowns that have mass has stiffness; stretch "
-            "the web by a load, or by a prestrain of its cable"
-        )
-    return _described(pencil, *_ordered(pencil, np.hstack(vectors)), unstable, low - unstable)
+    return *(_ordered(pencil, np.hstack(vectors)) if vectors else ()), unstable, low - unstable
 
 
 def _ordered(pencil, vectors):
@@ -140,9 +150,6 @@ def _ordered(pencil, vectors):
 def _described(pencil, squared, bound, residual, vectors, unstable, zero):
     """The `Spectrum` of vectors with φ*Mφ = 1."""
     system = pencil.system
-    if system.angles:
-        kept = system.carriers.turns_about_axles(system, vectors)
-        squared, bound, residual, vectors = (values[..., kept] for values in (squared, bound, residual, vectors))
     modes = np.arange(len(squared))
     shapes = np.zeros((len(modes), system.rows, 3), dtype=vectors.dtype)
     kinetic = np.zeros_like(shapes)

@@ -155,6 +155,10 @@ class RestingBodies(Carried):
         tensor = R @ np.linalg.pinv(self.turns.mobility[n]) @ R.T
         return tensor + ACROSS * (np.eye(3) - tensor) if n in self._on_axles else tensor
 
+    def count_across(self, system):
+        """Number of unknowns that turn bodies across their axles, which no body does."""
+        return 2 * sum(np.isin(self.turns.rows[n, 1], system.free // 3) for n in self._on_axles)
+
     def turns_about_axles(self, system, vectors):
         """Mask of the vectors (unknowns, modes) that turn no body across its axle, shape (modes,)."""
         turned = np.ones(vectors.shape[1], dtype=bool)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import refweb
 from refweb.__main__ import main
@@ -205,6 +206,32 @@ def test_a_ball_that_falls_on_one_spring():
         assert gradient.error[0] < 0.05 * abs(exact)
 
 
+def test_a_stiffness_that_refweb_chose():
+    """It goes as the energy of the ball, m v²/2, and does not know the tension of the line: a note says so.
+
+    The derivative is that at this stiffness k, with the largest force v √(km) on what is fixed.
+    """
+    ball = refweb.Body(name="ball", shape="sphere", radius=0.1, mass=0.5, position=(0.5, 0, 0.11), velocity=(0, 0, -2))
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1]),
+        cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=1000.0),
+        effects=(ball, refweb.Contact()),
+        observe=[refweb.Observe(name="force", quantity="reaction", body="ball", reduce="max")],
+        solve=refweb.Dynamic(duration=0.01, safety=0.02),
+        output=refweb.Output(interval=1e-3),
+    )
+    solution = refweb.run(scene, progress=False)
+    force, gradient = solution.results["force"].value, solution.gradient("force", "body.0.mass")
+    assert abs(float(gradient) - 0.5 * force / 0.5) <= gradient.error[0] < 0.05 * force
+    (note,) = gradient.notes
+    k = solution.scene.contact.law_of(ball)[0]
+    assert note.startswith(f'stiffness = {k:g} of the contact of body "ball" is one that refweb chose by this number')
+    assert not solution.gradient("force", "cable.density").notes
+    given = refweb.run(scene.replace(effects=(ball, refweb.Contact(stiffness=k))), progress=False)
+    again = given.gradient("force", "body.0.mass")
+    assert not again.notes and float(again) == float(gradient)
+
+
 def on_a_rail(duration, step, contact, velocity, height, observe):
     """A ball on one line whose ends are held, under gravity."""
     return refweb.Scene(
@@ -385,6 +412,20 @@ def test_one_sided_where_lines_share_the_largest_value():
     assert gained == pytest.approx(1e-4 * float(aside), rel=0.02)  # the second order of a large sag
 
 
+def test_a_ring_that_slides_on_a_thread():
+    """On an ellipse with the half axes 1 and b = 0.8 m from φ = 0.5 on, v²/2 = b g (1 − cos φ) − p sin φ at its lowest.
+
+    By the force p aside v has −sin φ/v, by gravity v/(2 g); the height has no derivative but by the stretch of the
+    thread, which is some 1e-5 of the pull.
+    """
+    solution, phi, g = refweb.run(refweb.Scene.load("ring-on-thread"), progress=False), 0.5, 9.81
+    v = np.sqrt(2.0 * 0.8 * g * (1.0 - np.cos(phi)))
+    for path, exact in (("gravity.acceleration.0", -np.sin(phi) / v), ("gravity.acceleration.2", -0.5 * v / g)):
+        speed, lowest = solution.gradient("speed", path), solution.gradient("lowest", path)
+        assert abs(float(speed) - exact) <= speed.error[0] + 1e-5 and speed.error[0] < 1e-3 * abs(exact)
+        assert abs(float(lowest)) <= lowest.error[0] + 1e-5 < 1e-4
+
+
 def pushed_spring(step_size, *effects):
     """The oscillator of two largest excursions, and a load of p t/0.4 up to 0.4 s and of p behind, with p = 0."""
     load = refweb.Load(node=[1], force=(0.0, 0.0, 0.0), factor=[(0.0, 0.0), (0.4, 1.0)])
@@ -458,6 +499,81 @@ def test_sizes_that_are_0():
     for name, path in (("stress", "velocity.0.value.1"), ("farthest", "point_mass.0.mass")):  # of order 2, and none
         gradient = solution.gradient(name, path)
         assert float(gradient) == gradient.error[0] == 0.0
+
+
+def test_where_two_lines_change_places():
+    """The largest tension of the looser of two lines is where both are equal, whose time changes with the number.
+
+    Beside it is the same in scipy, to 1e-12, by central differences.
+    """
+    scene = between_two_lines((0.3, 0.1, 0.0))
+    loosest = refweb.Observe(name="loosest", quantity="tension", select="min", reduce="max")
+    load = refweb.Load(node=[1], force=(0.0, 0.0, 0.0))
+    scene = scene.replace(observe=[loosest], effects=(*scene.effects, load))
+    ends, length = np.array([[-1.0, 0, 0], [1, 0, 0]]), 1.0 / 1.01
+
+    def tensions(x, area):
+        pulls = ends - x
+        lengths = np.linalg.norm(pulls, axis=1)
+        return np.array([1e6 * area, 100.0]) * (lengths / length - 1.0), pulls / lengths[:, None]
+
+    def loosest_of(area, speed, force):
+        def rate(t, y):
+            tension, to = tensions(y[:3], area)
+            return [*y[3:], *((tension[:, None] * to).sum(axis=0) + [force, 0.0, 0.0]) / 0.5]
+
+        start = [0.0, 0.0, 0.0, 0.3, speed, 0.0]
+        motion = solve_ivp(rate, (0.0, 1.0), start, "DOP853", rtol=1e-12, atol=1e-13, dense_output=True).sol
+        apart = lambda t: np.subtract(*tensions(motion(t)[:3], area)[0])  # noqa: E731
+        return tensions(motion(brentq(apart, 0.75, 0.81))[:3], area)[0].min()
+
+    solution, at = refweb.run(scene, progress=False), (1e-4, 0.1, 0.0)
+    assert abs(solution.results["loosest"].value - loosest_of(*at)) <= solution.results["loosest"].error
+    steps = {"cable.groups.a.area": 1e-8, "velocity.0.value.1": 1e-4, "load.0.force.0": 1e-4}
+    for n, (path, step) in enumerate(steps.items()):
+        low, high = (loosest_of(*(p + s * step * (k == n) for k, p in enumerate(at))) for s in (-1.0, 1.0))
+        gradient, exact = solution.gradient("loosest", path), (high - low) / (2.0 * step)
+        assert abs(float(gradient) - exact) <= gradient.error[0] < 0.3 * abs(exact) and gradient.left is None
+
+
+def test_sizes_that_pass_0():
+    """A swing turns back: its least speed is 0 for any speed, and a load across leaves |sin(ωt)/(mω)| of it."""
+    observe = [
+        refweb.Observe(name="speed", quantity="velocity", node=1, reduce="min"),
+        refweb.Observe(name="along", quantity="velocity", node=[1], component="y", select="abs", reduce="min"),
+    ]
+    scene = between_two_lines((0.0, 0.1, 0.0))
+    load = refweb.Load(node=[1], force=(0.0, 0.0, 0.0))
+    solution = refweb.run(scene.replace(observe=observe, effects=(*scene.effects, load)), progress=False)
+    turn = solution.results["speed"].time
+    for name in ("speed", "along"):
+        assert abs(float(solution.gradient(name, "velocity.0.value.1"))) < 1e-9
+    gradient = solution.gradient("speed", "load.0.force.2")  # by z, of which ω = 2/s as by y, but for the large sag
+    exact = abs(np.sin(2.0 * turn))
+    assert float(gradient) == pytest.approx(exact, rel=0.15) and gradient.left[0] == pytest.approx(-float(gradient))
+
+
+def test_a_motion_that_stays_at_a_kink():
+    """Lines at rest without strain, and a ball that just touches: a push and a pull move them otherwise, with no sign.
+
+    By prestrain the tension at the start is EA for a number that rises, and 0 for one that falls.
+    """
+    slack = replace(between_two_lines((0.0, 0.0, 0.0)).cable, law="tension-only", prestrain=0.0)
+    first = refweb.Observe(name="first", quantity="tension", reduce="max")
+    last = refweb.Observe(name="last", quantity="tension")
+    scene = between_two_lines((0.0, 0.0, 0.0)).replace(cable=slack, observe=[first, last])
+    solution = refweb.run(scene, progress=False)
+    gradient = solution.gradient("first", "cable.prestrain")
+    assert float(gradient) == pytest.approx(100.0, rel=1e-6) and abs(gradient.left[0]) < 1e-9
+    for path in ("velocity.0.value.0", "cable.prestrain"):
+        with pytest.raises(InputError, match=f'"last" by {path}: at 0.* s line 0 is neither slack nor taut'):
+            solution.gradient("last", path)
+    assert float(solution.gradient("last", "velocity.0.value.1")) == 0.0  # across, of order 2
+
+    scene = on_a_rail(0.02, 2e-4, refweb.Contact(stiffness=1e3), (0.0, 0.0, 0.0), 0.1, "z")
+    solution = refweb.run(scene.replace(effects=scene.effects[:2]), progress=False)
+    with pytest.raises(InputError, match='by body.0.velocity.2: at .* s body "ball" just touches, and stays so'):
+        solution.gradient("place", "body.0.velocity.2")
 
 
 def test_run_and_step_refinement_of_different_peaks():
@@ -551,6 +667,8 @@ def test_wrong_names(tmp_path):
     ]
     solution = refweb.run(net(effects=(load,), observe=more, duration=6e-3), progress=False)
     for result, path, by, text in (
+        (None, "cable.area", None, "result = None must be the name of a result: moved, speed"),
+        ("moved", 3, None, "path = 3 must be the path of a number: "),
         ("mouved", "cable.area", None, 'result "mouved" is none of this scene, did you mean "moved"'),
         ("moved", "cable.aera", None, 'path "cable.aera" is no number of this scene, did you mean "cable.area"'),
         ("moved", "cable.area", "line", 'by = "line" is of statics'),

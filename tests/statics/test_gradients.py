@@ -528,6 +528,8 @@ def test_kinks_are_named():
 def test_refusals(tmp_path):
     solution = refweb.run(net())
     for arguments, words in (
+        ((1, "cable.area"), "result = 1 must be the name of a result: tension, stress, "),
+        (("tension", ["cable.area"]), r"path = \['cable.area'\] must be the path of a number: .*cable.area, "),
         (("tensoin", "cable.area"), 'result "tensoin" is none of this scene, did you mean "tension"'),
         (("tension", "cable.aera"), r'path "cable.aera" is no number of this scene, did you mean "cable.area"'),
         (("tension", "cable.knot_factor"), r"cable.knot_factor = 1 cannot be changed to both sides: .* must be ≤ 1"),

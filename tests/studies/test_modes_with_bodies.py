@@ -1,6 +1,7 @@
 """Modes of free bodies on ropes beside closed forms: sway, bifilar torsion, bounce, pendulum, librations."""
 
 import numpy as np
+import pytest
 
 import refweb
 from refweb.pictures.frames import frame_of
@@ -200,3 +201,47 @@ def test_table_names_a_body_that_moves_most(tmp_path):
     assert rows_of_modes(found.summary()["steps"][0]).rows[0][4] == "arm" and np.isnan(found.history["node"]).all()
     _, table = of_folder(tmp_path / "out").table()
     np.testing.assert_array_equal(table["frequency"], found.frequency)
+
+
+def on_an_axle(direction):
+    """A pendulum of a box on an axle, beside a node of 1e-5 kg in the middle of a stiff line in tension."""
+    arm = {"name": "arm", "shape": "box", "size": [0.5, 0.2, 0.2], "mass": 2.0, "position": [0.5, 0.0, 0.0]}
+    arm |= {"inertia": [0.01, 0.05, 0.05], "axle": {"point": [0.0, 0.0, 0.0], "direction": direction}}
+    points = [[-1, 0, 1], [0, 0, 1], [1, 0, 1]]
+    return refweb.Scene.from_dict(
+        {
+            "web": {"kind": "inline", "points": points, "lines": [[0, 1], [1, 2]], "supports": [0, 2]},
+            "body": [arm],
+            "point_mass": [{"node": 1, "mass": 1e-5}],
+            "cable": {"law": "linear", "modulus": 1e9, "area": 1e-3, "density": 0, "prestrain": 1e-3},
+            "gravity": {"acceleration": [0.0, 0.0, -G]},
+            "solve": {"kind": "static"},
+        }
+    )
+
+
+@pytest.mark.parametrize("direction", [[1.0, 1.0, 0.0], [1.0, 2.0, 3.0]])
+def test_all_modes_beside_an_axle_across_all_axes(direction):
+    """ω² = m g r/(I + m r²), with what is across the axle n of arm and gravity; a node has T and EA, 2/L m of it each.
+
+    That along the line is faster than what would turn the body across its axle, which is no mode.
+    """
+    n = np.array(direction) / np.linalg.norm(direction)
+    r, g = 0.5 * np.sqrt(1.0 - n[0] ** 2), G * np.sqrt(1.0 - n[2] ** 2)
+    pendulum = 2.0 * g * r / (n @ np.diag([0.01, 0.05, 0.05]) @ n + 2.0 * r**2)
+    length = 1.0 / (1.0 + 1e-3)  # the tension is EA ε, and the line is 1 m long in it
+    tension, stiff = 1e6 * 1e-3, 1e6 / length
+    exact = np.sqrt([pendulum, 2.0 * tension / 1e-5, 2.0 * tension / 1e-5, 2.0 * stiff / 1e-5]) / (2.0 * np.pi)
+    for number in (3, 10):
+        found = refweb.modes(on_an_axle(direction), number, progress=False)
+        np.testing.assert_allclose(found.frequency, exact[:number], rtol=1e-4)  # the weight of the node
+
+
+def test_a_body_on_an_axle_that_nothing_turns():
+    """A box alone that hangs from a vertical axle has no mode, which an error says."""
+    scene = on_an_axle([0.0, 0.0, 1.0]).to_dict()
+    alone = {"kind": "inline", "points": [[-1, 0, 1], [1, 0, 1]], "lines": [[0, 1]], "supports": [0, 1]}
+    del scene["point_mass"]
+    scene = refweb.Scene.from_dict({**scene, "web": alone})
+    with pytest.raises(refweb.SolverError, match="no mode at step 1: none of the 1 unknowns that have mass has stiff"):
+        refweb.modes(scene, 3, progress=False)

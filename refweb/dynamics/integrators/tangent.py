@@ -16,11 +16,11 @@ has the limit of this: over a kick of size h it decays as δv' = b − M⁻¹C �
 
 with δv⁻ before the kick. It is that of the steps to order 2, not to rounding.
 
-`Steps` follows a run, and calls `Tangent.step` behind each step; `refweb.dynamics.gradients` is its user.
+`Steps` follows a run, and calls `Tangent.step` behind each step; `refweb.dynamics.linear_run` is its user.
 
 May change: constants, down to rounding, and how products are computed. Must stay: steps are those of the run itself,
 bit for bit, and δa is the derivative of `step` and of `effects.contact_solver`: a change of their kick has to follow
-here; names of `Steps` and `Tangent`, which `gradients` uses. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
+here; names of `Steps` and `Tangent`, which `linear_run` uses. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations
