@@ -23,9 +23,7 @@ def impact(problem, rtol):
         x, v = state.reshape(2, count, 3)
         return np.concatenate([v, weight * problem.forces(x)]).ravel()
 
-    velocity = np.zeros((count, 3))
-    velocity[problem.node, 2] = problem.speed
-    start = np.concatenate([problem.points, velocity]).ravel()
+    start = np.concatenate([problem.start, problem.velocities]).ravel()
     found = solve_ivp(rate, (0.0, problem.duration), start, "DOP853", rtol=rtol, atol=1e-3 * rtol)
     if not found.success:
         raise RuntimeError(found.message)

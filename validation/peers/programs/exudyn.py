@@ -26,9 +26,7 @@ def tension(mbs, t, item, stretch, rate, stiffness, damping, force):
 def system(problem):
     """The system, its nodes and markers, and the law, which has to live as long as the system does."""
     mbs = exu.SystemContainer().AddSystem()
-    velocity = np.zeros_like(problem.points)
-    velocity[problem.node, 2] = problem.speed
-    moved, masses, nodes, markers = problem.start - problem.points, problem.masses, [], []
+    velocity, moved, masses, nodes, markers = problem.velocities, problem.start - problem.points, problem.masses, [], []
     for n, (point, free) in enumerate(zip(problem.points, problem.free, strict=True)):
         if free:
             nodes.append(

@@ -17,7 +17,7 @@ def model_of(problem, step, damping=0.0):
     spec.option.timestep, spec.option.gravity = step, (0.0, 0.0, 0.0)
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_EULERDAMP
     free, masses = problem.free, problem.masses
-    for n, point in enumerate(problem.points):
+    for n, point in enumerate(problem.start):
         body = spec.worldbody.add_body(name=f"n{n}", pos=point)
         body.add_site(name=f"s{n}")
         if free[n]:
@@ -34,8 +34,7 @@ def model_of(problem, step, damping=0.0):
 def impact(problem, steps):
     model = model_of(problem, problem.duration / steps)
     data = mujoco.MjData(model)
-    body = problem.node + 1  # the world is the first one
-    data.qvel[model.body_dofadr[body] + 2] = problem.speed
+    data.qvel[:] = problem.velocities[problem.free].ravel()
     mujoco.mj_step(model, data, nstep=steps)
     mujoco.mj_kinematics(model, data)
     return data.xpos[1:].copy()
@@ -44,7 +43,7 @@ def impact(problem, steps):
 def draws(problem, steps):
     """One model, which two threads share: steps run outside of Python's lock."""
     model = model_of(problem, problem.duration / steps)
-    body = problem.node + 1
+    body = problem.node + 1  # the world is the first one
 
     def one(speed):
         data = mujoco.MjData(model)
@@ -61,7 +60,6 @@ def statics(problem, step=1e-4, damping=0.05, still=1e-6):
     """Damped steps under the last load until nothing moves: MuJoCo has no solver for equilibria."""
     model = model_of(problem, step, damping)
     data = mujoco.MjData(model)
-    data.qpos[:] = (problem.start - problem.points)[problem.free].ravel()
     data.xfrc_applied[problem.node + 1, 2] = problem.loads[-1]
     while data.time < 10.0:
         mujoco.mj_step(model, data, nstep=500)

@@ -15,10 +15,11 @@ def version():
 def impact(problem, steps):
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
     masses = np.where(problem.free, problem.masses, 0.0)  # a particle without mass does not move
-    for n, (point, mass) in enumerate(zip(problem.points.tolist(), masses.tolist(), strict=True)):
-        builder.add_particle(point, (0.0, 0.0, problem.speed if n == problem.node else 0.0), mass, radius=0.0)
+    for point, velocity, mass in zip(problem.start.tolist(), problem.velocities.tolist(), masses.tolist(), strict=True):
+        builder.add_particle(point, velocity, mass, radius=0.0)
     for (i, j), length in zip(problem.lines.tolist(), problem.natural.tolist(), strict=True):
         builder.add_spring(i, j, problem.ea / length, 0.0, 0.0)
+        builder.spring_rest_length[-1] = length  # in place of that between the particles
     model = builder.finalize(device="cpu")
     solver = newton.solvers.SolverSemiImplicit(model)
     before, after, control = model.state(), model.state(), model.control()

@@ -52,7 +52,9 @@ def moving(problem):
     net(problem)
     for n, mass in enumerate(problem.masses.tolist()):
         ops.mass(n, mass, mass, mass)
-    ops.setNodeVel(problem.node, 3, problem.speed, "-commit")
+    velocities = problem.velocities
+    for n, axis in np.argwhere(velocities).tolist():
+        ops.setNodeVel(n, axis + 1, float(velocities[n, axis]), "-commit")
     ops.constraints("Plain")
     ops.numberer("RCM")
 

@@ -44,10 +44,9 @@ def move(
 
 
 def impact(problem, steps):
-    velocity = np.zeros_like(problem.points)
-    velocity[problem.node, 2] = problem.speed  # flat lines do not pull: also the velocity half a step before
+    velocity = problem.velocities  # flat and slack lines do not pull: also those half a step before
     with wp.ScopedDevice("cpu"):
-        x, v = wp.array(problem.points, dtype=wp.vec3d), wp.array(velocity, dtype=wp.vec3d)
+        x, v = wp.array(problem.start, dtype=wp.vec3d), wp.array(velocity, dtype=wp.vec3d)
         lines, natural = wp.array(problem.lines, dtype=wp.vec2i), wp.array(problem.natural, dtype=wp.float64)
         weight = wp.array(np.where(problem.free, 1.0 / problem.masses, 0.0), dtype=wp.float64)
         force, step = wp.zeros_like(x), problem.duration / steps
