@@ -5,8 +5,9 @@ whose centre lines cross at the distance h push each other apart with
 
     K h (4 r² − h²)^(3/2)/(√27 r³)
 
-times the mean of their stretches, length over natural length, shared out to their nodes as by a lever. Near a node, at the share s of a line of length l, each has W(s l)
-of it, W(y) = S(y/2r) − S((y − l)/2r), S(x) = ½ + ¾ x − ¼ x³ from 0 at −1 to 1 at 1, so that lines that continue each
+times the mean of their stretches, length over natural length, shared out to their nodes as by a lever. Near a node, at
+the share s of a line of length l, each has W(s l) of it, W(y) = S(y/2r) − S((y − l)/2r), with S(x) = ½ + ¾ x − ¼ x³
+from 0 at −1 to 1 at 1, so that lines that continue each
 other have the whole together. Lines with a common node do not push each other.
 """
 

@@ -158,10 +158,18 @@ def section(comparison):
     right = f"Right: {truth.said}" + (f"; they differ by {truth.apart:.0e} m." if truth.apart else ".")
     rows = [row(comparison, name) for name in ("refweb", *runs.ORDER) if comparison.of(name)]
     heads = ["program", "lines", "with", "error [m]", "of tensions [N]", "CPU [s]", "first [s]", "wall [s]"]
-    text = f"## {work.title}\n\n{work.said}\n\n{right}\n\n" + table([*heads, "memory [MB]", "× refweb"], rows)
+    few = f"\n\nQuick variant: {extent(comparison.problem)}." if comparison.quick else ""
+    text = f"## {work.title}\n\n{work.said}{few}\n\n{right}\n\n" + table([*heads, "memory [MB]", "× refweb"], rows)
     failures = [r for r in comparison.records if "failure" in r]
     told = {f"`{r['program']}`, {given(r['settings'])}: {in_own_words(r)}" for r in failures}
     return text + ("\n\nIn their own words:\n\n" + "\n".join(f"- {line}" for line in sorted(told)) if told else "")
+
+
+def extent(problem):
+    """Size of a problem in words."""
+    words = f"{len(problem.lines)} lines"
+    words += f", {problem.duration:g} s" if problem.duration else ""
+    return words + (f", {len(problem.draws)} draws" if len(problem.draws) else "")
 
 
 def in_own_words(record):
@@ -209,8 +217,8 @@ def points(comparison, name):
 def drawn(comparisons):
     """Error over CPU time."""
     page, plot = plots.axes("CPU time [s]", "farthest node off [m]", height=4.4)
-    marks = dict(zip(("refweb", *runs.ORDER), "osD^v<>PXh", strict=True))
-    colours = dict(zip(marks, (*plots.COLOURS, "#1f9e9e", "#d48fb0", "#7f6a3f", "#9aa83a"), strict=True))
+    marks = dict(zip(("refweb", *runs.ORDER), "osD^v<>PXh*", strict=True))
+    colours = dict(zip(marks, (*plots.COLOURS, "#1f9e9e", "#d48fb0", "#7f6a3f", "#9aa83a", "#5b5bd6"), strict=True))
     for comparison, style in zip(comparisons, ("-", "--"), strict=False):
         implicit = " (implicit)" if comparison.work.name == "implicit" else ""
         for name in marks:

@@ -7,6 +7,9 @@ import KratosMultiphysics.StructuralMechanicsApplication as Structural
 import numpy as np
 from KratosMultiphysics.python_linear_solver_factory import ConstructSolver
 
+from ..contact import Contacts
+from ..many import by_processes
+
 COMPILES = False
 VARIABLES = (
     *(Kratos.DISPLACEMENT, Kratos.REACTION, Kratos.VELOCITY, Kratos.ACCELERATION, Kratos.VOLUME_ACCELERATION),
@@ -109,7 +112,7 @@ def implicit(problem, steps):
     return positions(problem, part)
 
 
-def impact(problem, steps):
+def impact(problem, steps, push=lambda part: None):
     part = net(problem, (*VARIABLES, *EXPLICIT))
     scheme = Structural.ExplicitCentralDifferencesScheme(0.0, 0.0, 0.0)
     strategy = Structural.MechanicalExplicitStrategy(part, scheme, False, False, True)
@@ -120,5 +123,27 @@ def impact(problem, steps):
         node.SetSolutionStepValue(Structural.MIDDLE_VELOCITY, 0, velocity)
     for time in (step * np.arange(1, steps + 1)).tolist():
         part.CloneTimeStep(time)
+        push(part)
         strategy.Solve()
     return positions(problem, part)
+
+
+def capture(problem, steps):
+    """Its contact applications have surfaces and grains, not lines: loads of each step are those of NumPy."""
+    contacts, utilities = Contacts(problem), Kratos.VariableUtils()
+
+    def push(part):
+        if not part.NumberOfConditions():
+            for n in range(1, len(problem.points) + 1):
+                part.CreateNewCondition("PointLoadCondition3D1N", n, [n], part.GetProperties(1))
+        x = problem.points + np.reshape(
+            utilities.GetSolutionStepValuesVector(part.Nodes, Kratos.DISPLACEMENT, 1, 3), (-1, 3)
+        )
+        pushed = Kratos.Vector(contacts.forces(x).ravel())
+        utilities.SetSolutionStepValuesVector(part.Nodes, Structural.POINT_LOAD, pushed, 0)
+
+    return impact(problem, steps, push)
+
+
+def draws(problem, steps):
+    return by_processes(impact, problem, steps=steps)

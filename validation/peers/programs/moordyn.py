@@ -71,3 +71,8 @@ def impact(problem, steps, scheme="RK2"):
         found = [moordyn.GetPointPos(moordyn.GetPoint(system, n)) for n in range(1, len(problem.points) + 1)]
         moordyn.Close(system)
     return np.array(found) + [0.0, 0.0, depth]
+
+
+def capture(problem, steps):
+    """MoorDyn has no contact of lines with a body or with each other: they pass."""
+    return impact(problem, steps)

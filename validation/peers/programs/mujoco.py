@@ -12,10 +12,12 @@ def version():
     return f"MuJoCo {mujoco.__version__}"
 
 
-def model_of(problem, step, damping=0.0):
+def model_of(problem, step, damping=0.0, tangled=0.0):
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.gravity = step, (0.0, 0.0, 0.0)
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    if not tangled:
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     free, masses = problem.free, problem.masses
     for n, point in enumerate(problem.start):
         body = spec.worldbody.add_body(name=f"n{n}", pos=point)
@@ -28,7 +30,37 @@ def model_of(problem, step, damping=0.0):
         tendon = spec.add_tendon(stiffness=[problem.ea / length, 0, 0], springlength=(0.0, length))
         tendon.wrap_site(f"s{i}")
         tendon.wrap_site(f"s{j}")
+    if tangled:
+        tangle(spec, problem, tangled)
     return spec.compile()
+
+
+def tangle(spec, problem, impedance):
+    """Add the contact of lines with the ball and with each other; ``impedance`` is the share of a rigid contact."""
+    line = np.median(problem.masses)  # of nodes within a line
+    solimp = (impedance, impedance, 1e-3, 0.5, 2.0)
+    flex = spec.add_flex(
+        name="lines",
+        dim=1,
+        radius=problem.line_radius,
+        vertbody=[f"n{n}" for n in range(len(problem.points)) if n != problem.ball],
+        vert=np.zeros(3 * (len(problem.points) - 1)),
+        elem=problem.lines.ravel(),
+        condim=1,
+        selfcollide=mujoco.mjtFlexSelf.mjFLEXSELF_SAP,
+        solref=(-problem.line_stiffness / line, 0.0),
+        solimp=solimp,
+    )
+    ball = spec.body(f"n{problem.ball}").add_geom(
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[problem.ball_radius - problem.line_radius, 0.0, 0.0],
+        mass=0.0,
+        condim=1,
+        priority=1,
+        solref=(-problem.ball_stiffness / line, 0.0),
+        solimp=solimp,
+    )
+    return flex, ball
 
 
 def impact(problem, steps):
@@ -67,3 +99,17 @@ def statics(problem, step=1e-4, damping=0.05, still=1e-6):
             mujoco.mj_kinematics(model, data)
             return data.xpos[1:].copy()
     raise RuntimeError(f"moves with {np.abs(data.qvel).max():.1e} m/s after {data.time:.0f} s of time")
+
+
+def capture(problem, steps, impedance=1e-4):
+    """Lines are capsules of a flex, whose contact is a soft constraint, with solref of a direct stiffness.
+
+    Its acceleration is that stiffness times the overlap, so that the push is linear in it and grows with the masses of
+    a contact: that of the ball is the law of the problem, that of lines is another one, of the same stiffness.
+    """
+    model = model_of(problem, problem.duration / steps, tangled=impedance)
+    data = mujoco.MjData(model)
+    data.qvel[:] = problem.velocities[problem.free].ravel()
+    mujoco.mj_step(model, data, nstep=steps)
+    mujoco.mj_kinematics(model, data)
+    return data.xpos[1:].copy()
