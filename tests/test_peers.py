@@ -6,12 +6,13 @@ method in NumPy, and the closed form of a saddle. One whose peer is not installe
 
 import importlib.util
 import json
+import os
 
 import numpy as np
 import pytest
 
 from validation.peers import __main__ as command
-from validation.peers import compare, contact, page, runs, truth
+from validation.peers import compare, contact, page, runs, start, truth
 from validation.peers.problem import Problem
 from validation.peers.programs import refweb
 from validation.peers.work import capture, draws, works
@@ -170,6 +171,7 @@ def test_it_measures_in_pairs_and_goes_on(measured, capsys):
     assert calls == ["refweb", "jax_fdm", "jax_fdm", "refweb"]
     text = (folder / "peers.md").read_text(encoding="utf-8")
     assert "| `jax_fdm` | 3 (1) |" in text and "In their own words" not in text
+    assert "Quick variant: 180 lines." in text, "the page does not say what it has not measured"
     assert command.main([*arguments, "--quick"]) == 0 and len(calls) == 4, "nothing is measured twice"
     records = json.loads((folder / "form-quick.json").read_text(encoding="utf-8"))["records"]
     assert [r["beside"] for r in records] == [None, None, "jax_fdm", "jax_fdm"]
@@ -189,6 +191,28 @@ def test_a_failure_is_told_in_words(measured, monkeypatch):
     text = (folder / "peers.md").read_text(encoding="utf-8")
     assert "| `jax_fdm` | fails |" in text
     assert "- `jax_fdm`, as they are: RuntimeError: analyze returned -3 · WARNING: singular" in text
+
+
+def test_an_error_above_the_target_is_told(measured, monkeypatch):
+    _, arguments, folder = measured
+    run = compare.runs.run
+
+    def other_model(machine, name, *more):
+        cost, result = run(machine, name, *more)
+        return cost, result if name == "refweb" else result + [0.0, 0.0, 0.02]
+
+    monkeypatch.setattr(compare.runs, "run", other_model)
+    command.main([*arguments, "--quick"])
+    assert "| `jax_fdm` | 2e-02 m off |" in (folder / "peers.md").read_text(encoding="utf-8")
+
+
+def test_an_index_that_is_not_reached_is_told(monkeypatch):
+    environment = {"PIP_CONFIG_FILE": os.devnull, "PIP_INDEX_URL": "http://127.0.0.1:9", "PIP_FIND_LINKS": ""}
+    for key, value in (environment | {"PIP_RETRIES": "1", "PIP_TIMEOUT": "2"}).items():
+        monkeypatch.setenv(key, value)
+    found = start.measured("dop853")
+    assert found["program"] == "dop853" and found["failure"].startswith("the package index is not reachable: "), found
+    assert start.reason("WARNING: old\nERROR: No matching distribution found for x").endswith("found for x")
 
 
 def test_wrong_names_are_refused(capsys):
@@ -212,3 +236,5 @@ def test_the_curves_are_drawn(measured):
     one.records.append({"program": "moordyn", "settings": {"steps": 1}, "failure": "x", "beside": None})
     assert one.chosen("mujoco") is None and one.chosen("moordyn") is None, "errors of 0.06 m are too large"
     assert len(plot.lines) == 1 and len(problem.lines) == 112
+    (plot,) = page.drawn([one, one]).axes
+    assert [line.get_label() for line in plot.lines] == ["mujoco", "mujoco (impact-error)"]

@@ -7,8 +7,8 @@ whose centre lines cross at the distance h push each other apart with
 
 times the mean of their stretches, length over natural length, shared out to their nodes as by a lever. Near a node, at
 the share s of a line of length l, each has W(s l) of it, W(y) = S(y/2r) − S((y − l)/2r), with S(x) = ½ + ¾ x − ¼ x³
-from 0 at −1 to 1 at 1, so that lines that continue each
-other have the whole together. Lines with a common node do not push each other.
+from 0 at −1 to 1 at 1, so that lines that continue each other have the whole together. Lines with a common node do not
+push each other.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def ladder(steps, rtol):
     """Settings from the longest steps to the shortest."""
     found = {name: [{"steps": n} for n in steps] for name in STEPPED}
     found["refweb"] += [{"steps": steps[0] // 2, "method": "explicit", "order": 6}]
-    found |= {"moordyn": [{"steps": steps[-1]}], "pyelastica": [{"steps": 15 * steps[-1], "radius": 1e-3}]}
+    found |= {"moordyn": [{"steps": steps[-1]}], "pyelastica": [{"steps": 4 * steps[-1], "radius": 4e-3}]}
     return found | {"dop853": [{"rtol": one} for one in rtol]}
 
 
