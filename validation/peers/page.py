@@ -161,8 +161,8 @@ def section(comparison):
     right = f"Right: {truth.said}" + (f"; they differ by {truth.apart:.0e} m." if truth.apart else ".")
     rows = [row(comparison, name) for name in ("refweb", *runs.ORDER) if comparison.of(name)]
     heads = ["program", "lines", "with", "error [m]", "of tensions [N]", "CPU [s]", "first [s]", "wall [s]"]
-    few = f"\n\nQuick variant: {extent(comparison.problem)}." if comparison.quick else ""
-    text = f"## {work.title}\n\n{work.said}{few}\n\n{right}\n\n" + table([*heads, "memory [MB]", "× refweb"], rows)
+    quick = f"\n\nQuick variant: {extent(comparison.problem)}." if comparison.quick else ""
+    text = f"## {work.title}\n\n{work.said}{quick}\n\n{right}\n\n" + table([*heads, "memory [MB]", "× refweb"], rows)
     failures = [r for r in comparison.records if "failure" in r]
     told = {f"`{r['program']}`, {given(r['settings'])}: {in_own_words(r)}" for r in failures}
     return text + ("\n\nIn their own words:\n\n" + "\n".join(f"- {line}" for line in sorted(told)) if told else "")

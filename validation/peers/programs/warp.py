@@ -45,14 +45,14 @@ def move(
     force[node] = wp.vec3d()
 
 
-def impact(problem, steps, contacts=None):
+def impact(problem, steps, more=None):
     velocity = problem.velocities  # flat and slack lines do not pull: also those half a step before
     with wp.ScopedDevice("cpu"):
         x, v = wp.array(problem.start, dtype=wp.vec3d), wp.array(velocity, dtype=wp.vec3d)
         lines, natural = wp.array(problem.lines, dtype=wp.vec2i), wp.array(problem.natural, dtype=wp.float64)
         weight = wp.array(np.where(problem.free, 1.0 / problem.masses, 0.0), dtype=wp.float64)
         force, step = wp.zeros_like(x), problem.duration / steps
-        push = contacts(problem, x, lines, natural, force) if contacts else None
+        push = more(problem, x, lines, natural, force) if more else None
         for n in range(steps):
             wp.launch(pull, len(problem.lines), [x, lines, natural, wp.float64(problem.ea), force])
             if push:
