@@ -14,7 +14,6 @@ push each other.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 SKIN = 0.02
 """Distance within which pairs are searched in advance [m]."""
@@ -28,6 +27,8 @@ class Contacts:
 
     def search(self, x):
         """Pairs of lines that may touch before a node has moved by half the `SKIN`."""
+        from scipy.spatial import cKDTree  # which not every program brings
+
         ends = x[self.problem.lines]
         half = 0.5 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max()
         reach = 2.0 * (half + self.problem.line_radius) + SKIN
