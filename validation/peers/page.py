@@ -16,6 +16,11 @@ from . import runs
 PICTURES = pathlib.Path(__file__).parents[1] / "pictures"
 ENOUGH = 10
 """Pairs from which on a ratio is a claim."""
+CURVES = {
+    "peers.png": ("of the impact", "impact-error", "implicit"),
+    "peers-capture.png": ("of the throw and, dashed, of the capture", "throw", "capture"),
+}
+"""Pictures: words, and works, of which the second is dashed."""
 BUSY = 1.5
 """Wall time over CPU time from which on a page says that the machine was busy."""
 INTRODUCTION = """# Beside its peers
@@ -30,8 +35,10 @@ write it, and measures them beside each other. All numbers of this page come fro
   the least of all runs. What compiles when it is called is called twice: "first" has the first call. Each run is a
   process of its own with one thread; **memory** is the peak of that process, libraries included.
 - **× refweb** is the median of the ratios of CPU times in pairs of runs, one right after the other, first the one and
-  then the other, and in brackets the number of pairs. Below ten pairs it is no claim.
-- **Lines** are those of the program that the work needs, imports included, without comments and empty lines.
+  then the other, and in brackets the number of pairs. Below ten pairs it is no claim. "m off" is the least error of a
+  program that does not reach the target, since its elements or its contact are another model.
+- **Lines** are those of the program that the work needs, imports included, without comments and empty lines; contact
+  forces and draws that several programs take from one file are not counted.
 - refweb runs without its own estimate of errors in dynamics, `[accuracy] error = "none"`, since no other program makes
   one; by default it makes a second run for it. In statics its bounds are included.
 """
@@ -45,17 +52,10 @@ that was stopped goes on there, and a changed program is measured anew with anot
 from another environment, `--full` takes ten pairs of every peer however long that lasts, and `--work start` installs
 each program in an empty environment.
 """
-LEFT_OUT = """## Not compared
-
-- **PyElastica** has rods with bending and shear, joined by forces in Python; a net of strings that carry tension only
-  is no model of it.
-- **A throw and a capture with self-contact**: contact of lines is a penalty in refweb, a soft constraint in MuJoCo, and
-  here the others have none between lines, so that no program solves the problem of another.
-"""
 
 
 def write(folder, done, versions, start, target=None):
-    """Write the page and its picture.
+    """Write the page and its pictures.
 
     Parameters
     ----------
@@ -66,18 +66,19 @@ def write(folder, done, versions, start, target=None):
     start : dict
         What `validation.peers.start` has measured.
     target : pathlib.Path, optional
-        File of the page outside of the folder; its picture is then ``validation/pictures/peers.png``.
+        File of the page outside of the folder; its pictures are then in ``validation/pictures``.
     """
-    picture = folder / "peers.png" if target is None else PICTURES / "peers.png"
+    pictures = folder if target is None else PICTURES
     target = target or folder / "peers.md"
-    link = os.path.relpath(picture, target.parent).replace(os.sep, "/")
     parts = [INTRODUCTION.strip(), programs(versions), business(done), summary(done)]
-    curves = [one for one in done if one.work.name in ("impact-error", "implicit")]
-    if any(points(one, name) for one in curves for name in one.settings):
-        picture.write_bytes(plots.image(drawn(curves)).png)
-        parts.append(f"![Error over CPU time of the impact, by program]({link})")
+    for name, (words, *works) in CURVES.items():
+        curves = [one for one in done if one.work.name in works]
+        if any(points(one, program) for one in curves for program in one.settings):
+            (pictures / name).write_bytes(plots.image(drawn(curves)).png)
+            link = os.path.relpath(pictures / name, target.parent).replace(os.sep, "/")
+            parts.append(f"![Error over CPU time {words}, by program]({link})")
     parts += [section(one) for one in done]
-    parts += [started(start), LEFT_OUT.strip(), CORRECTIONS.strip()]
+    parts += [started(start), CORRECTIONS.strip()]
     target.write_text("\n\n".join(filter(None, parts)) + "\n", encoding="utf-8")
     return target
 
@@ -142,7 +143,9 @@ def verdict(comparison, name):
         return "–"
     if all("failure" in r for r in comparison.of(name)):
         return "fails"
-    return ratio(comparison, name) if comparison.chosen(name) is not None else "error too large"
+    if comparison.chosen(name) is not None:
+        return ratio(comparison, name)
+    return f"{min(r['error'] for r in comparison.of(name) if 'error' in r):.0e} m off"
 
 
 def given(settings):
@@ -158,10 +161,18 @@ def section(comparison):
     right = f"Right: {truth.said}" + (f"; they differ by {truth.apart:.0e} m." if truth.apart else ".")
     rows = [row(comparison, name) for name in ("refweb", *runs.ORDER) if comparison.of(name)]
     heads = ["program", "lines", "with", "error [m]", "of tensions [N]", "CPU [s]", "first [s]", "wall [s]"]
-    text = f"## {work.title}\n\n{work.said}\n\n{right}\n\n" + table([*heads, "memory [MB]", "× refweb"], rows)
+    quick = f"\n\nQuick variant: {extent(comparison.problem)}." if comparison.quick else ""
+    text = f"## {work.title}\n\n{work.said}{quick}\n\n{right}\n\n" + table([*heads, "memory [MB]", "× refweb"], rows)
     failures = [r for r in comparison.records if "failure" in r]
     told = {f"`{r['program']}`, {given(r['settings'])}: {in_own_words(r)}" for r in failures}
     return text + ("\n\nIn their own words:\n\n" + "\n".join(f"- {line}" for line in sorted(told)) if told else "")
+
+
+def extent(problem):
+    """Size of a problem in words."""
+    words = f"{len(problem.lines)} lines"
+    words += f", {problem.duration:g} s" if problem.duration else ""
+    return words + (f", {len(problem.draws)} draws" if len(problem.draws) else "")
 
 
 def in_own_words(record):
@@ -207,16 +218,16 @@ def points(comparison, name):
 
 
 def drawn(comparisons):
-    """Error over CPU time."""
+    """Error over CPU time; dashed lines are those of the second work."""
     page, plot = plots.axes("CPU time [s]", "farthest node off [m]", height=4.4)
-    marks = dict(zip(("refweb", *runs.ORDER), "osD^v<>PXh", strict=True))
-    colours = dict(zip(marks, (*plots.COLOURS, "#1f9e9e", "#d48fb0", "#7f6a3f", "#9aa83a"), strict=True))
+    marks = dict(zip(("refweb", *runs.ORDER), "osD^v<>PXh*", strict=True))
+    colours = dict(zip(marks, (*plots.COLOURS, "#1f9e9e", "#d48fb0", "#7f6a3f", "#9aa83a", "#5b5bd6"), strict=True))
     for comparison, style in zip(comparisons, ("-", "--"), strict=False):
-        implicit = " (implicit)" if comparison.work.name == "implicit" else ""
+        second = f" ({comparison.work.name})" if style == "--" else ""
         for name in marks:
             if found := points(comparison, name):
                 width = 2.2 if name == "refweb" else 1.2
-                label = f"{name}{implicit}"
+                label = f"{name}{second}"
                 plot.plot(
                     *zip(*found, strict=True), style, marker=marks[name], color=colours[name], lw=width, label=label
                 )

@@ -37,6 +37,19 @@ class Problem:
         Velocities in place of that one, one motion each, shape (k,) [m/s].
     dish : float
         Depth of a bowl that a program begins its search from [m]; 0 is flat.
+    folded : ndarray
+        Positions at the start of a motion, where they are not those of the plan, shape (n, 3) [m].
+    weights : ndarray
+        Point masses at nodes, shape (n,) [kg].
+    thrown : ndarray
+        Velocities of nodes at first, in place of that of one node, shape (n, 3) [m/s].
+    ball : int
+        Node that is the centre of a free ball; −1 without.
+    ball_radius, ball_stiffness : float
+        Distance from its centre at which lines touch it [m], and the push over the depth [N/m], see
+        `validation.peers.contact`.
+    line_radius, line_stiffness : float
+        Radius of lines for each other [m], and stiffness of their contact [N/m]; 0 is no contact.
     """
 
     points: np.ndarray
@@ -52,6 +65,14 @@ class Problem:
     duration: float = 0.0
     draws: np.ndarray = ()
     dish: float = 0.0
+    folded: np.ndarray = ()
+    weights: np.ndarray = ()
+    thrown: np.ndarray = ()
+    ball: int = -1
+    ball_radius: float = 0.0
+    ball_stiffness: float = 0.0
+    line_radius: float = 0.0
+    line_stiffness: float = 0.0
 
     @classmethod
     def load(cls, path):
@@ -73,16 +94,35 @@ class Problem:
         return free
 
     @property
+    def point_masses(self):
+        """Masses at nodes beside those of lines [kg], shape (n,)."""
+        masses = np.zeros(len(self.points))
+        masses[self.node] = self.mass
+        return masses + self.weights if len(self.weights) else masses
+
+    @property
     def masses(self):
-        """Mass of each node [kg], shape (n,): halves of its lines, and the point mass."""
+        """Mass of each node [kg], shape (n,): halves of its lines, and point masses."""
         halves = np.repeat(0.5 * self.density * self.natural, 2)
-        masses = np.bincount(self.lines.ravel(), halves, len(self.points))
-        masses[self.node] += self.mass
-        return masses
+        return np.bincount(self.lines.ravel(), halves, len(self.points)) + self.point_masses
+
+    @property
+    def velocities(self):
+        """Velocities of nodes at first, shape (n, 3) [m/s]."""
+        if len(self.thrown):
+            return self.thrown.copy()
+        velocities = np.zeros_like(self.points)
+        velocities[self.node, 2] = self.speed
+        return velocities
 
     @property
     def start(self):
-        """Positions that a search for an equilibrium begins with, shape (n, 3) [m]: a paraboloid within the rim."""
+        """Positions that a motion, or a search for an equilibrium, begins with, shape (n, 3) [m].
+
+        Those of a search are a paraboloid within the rim.
+        """
+        if len(self.folded):
+            return self.folded.copy()
         middle = self.points[self.node, :2]
         distance = np.linalg.norm(self.points[:, :2] - middle, axis=1)
         height = self.dish * (1.0 - (distance / distance.max()) ** 2)

@@ -18,7 +18,7 @@ import numpy as np
 ROOT = pathlib.Path(__file__).parents[2]
 PROGRAMS = pathlib.Path(__file__).parent / "programs"
 COMPLAINT = re.compile(r"(?i)\b(error|warning|fail\w*|singular|diverge\w*|not converge\w*|nan)\b")
-ORDER = ("dop853", "mujoco", "opensees", "exudyn", "kratos", "moordyn", "jax_fdm", "warp", "newton")
+ORDER = ("dop853", "mujoco", "opensees", "exudyn", "kratos", "moordyn", "jax_fdm", "warp", "newton", "pyelastica")
 """Peers, in the order of tables."""
 
 

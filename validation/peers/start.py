@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -27,10 +28,20 @@ PACKAGES = {
     "jax_fdm": ["jax_fdm"],
     "warp": ["warp-lang"],
     "newton": ["newton"],
+    "pyelastica": ["pyelastica"],
 }
 """What a user installs for a program."""
+UNREACHED = re.compile(r"Retrying|ConnectionError|ConnectTimeout|ProxyError|resolve host|name resolution|refused")
+"""What pip writes where it does not reach the index."""
 FIRST = ("impact-error", "form")
 """Works whose quick variant is a first result: the first one that a program takes."""
+
+
+def reason(words):
+    """Reason of a failed installation: the index that is not reached, or the last line of what pip says."""
+    lines = words.splitlines()
+    unreached = next((line for line in lines if UNREACHED.search(line)), None)
+    return f"the package index is not reachable: {unreached.strip()[:200]}" if unreached else lines[-1]
 
 
 def measured(name):
@@ -49,7 +60,7 @@ def measured(name):
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             steps[step] = time.perf_counter() - begun
             if done.returncode:
-                return found | {"failure": (done.stderr.strip() or step).splitlines()[-1]}
+                return found | {"failure": reason(done.stderr.strip() or step)}
         machine = runs.machine(python)
         machine = machine._replace(environment=machine.environment | caches)
         problem, settings = work.problem(True), (work.quick or work.settings)[name][0]

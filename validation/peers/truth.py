@@ -69,8 +69,7 @@ def equilibrium(problem):
 def verlet(problem, steps):
     """Positions at the end of the motion by the Verlet method, in NumPy."""
     step, weight = problem.duration / steps, np.where(problem.free, 1.0 / problem.masses, 0.0)[:, None]
-    x, v = problem.points.copy(), np.zeros_like(problem.points)
-    v[problem.node, 2] = problem.speed
+    x, v = problem.start, problem.velocities
     for _ in range(steps):
         x += 0.5 * step * v
         v += step * weight * problem.forces(x)

@@ -9,8 +9,12 @@ from exudyn.itemInterface import (
     NodePoint,
     NodePointGround,
     ObjectConnectorSpringDamper,
+    ObjectGenericODE2,
     ObjectMassPoint,
 )
+
+from ..contact import Contacts
+from ..many import by_processes
 
 COMPILES = False
 
@@ -26,9 +30,7 @@ def tension(mbs, t, item, stretch, rate, stiffness, damping, force):
 def system(problem):
     """The system, its nodes and markers, and the law, which has to live as long as the system does."""
     mbs = exu.SystemContainer().AddSystem()
-    velocity = np.zeros_like(problem.points)
-    velocity[problem.node, 2] = problem.speed
-    moved, masses, nodes, markers = problem.start - problem.points, problem.masses, [], []
+    velocity, moved, masses, nodes, markers = problem.velocities, problem.start - problem.points, problem.masses, [], []
     for n, (point, free) in enumerate(zip(problem.points, problem.free, strict=True)):
         if free:
             nodes.append(
@@ -93,3 +95,23 @@ def statics(problem):
     settings.linearSolverType = exu.LinearSolverType.EigenSparse
     mbs.SolveStatic(settings)
     return positions(mbs, nodes)
+
+
+def capture(problem, steps):
+    """Exudyn has no contact of lines with each other: an object of all nodes has that of NumPy as its force."""
+    mbs, nodes, _, law = system(problem)
+    contacts, none = Contacts(problem), exu.MatrixContainer()
+    size = problem.points.size
+    none.SetWithSparseMatrix(np.empty((0, 3)), size, size)
+
+    def force(mbs, t, item, q, v):
+        return contacts.forces(problem.points + np.reshape(q, (-1, 3))).ravel()
+
+    mbs.AddObject(ObjectGenericODE2(nodeNumbers=nodes, massMatrix=none, forceUserFunction=force))
+    mbs.Assemble()
+    mbs.SolveDynamic(settings_of(problem, steps), solverType=exu.DynamicSolverType.VelocityVerlet)
+    return positions(mbs, nodes)
+
+
+def draws(problem, steps):
+    return by_processes(impact, problem, steps=steps)

@@ -7,6 +7,9 @@ import KratosMultiphysics.StructuralMechanicsApplication as Structural
 import numpy as np
 from KratosMultiphysics.python_linear_solver_factory import ConstructSolver
 
+from ..contact import Contacts
+from ..many import by_processes
+
 COMPILES = False
 VARIABLES = (
     *(Kratos.DISPLACEMENT, Kratos.REACTION, Kratos.VELOCITY, Kratos.ACCELERATION, Kratos.VOLUME_ACCELERATION),
@@ -50,14 +53,21 @@ def net(problem, variables=VARIABLES):
         utilities.AddDof(displacement, reaction, part)
         for n in problem.supports.tolist():
             part.Nodes[n + 1].Fix(displacement)
-    if problem.mass:
-        heavy = part.CreateNewProperties(2)
-        heavy.SetValue(Kratos.NODAL_MASS, problem.mass)
-        mass = part.CreateNewElement("NodalConcentratedElement3D1N", len(problem.lines) + 1, [problem.node + 1], heavy)
-        mass.SetValue(Kratos.NODAL_MASS, problem.mass)
-        part.Nodes[problem.node + 1].SetSolutionStepValue(Kratos.VELOCITY_Z, 0, problem.speed)
-        part.Nodes[problem.node + 1].SetSolutionStepValue(Kratos.VELOCITY_Z, 1, problem.speed)
+    for c, n in enumerate(np.flatnonzero(problem.point_masses).tolist(), len(problem.lines) + 1):
+        mass = part.CreateNewElement("NodalConcentratedElement3D1N", c, [n + 1], part.CreateNewProperties(c))
+        mass.SetValue(Kratos.NODAL_MASS, problem.point_masses[n])
+    displace(problem, part)
+    for node, velocity in zip(part.Nodes, problem.velocities.tolist(), strict=True):
+        node.SetSolutionStepValue(Kratos.VELOCITY, 0, velocity)
+        node.SetSolutionStepValue(Kratos.VELOCITY, 1, velocity)
     return part
+
+
+def displace(problem, part):
+    for node, moved in zip(part.Nodes, problem.start - problem.points, strict=True):
+        node.SetSolutionStepValue(Kratos.DISPLACEMENT, 0, Kratos.Array3(moved.tolist()))
+        node.SetSolutionStepValue(Kratos.DISPLACEMENT, 1, Kratos.Array3(moved.tolist()))
+        node.X, node.Y, node.Z = node.X0 + moved[0], node.Y0 + moved[1], node.Z0 + moved[2]
 
 
 def positions(problem, part):
@@ -87,9 +97,6 @@ def step(part, strategy, time):
 def statics(problem):
     part = net(problem)
     part.CreateNewCondition("PointLoadCondition3D1N", 1, [problem.node + 1], part.GetProperties(1))
-    for node, moved in zip(part.Nodes, problem.start - problem.points, strict=True):
-        node.SetSolutionStepValue(Kratos.DISPLACEMENT, Kratos.Array3(moved.tolist()))
-        node.X, node.Y, node.Z = node.X0 + moved[0], node.Y0 + moved[1], node.Z0 + moved[2]
     strategy = newton(part, Kratos.ResidualBasedIncrementalUpdateStaticScheme())
     for load in problem.loads.tolist():
         part.Nodes[problem.node + 1].SetSolutionStepValue(Structural.POINT_LOAD_Z, load)
@@ -105,15 +112,38 @@ def implicit(problem, steps):
     return positions(problem, part)
 
 
-def impact(problem, steps):
+def impact(problem, steps, push=lambda part: None):
     part = net(problem, (*VARIABLES, *EXPLICIT))
     scheme = Structural.ExplicitCentralDifferencesScheme(0.0, 0.0, 0.0)
     strategy = Structural.MechanicalExplicitStrategy(part, scheme, False, False, True)
     strategy.SetEchoLevel(0)
     step = problem.duration / steps
     part.ProcessInfo.SetValue(Kratos.DELTA_TIME, step)
-    part.Nodes[problem.node + 1].SetSolutionStepValue(Structural.MIDDLE_VELOCITY_Z, 0, problem.speed)
+    for node, velocity in zip(part.Nodes, problem.velocities.tolist(), strict=True):
+        node.SetSolutionStepValue(Structural.MIDDLE_VELOCITY, 0, velocity)
     for time in (step * np.arange(1, steps + 1)).tolist():
         part.CloneTimeStep(time)
+        push(part)
         strategy.Solve()
     return positions(problem, part)
+
+
+def capture(problem, steps):
+    """Its contact applications have surfaces and grains, not lines: loads of each step are those of NumPy."""
+    contacts, utilities = Contacts(problem), Kratos.VariableUtils()
+
+    def push(part):
+        if not part.NumberOfConditions():
+            for n in range(1, len(problem.points) + 1):
+                part.CreateNewCondition("PointLoadCondition3D1N", n, [n], part.GetProperties(1))
+        x = problem.points + np.reshape(
+            utilities.GetSolutionStepValuesVector(part.Nodes, Kratos.DISPLACEMENT, 1, 3), (-1, 3)
+        )
+        pushed = Kratos.Vector(contacts.forces(x).ravel())
+        utilities.SetSolutionStepValuesVector(part.Nodes, Structural.POINT_LOAD, pushed, 0)
+
+    return impact(problem, steps, push)
+
+
+def draws(problem, steps):
+    return by_processes(impact, problem, steps=steps)

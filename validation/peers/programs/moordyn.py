@@ -42,10 +42,12 @@ def version():
 def impact(problem, steps, scheme="RK2"):
     step = problem.duration / steps
     kind = ["Free" if one else "Fixed" for one in problem.free]
-    kind[problem.node] = "Coupled"
+    coupled, count = np.flatnonzero(problem.point_masses), np.count_nonzero(problem.point_masses)
+    for n in coupled:
+        kind[n] = "Coupled"
     depth = 5000.0  # below the surface: the air has lines of another law
     points = [
-        f"{n} {kind[n - 1]} {x!r} {y!r} {z - depth!r} 0 0 0 0" for n, (x, y, z) in enumerate(problem.points.tolist(), 1)
+        f"{n} {kind[n - 1]} {x!r} {y!r} {z - depth!r} 0 0 0 0" for n, (x, y, z) in enumerate(problem.start.tolist(), 1)
     ]
     lines = [
         f"{c} rope {i + 1} {j + 1} {length!r} 1 -"
@@ -57,14 +59,20 @@ def impact(problem, steps, scheme="RK2"):
         pathlib.Path("net.txt").write_text(text, encoding="utf-8")
         system = moordyn.Create("net.txt")
         moordyn.SetVerbosity(system, moordyn.LEVEL_ERR)
-        x, v = problem.points[problem.node] - [0.0, 0.0, depth], np.array([0.0, 0.0, problem.speed])
-        moordyn.Init_NoIC(system, x.tolist(), v.tolist())
-        mass, force = problem.mass, np.zeros(3)
-        for n in range(steps):  # kick, drift, kick of the body that carries the coupled point
+        x, v = problem.start[coupled] - [0.0, 0.0, depth], problem.velocities[coupled]
+        moordyn.Init_NoIC(system, x.ravel().tolist(), v.ravel().tolist())
+        mass, force = problem.point_masses[coupled, None], np.zeros((count, 3))
+        for n in range(steps):  # kick, drift, kick of the bodies that carry the coupled points
             v = v + 0.5 * step * force / mass
-            force = np.array(moordyn.Step(system, x.tolist(), v.tolist(), n * step, step))
+            force = moordyn.Step(system, x.ravel().tolist(), v.ravel().tolist(), n * step, step)
+            force = np.reshape(force, (count, 3))
             x = x + step * v
             v = v + 0.5 * step * force / mass
         found = [moordyn.GetPointPos(moordyn.GetPoint(system, n)) for n in range(1, len(problem.points) + 1)]
         moordyn.Close(system)
     return np.array(found) + [0.0, 0.0, depth]
+
+
+def capture(problem, steps):
+    """MoorDyn has no contact of lines with a body or with each other: they pass."""
+    return impact(problem, steps)

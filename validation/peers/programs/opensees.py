@@ -3,6 +3,9 @@
 import numpy as np
 import openseespy.opensees as ops
 
+from ..contact import Contacts
+from ..many import by_processes
+
 COMPILES = False
 
 
@@ -52,17 +55,23 @@ def moving(problem):
     net(problem)
     for n, mass in enumerate(problem.masses.tolist()):
         ops.mass(n, mass, mass, mass)
-    ops.setNodeVel(problem.node, 3, problem.speed, "-commit")
+    velocities = problem.velocities
+    for n, axis in np.argwhere(velocities).tolist():
+        ops.setNodeVel(n, axis + 1, float(velocities[n, axis]), "-commit")
     ops.constraints("Plain")
     ops.numberer("RCM")
 
 
-def impact(problem, steps):
-    moving(problem)
+def explicit():
     ops.system("Diagonal", "lumped")
     ops.algorithm("Linear")
     ops.integrator("ExplicitDifference")
     ops.analysis("Transient")
+
+
+def impact(problem, steps):
+    moving(problem)
+    explicit()
     if (status := ops.analyze(steps, problem.duration / steps)) != 0:
         raise RuntimeError(f"analyze returned {status}")
     return positions(problem)
@@ -78,3 +87,33 @@ def implicit(problem, steps, integrator=("Newmark", 0.5, 0.25)):
     if (status := ops.analyze(steps, problem.duration / steps)) != 0:
         raise RuntimeError(f"analyze returned {status} at t = {ops.getTime():.4f} s")
     return positions(problem)
+
+
+def capture(problem, steps):
+    """Its contact elements have beams and nodes, not two trusses: loads of each step are those of NumPy.
+
+    They count at the end of the step, which central differences foresee.
+    """
+    moving(problem)
+    contacts = Contacts(problem)
+    ops.timeSeries("Constant", 1)
+    ops.pattern("Plain", 1, 1)
+    for n in range(len(problem.points)):
+        ops.load(n, 0.0, 0.0, 0.0)
+        for axis in (1, 2, 3):
+            ops.parameter(3 * n + axis, "loadPattern", 1, "loadAtNode", n, axis)
+    explicit()
+    step, x = problem.duration / steps, problem.start
+    before = x - step * problem.velocities
+    for _ in range(steps):
+        ahead = 2.0 * x - before + step**2 * np.array([ops.nodeAccel(n) for n in range(len(x))])
+        for k, force in enumerate(contacts.forces(ahead).ravel().tolist(), 1):
+            ops.updateParameter(k, force)
+        if (status := ops.analyze(1, step)) != 0:
+            raise RuntimeError(f"analyze returned {status}")
+        before, x = x, positions(problem)
+    return x
+
+
+def draws(problem, steps):
+    return by_processes(impact, problem, steps=steps)

@@ -1,5 +1,7 @@
 """refweb: a scene of the same net."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import refweb
@@ -13,7 +15,7 @@ def version():
 
 def scene(problem, effects, **parts):
     web = refweb.Inline(
-        points=problem.points.tolist(),
+        points=(problem.points if problem.dish else problem.start).tolist(),
         lines=problem.lines.tolist(),
         supports=problem.supports.tolist(),
         natural_length=problem.natural.tolist(),
@@ -28,11 +30,13 @@ def statics(problem):
     return refweb.run(scene(problem, [load], solve=solve), progress=False).positions
 
 
-def thrown(problem, steps=None, observe=(), **method):
-    effects = [
-        refweb.PointMass(node=problem.node, mass=problem.mass),
-        refweb.Velocity(node=problem.node, value=(0.0, 0.0, problem.speed)),
-    ]
+def thrown(problem, steps=None, observe=(), more=(), **method):
+    masses, velocities = problem.point_masses, problem.velocities
+    effects = [refweb.PointMass(node=n, mass=masses[n]) for n in np.flatnonzero(masses).tolist()]
+    for value in np.unique(velocities[velocities.any(axis=1)], axis=0).tolist():
+        nodes = np.flatnonzero((velocities == value).all(axis=1)).tolist()
+        effects.append(refweb.Velocity(node=nodes, value=tuple(value)))
+    effects += more
     step = {} if steps is None else {"step_size": problem.duration / steps * (1.0 + 1e-12)}
     parts = {
         "solve": refweb.Dynamic(duration=problem.duration, **step, **method),
@@ -55,6 +59,26 @@ def draws(problem, **method):
 
 
 implicit = impact
+
+
+def capture(problem, **method):
+    """The ball is the last node, which a body stands for here."""
+    net = replace(problem, **{key: getattr(problem, key)[:-1] for key in ("points", "weights", "thrown")})
+    ball = refweb.Body(
+        name="ball",
+        radius=problem.ball_radius,
+        mass=problem.weights[-1],
+        position=tuple(problem.points[-1].tolist()),
+        velocity=tuple(problem.thrown[-1].tolist()),
+    )
+    more = [
+        ball,
+        refweb.Contact(stiffness=problem.ball_stiffness),
+        refweb.SelfContact(radius=problem.line_radius, stiffness=problem.line_stiffness),
+    ]
+    place = [refweb.Observe(name=k, quantity="position", body="ball", component=k) for k in "xyz"]
+    found = refweb.run(thrown(net, more=more, observe=place, **method), progress=False)
+    return np.vstack([found.positions, [found.results[k].value for k in "xyz"]])
 
 
 def form(problem, force_density=7.0):

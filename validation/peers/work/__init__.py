@@ -10,7 +10,7 @@ import importlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-FILES = ("statics", "impact", "implicit", "large", "form", "draws")
+FILES = ("statics", "impact", "implicit", "large", "form", "throw", "capture", "draws")
 
 
 @dataclass(frozen=True)

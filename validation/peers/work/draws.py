@@ -9,6 +9,8 @@ from ..truth import Truth, verlet
 from ..webs import paper, problem
 from . import Work
 
+PROGRAMS = ("refweb", "mujoco", "opensees", "exudyn", "kratos", "warp")
+
 
 def cases(quick):
     speeds = np.random.default_rng(1).uniform(0.5, 1.5, 8 if quick else 200)
@@ -28,13 +30,15 @@ WORKS = (
     Work(
         name="draws",
         title="200 impacts on two cores",
-        said="The impact on a net of 112 lines at 200 speeds from 0.5 to 1.5 m/s, by two processes or threads. Error: "
-        "the mass after 0.1 s. CPU time is that of all processes, wall time that which the user waits.",
+        said="The impact on a net of 112 lines at 200 speeds, drawn from 0.5 to 1.5 m/s, by two processes or threads. "
+        "Error: the mass after 0.1 s. CPU time is that of all processes, wall time that which the user waits; each is "
+        "run as a user would, refweb by a sweep, whose processes import it, MuJoCo by threads that share a model, the "
+        "others by processes that are copies of the first. Memory is that of the first.",
         task="draws",
         problem=cases,
         truth=right,
-        settings={"refweb": [{"steps": 1250}], "mujoco": [{"steps": 1250}], "dop853": [{"rtol": 1e-2}, {"rtol": 1e-3}]},
+        settings=dict.fromkeys(PROGRAMS, [{"steps": 1250}]) | {"dop853": [{"rtol": 1e-2}, {"rtol": 1e-3}]},
         target=5e-5,
-        quick={"refweb": [{"steps": 250}], "mujoco": [{"steps": 250}], "dop853": [{"rtol": 1e-3}]},
+        quick=dict.fromkeys(PROGRAMS, [{"steps": 250}]) | {"dop853": [{"rtol": 1e-3}]},
     ),
 )

@@ -18,6 +18,7 @@ def ladder(steps):
     found = {name: [{"steps": n} for n in (5 * steps // 8, steps, 2 * steps)] for name in STEPPED}
     found["refweb"] += [{"steps": steps // 2, "method": "explicit", "order": 6}]
     found["moordyn"] = [{"steps": 5 * steps // 8}]
+    found["pyelastica"] = [{"steps": 5 * steps, "radius": 4e-3}]
     return found | {"dop853": [{"rtol": 10.0**-n} for n in (2, 3, 4)]}
 
 
@@ -47,6 +48,6 @@ WORKS = (
         truth=motion,
         settings=ladder(STEPS),
         target=5e-5,
-        quick=ladder(QUICK),
+        quick=ladder(QUICK) | {"pyelastica": [{"steps": 80 * QUICK, "radius": 2.5e-4}]},
     ),
 )
