@@ -10,7 +10,12 @@ An implicit step solves (I − γJ) z = r with J = [[0, I], [−M⁻¹K, −M⁻
 
 a matrix of half the size. It is symmetric unless an effect is not, and definite without the negative part of K.
 
-`set_up` and the other callbacks have the signatures of sksundae; factors are those of the last `set_up`.
+A run of 464 steps of BDF on the square web of 3120 lines, 0.7 s, takes 0.20 s for 570 solutions, 0.12 s for 26
+factorizations, 0.07 s for forces, 0.17 s within SUNDIALS, and 0.19 s for what is observed in the middle and at the end
+of each step. The last factors are kept where CVODE asks for them anew and nothing has changed, a third of all times.
+
+`set_up` and the other callbacks have the signatures of sksundae; factors are those of the last `set_up` with another γ
+or tangent.
 """
 
 from __future__ import annotations
