@@ -160,9 +160,9 @@ def element_of(lines, column, first, last, scale, value):
     k, fours = np.uint64(column), first
     while fours + 4 <= last:
         n = np.uint64(fours)
-        found = (lines[n, k] * scale == value) | (lines[n + np.uint64(1), k] * scale == value)
-        more = (lines[n + np.uint64(2), k] * scale == value) | (lines[n + np.uint64(3), k] * scale == value)
-        if found | more:
+        pair = (lines[n, k] * scale == value) | (lines[n + np.uint64(1), k] * scale == value)
+        next_pair = (lines[n + np.uint64(2), k] * scale == value) | (lines[n + np.uint64(3), k] * scale == value)
+        if pair | next_pair:
             break
         fours += 4
     for n in range(fours, last):

@@ -38,15 +38,7 @@ from .energy_balance import (
     write_length_force,
 )
 from .events import ended_by, note_events
-from .extremes import (
-    look_at,
-    look_with_places,
-    note_time,
-    plain_value,
-    turns_back,
-    update_extreme,
-    update_plain_extreme,
-)
+from .extremes import look_at, look_with_places, note_time, plain_value, take_over, turns_back
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_balance import add_half_steps, push_on, set_push
 from .neighbour_list import covered, reach_all, show_near, update_neighbours
@@ -209,10 +201,7 @@ def run_steps(
                 known[0] = look_at(i, now, x, v, f, lines, observed, where)
             turned = turns_back(i, known[0], signs[i], values[i], recent, ending) or turned
             if signs[i] * known[0] > signs[i] * values[i]:
-                if simple:
-                    update_plain_extreme(i, now, flat_x, lines, known, observed, extremes)
-                else:
-                    update_extreme(i, known[0], now, x, v, f, lines, observed, where, extremes)
+                take_over(simple, i, now, x, v, f, lines, known, observed, where, extremes)
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:

@@ -197,6 +197,15 @@ def update_plain_extreme(
         extremes.places[i] = element_of(lines, plain[i, 1], plain[i, 2], plain[i, 3], observed.scales[i], known[0])
 
 
+@kernel(leaf=True, forceinline=True)
+def take_over(simple, i, t, x, v, f, lines, known, observed, where, extremes):
+    """Take over the value ``known[0]`` of a probe, which `plain_value` has written if it is ``simple``."""
+    if simple:
+        update_plain_extreme(i, t, x.reshape(-1), lines, known, observed, extremes)
+    else:
+        update_extreme(i, known[0], t, x, v, f, lines, observed, where, extremes)
+
+
 @kernel(leaf=True, apart=("looks",))
 def inspect(
     t: float,

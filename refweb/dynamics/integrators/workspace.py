@@ -21,7 +21,7 @@ class Workspace(Record):
     reaction, push : ndarray, shape (3,)
         Force of the supports, and the force that is integrated along the steps [N].
     known : ndarray, shape (4,)
-        What `refweb.dynamics.integrators.extremes.plain_value` knows of plain probes.
+        Values of plain probes, see `refweb.dynamics.integrators.extremes.plain_value`.
     before : ndarray, shape (driven, 7)
         State of rows whose motion is prescribed, ahead of a step.
     aside, extra, half, momenta : ndarray, shape (rows, 3)
