@@ -82,8 +82,11 @@ def test_lists_of_nodes_refuse_what_is_no_node(wrong):
         checked("k", [[0, 1], [wrong, 3]], rows(2, number=node_number))
 
 
-@pytest.mark.parametrize(("bounds", "wrong"), [({"above": 0}, 0.0), ({"above": 0}, 1e-101), ({"at_least": 2}, 1.0),
-                                               ({"below": 3}, 3.0), ({"at_most": 4}, 5.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("bounds", "wrong"),
+    [({"above": 0}, 0.0), ({"above": 0}, 1e-101), ({"above": 2}, 2.0), ({"at_least": 2}, 1.0), ({"below": 3}, 3.0),
+     ({"at_most": 4}, 5.0)],
+)  # fmt: skip
 def test_bounds_hold_in_lists(bounds, wrong):
     read = real(**bounds).metadata["read"]
     assert read_all("k", [2.5, 2.75], read) == [2.5, 2.75]
