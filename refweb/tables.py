@@ -27,7 +27,7 @@ from .messages import closest, nearest, quote, short
 from .registry import known, possible
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from dataclasses import Field
 
 T = TypeVar("T")
@@ -44,6 +44,26 @@ def _refuse(name, value, limit):
     raise InputError(f"{name} = {quote(value)} must be {limit}")
 
 
+def _at_once(kinds, lowest, highest):
+    """Give a reader ``at_once``, which reads a list at once if all values are of some types and within bounds.
+
+    It returns them as the first type, or None if a value needs the reader itself. A net has thousands of numbers.
+    """
+
+    def at_once(values):
+        if not set(map(type, values)) <= set(kinds) or not lowest <= min(values) <= max(values) <= highest:
+            return None
+        finite = math.isfinite(sum(values))  # comparisons may miss what is not a number
+        return list(map(kinds[0], values)) if finite else None
+
+    def attach(read):
+        read.at_once = at_once
+        return read
+
+    return attach
+
+
+@_at_once((float, int), -LARGEST, LARGEST)
 @accepts(limits("number", at_least=-LARGEST, at_most=LARGEST))
 def _number(name, value, unit=""):
     unit = f" [{unit}]" if unit else ""
@@ -85,6 +105,22 @@ def _bounded(name, value, unit, above, at_least, below, at_most):
     return value
 
 
+def read_all(name: str, values: Sequence[Any], number: Callable[..., Any]) -> list[Any]:
+    """Read values of a list, each as ``number(f"{name}[{i}]", value)`` does."""
+    at_once = getattr(number, "at_once", None)
+    result = at_once(values) if at_once and values else None
+    return [number(f"{name}[{i}]", x) for i, x in enumerate(values)] if result is None else result
+
+
+def _rows_at_once(given, width, number):
+    """Rows of numbers that are read at once; an empty list if they need to be read one by one."""
+    at_once = getattr(number, "at_once", None)
+    if at_once is None or not set(map(type, given)) <= {list, tuple} or set(map(len, given)) != {width}:
+        return []
+    flat = iter(at_once([x for row in given for x in row]) or [])
+    return list(zip(*[flat] * width, strict=True))
+
+
 def _list(name, value, what):
     if hasattr(value, "tolist"):
         value = value.tolist()
@@ -115,6 +151,10 @@ def real(
 ) -> Any:
     """A finite real number within bounds."""
 
+    lower = [SMALLEST if 0.0 in (above, at_least) else -LARGEST, *(b for b in (above, at_least) if b is not None)]
+    upper = [LARGEST, *(b for b in (below, at_most) if b is not None)]
+
+    @_at_once((float, int), math.nextafter(max(lower), math.inf), math.nextafter(min(upper), -math.inf))
     @accepts(limits("number", above, -LARGEST if at_least is None else at_least, below, at_most))
     def read(name, value):
         return _bounded(name, _number(name, value, unit), unit, above, at_least, below, at_most)
@@ -201,8 +241,8 @@ def rows(width: int, default: Any = MISSING, *, unit: str = "", increasing: bool
         value = _list(name, value, f"a list of rows of {width} numbers")
         if not value:
             _refuse(name, value, f"at least one row of {width} numbers")
-        result = []
-        for i, row in enumerate(value):
+        result = _rows_at_once(value, width, number)
+        for i, row in enumerate([] if result else value):
             row = _list(f"{name}[{i}]", row, f"a row of {width} numbers")
             if len(row) != width:
                 _refuse(f"{name}[{i}]", row, f"a row of {width} numbers, not {len(row)}")
@@ -216,6 +256,7 @@ def rows(width: int, default: Any = MISSING, *, unit: str = "", increasing: bool
     return field(read, default=default, unit=unit)
 
 
+@_at_once((int,), 0, _WHOLE)
 @accepts({"type": "integer", "minimum": 0})
 def node_number(name: str, value: Any) -> int:
     """Read one whole number ≥ 0."""
@@ -230,7 +271,7 @@ def numbers_list(default: Any = MISSING, *, number: Any = _number, empty: bool =
         value = _list(name, value, "a list of numbers")
         if not value and not empty:
             _refuse(name, value, "a list with at least one number")
-        return tuple(number(f"{name}[{i}]", x) for i, x in enumerate(value))
+        return tuple(read_all(name, value, number))
 
     return field(read, default=default)
 

@@ -189,7 +189,8 @@ MIRRORS = {
     "results/observables/overlap": "results/test_contact_force.py results/test_every_number.py",
     "system/contact_forces": "results/test_every_number.py results/test_contact_force.py",
     "dynamics/integrators/contacts": "results/test_contact_force.py",
-    "results/probes": "results/test_observable_contract.py effects/test_plastic.py",
+    "results/probes": "results/test_probes.py results/test_observable_contract.py effects/test_plastic.py",
+    "tables": "test_tables.py",
     "results/progress": "results/test_loaded.py",
     "results/observables": "results/test_observable_contract.py results/test_selections.py "
     "dynamics/test_accuracy.py statics/test_statics.py",
@@ -505,6 +506,9 @@ MUTANTS = [
         "effects/bending", "f[cells[c, 1], r] += first_pull + last_pull", "f[cells[c, 1], r] += first_pull - last_pull"
     ),
     Mutant("results/probes", "-value if select == 1 else abs(value)", "-value if select == 1 else value"),
+    Mutant("results/probes", "1e-15 * abs(square), first", "1e-15 * abs(square), 0"),
+    Mutant("tables", "if finite else None", "if values else None"),
+    Mutant("tables", "math.nextafter(max(lower), math.inf)", "max(lower)"),
     Mutant("results/observables/line", '"end": net.subdivide - 1', '"end": 0'),
     Mutant(
         "results/observables/nodal",
@@ -936,7 +940,7 @@ MUTANTS = [
     Mutant("compiled/keys", "return value.machine_code_key()", 'return "a kernel"'),
     Mutant("compiled/store", "if content[:CHECK] == _checksum(content[CHECK:]):", "if content:"),
     Mutant("compiled/kernel", "if features is None or k.apart <= features", "if features is None or not k.apart"),
-    Mutant("compiled/tables", "and value.flags.c_contiguous", "and value.size"),
+    Mutant("compiled/tables", "(flags := value.flags).c_contiguous", "(flags := value.flags).aligned"),
     Mutant("compiled/tables", "for _ in range(2):  # what", "for _ in range(1):  # what"),
     # Values by path, new scenes and comparisons
     Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),

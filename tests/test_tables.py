@@ -3,14 +3,16 @@
 import ast
 import copy
 import inspect
+import math
 import pathlib
 import pickle
+import re
 
 import pytest
 
 import refweb
 from refweb.registry import exports, load
-from refweb.tables import Table
+from refweb.tables import Table, checked, node_number, numbers_list, read_all, real, rows
 
 CLASSES = [
     name for name, place in exports().items() if isinstance(load(place), type) and issubclass(load(place), Table)
@@ -53,3 +55,40 @@ def test_editors_know_the_names_of_the_package():
     told = {a.asname: f"refweb.{n.module}:{a.name}" for n in known for a in n.names if a.asname is not None}
     assert told == exports(), "add the line to refweb/__init__.py"
     assert (package.parent / "py.typed").exists()
+
+
+WRONG = [math.nan, math.inf, 1e101, -1e101, 10**400, True, "1", None, [1.0]]
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=repr)
+@pytest.mark.parametrize("place", [0, 2, 4])
+def test_lists_that_are_read_at_once_refuse_what_a_number_alone_refuses(wrong, place):
+    good = [1.0, 2, -3.0, 0.0, 5.0]
+    assert checked("k", good, numbers_list()) == tuple(checked(f"k[{i}]", x, real()) for i, x in enumerate(good))
+    assert all(type(x) is float for x in checked("k", good, numbers_list()))
+    given = [*good[:place], wrong, *good[place + 1 :]]
+    with pytest.raises(refweb.InputError) as alone:
+        checked(f"k[{place}]", wrong, real())
+    with pytest.raises(refweb.InputError, match=re.escape(str(alone.value))):
+        checked("k", given, numbers_list())
+    with pytest.raises(refweb.InputError, match=re.escape(str(alone.value).replace("k[", "k[1]["))):
+        checked("k", [good, given], rows(5))
+
+
+@pytest.mark.parametrize("wrong", [-1, 2**63, 1.0, True, "1"], ids=repr)
+def test_lists_of_nodes_refuse_what_is_no_node(wrong):
+    assert checked("k", [[0, 1], (2**62, 3)], rows(2, number=node_number)) == ((0, 1), (2**62, 3))
+    with pytest.raises(refweb.InputError, match=re.escape("k[1][0] = ")):
+        checked("k", [[0, 1], [wrong, 3]], rows(2, number=node_number))
+
+
+@pytest.mark.parametrize(
+    ("bounds", "wrong"),
+    [({"above": 0}, 0.0), ({"above": 0}, 1e-101), ({"above": 2}, 2.0), ({"at_least": 2}, 1.0), ({"below": 3}, 3.0),
+     ({"at_most": 4}, 5.0)],
+)  # fmt: skip
+def test_bounds_hold_in_lists(bounds, wrong):
+    read = real(**bounds).metadata["read"]
+    assert read_all("k", [2.5, 2.75], read) == [2.5, 2.75]
+    with pytest.raises(refweb.InputError, match=re.escape(f"k[1] = {wrong:g}")):
+        read_all("k", [2.5, wrong], read)

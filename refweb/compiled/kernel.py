@@ -130,9 +130,14 @@ class Kernel:
         with numba_internals.lock:
             return (self._compiled() if self._linked else _ByAddress(self))._numba_type_
 
+    @property
+    def loaded(self):
+        """True if its machine code is loaded."""
+        return self._slot.filled
+
     def known(self):
         """Tell if its machine code is loaded, or on disk."""
-        if self._slot.filled:
+        if self.loaded:
             return True
         return numba_internals.PLAIN or self._body._cache.has(self.signature)
 

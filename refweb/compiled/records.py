@@ -120,7 +120,8 @@ class Record:
             if isinstance(kind, types.Array):
                 words += sizes_of(value, kind, label)
             elif isinstance(kind, Pointer):
-                if value._numba_type_ != kind:
+                given = value._numba_type_
+                if given is not kind and given != kind:
                     refuse(value, kind, label)
                 words.append(value.address)
             else:

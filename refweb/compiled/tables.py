@@ -95,6 +95,8 @@ class FunctionsType(Pointer):
 
 for _kind in (ArraysType, FunctionsType):
     register_model(_kind)(models.OpaqueModel)
+arrays_type, functions_type = functools.cache(ArraysType), functools.cache(FunctionsType)
+"""Types by item and by signature, whose names are long to write: a run asks for them hundreds of times."""
 
 
 @_global(operator.getitem)
@@ -191,10 +193,10 @@ _number_type = functools.cache(from_dtype)
 
 def sizes_of(value, kind, name):
     """Address and sizes of an array, with a check of its type."""
-    fits = isinstance(value, np.ndarray) and value.ndim == kind.ndim and value.flags.c_contiguous
-    if not fits or _number_type(value.dtype) != kind.dtype or not value.flags.writeable:
+    fits = isinstance(value, np.ndarray) and value.ndim == kind.ndim and (flags := value.flags).c_contiguous
+    if not fits or _number_type(value.dtype) != kind.dtype or not flags.writeable:
         refuse(value, kind, name)
-    return [value.ctypes.data, *value.shape]
+    return [value.__array_interface__["data"][0], *value.shape]
 
 
 class Arrays:
@@ -209,7 +211,7 @@ class Arrays:
         releases these arrays at its end.
     """
 
-    kind_of = ArraysType
+    kind_of = staticmethod(arrays_type)
 
     def __init__(self, item: Any, arrays: Sequence[Any]) -> None:
         self.item: Any = item
@@ -219,9 +221,9 @@ class Arrays:
         self._head = np.array([len(words), self._items.ctypes.data], dtype=WORD)
         self.address: int = self._head.ctypes.data
 
-    @functools.cached_property
+    @property
     def _numba_type_(self):
-        return ArraysType(self.item)
+        return arrays_type(self.item)
 
     def __len__(self) -> int:
         return len(self._arrays)
@@ -265,7 +267,7 @@ class Functions:
         table is needed.
     """
 
-    kind_of = FunctionsType
+    kind_of = staticmethod(functions_type)
 
     def __init__(self, signature: Any, kernels: Sequence[Any]) -> None:
         self.signature: Any = signature
@@ -274,9 +276,9 @@ class Functions:
             if item.signature != signature:
                 raise TypeError(f"{item.name} has the signature {item.signature}, not {signature}")
 
-    @functools.cached_property
+    @property
     def _numba_type_(self):
-        return FunctionsType(self.signature)
+        return functions_type(self.signature)
 
     def __len__(self) -> int:
         return len(self.kernels)

@@ -14,7 +14,20 @@ import numpy as np
 from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError
 from ..messages import quote
-from ..tables import Several, Table, checked, choice, field, node_number, numbers_list, real, rows, table, texts
+from ..tables import (
+    Several,
+    Table,
+    checked,
+    choice,
+    field,
+    node_number,
+    numbers_list,
+    read_all,
+    real,
+    rows,
+    table,
+    texts,
+)
 from .web import Web, in_range
 
 if TYPE_CHECKING:
@@ -31,7 +44,7 @@ def _lengths(name, value):
         return value
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, (list, tuple)):
-        return tuple(checked(f"{name}[{i}]", value_i, LENGTH) for i, value_i in enumerate(value))
+        return tuple(read_all(name, value, LENGTH.metadata["read"]))
     return checked(name, value, LENGTH)
 
 

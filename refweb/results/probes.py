@@ -121,8 +121,8 @@ def largest_in(lines, column, first, last):
 
 
 @kernel(leaf=True, forceinline=True)
-def farthest(x, first, last):
-    """Largest magnitude of the flat array x over the rows from ``first`` to ``last`` − 1, by four maxima at once."""
+def largest_square(x, first, last):
+    """Largest squared magnitude of the flat array x over rows ``first`` to ``last`` − 1, by four maxima at once."""
     a = b = c = d = -math.inf
     fours = (last - first) // 4 * 4
     for n in range(first, first + fours, 4):
@@ -133,12 +133,45 @@ def farthest(x, first, last):
         d = _larger(d, _size(x, q + np.uint64(9)))
     for n in range(first + fours, last):
         a = _larger(a, _size(x, np.uint64(3 * n)))
-    return math.sqrt(_larger(_larger(a, b), _larger(c, d)))
+    return _larger(_larger(a, b), _larger(c, d))
 
 
 @kernel(leaf=True, forceinline=True)
 def _size(x, q):
     return x[q] * x[q] + x[q + np.uint64(1)] * x[q + np.uint64(1)] + x[q + np.uint64(2)] * x[q + np.uint64(2)]
+
+
+@kernel(leaf=True, forceinline=True)
+def row_of_square(x, first, last, square):
+    """First row whose squared magnitude is the largest, as `largest_of` says it; four are compared at once."""
+    limit, fours = square - 1e-15 * abs(square), first
+    while fours + 4 <= last:
+        q = np.uint64(3 * fours)
+        near = _larger(_size(x, q), _size(x, q + np.uint64(3)))
+        if _larger(near, _larger(_size(x, q + np.uint64(6)), _size(x, q + np.uint64(9)))) >= limit:
+            break
+        fours += 4
+    for n in range(fours, last):
+        if _size(x, np.uint64(3 * n)) >= limit:
+            return n
+    return -1
+
+
+@kernel(leaf=True, forceinline=True)
+def element_of(lines, column, first, last, scale, value):
+    """First element of which ``scale`` times a column is a value, ``first`` if none is; four are compared at once."""
+    k, fours = np.uint64(column), first
+    while fours + 4 <= last:
+        n = np.uint64(fours)
+        pair = (lines[n, k] * scale == value) | (lines[n + np.uint64(1), k] * scale == value)
+        next_pair = (lines[n + np.uint64(2), k] * scale == value) | (lines[n + np.uint64(3), k] * scale == value)
+        if pair | next_pair:
+            break
+        fours += 4
+    for n in range(fours, last):
+        if lines[np.uint64(n), k] * scale == value:
+            return n
+    return first
 
 
 def plain_of(probe: Probe) -> tuple[tuple[int, ...], float]:

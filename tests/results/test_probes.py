@@ -29,15 +29,27 @@ def test_plain_values(count):
         kind, scale = probes.plain_of(node)
         assert kind == (probes.NODES, first, last, 0) and scale == 1.0
         value, place = valued(node, x, lines)
-        assert probes.farthest(x.ravel(), first, last) == value and place == first + np.argmax(
-            (x[first:last] ** 2).sum(1)
-        )
+        square = probes.largest_square(x.ravel(), first, last)
+        assert np.sqrt(square) == value and place == first + np.argmax((x[first:last] ** 2).sum(1))
+        assert probes.row_of_square(x.ravel(), first, last, square) == place
         np.testing.assert_allclose(value, np.linalg.norm(x[first:last], axis=1).max(), rtol=1e-15)
         kind, scale = probes.plain_of(line)
         assert kind == (probes.LINES, 1, first, last) and scale == 0.3
         value, place = valued(line, x, lines)
         assert scale * probes.largest_in(lines, 1, first, last) == value == (data[:, 0] * lines[first:last, 1]).max()
         assert place == first + np.argmax(lines[first:last, 1])
+        assert probes.element_of(lines, 1, first, last, scale, value) == place
+
+
+@pytest.mark.parametrize("last", range(5, 12))
+def test_the_first_of_equal_values_has_the_place(last):
+    x, lines = np.zeros((last, 3)), np.zeros((last, 2))
+    x[[3, last - 1]], lines[[2, last - 2], 1] = (0.0, 3.0, 4.0), 2.0
+    node = probes.Probe(probes.displacement, [probes.MAGNITUDE, 0, last], np.zeros((last, 3)))
+    line = probes.Probe(probes.line, [1, 0, last], np.full((last, 1), 0.5))
+    assert probes.row_of_square(x.ravel(), 0, last, 25.0) == valued(node, x, lines)[1] == 3
+    assert probes.element_of(lines, 1, 0, last, 0.5, 1.0) == valued(line, x, lines)[1] == 2
+    assert probes.row_of_square(x.ravel(), 0, last, np.nan) == -1
 
 
 def test_what_is_not_plain():

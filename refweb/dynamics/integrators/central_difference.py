@@ -143,9 +143,11 @@ class CentralDifference(Integrator):
 
     @cached_property
     def _bounded(self):
-        """The model with the kernels of bounds alone, for a scene whose step is asked for and that does not run."""
-        terms, bare = self.model.terms, self.model.without_kernels()
-        model = replace(bare, terms=replace(bare.terms, bounds=terms.bounds, dampings=terms.dampings))
+        """The model; with the kernels of bounds alone if others are not loaded, for a scene that does not run."""
+        model, terms = self.model, self.model.terms
+        if not all(item.loaded for item in model.all_kernels()):
+            bare = model.without_kernels()
+            model = replace(bare, terms=replace(bare.terms, bounds=terms.bounds, dampings=terms.dampings))
         prepare([safe_step, *model.all_kernels()], features(self._scheme, self.model, self._observed, self._events))
         return model
 

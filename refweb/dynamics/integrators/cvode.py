@@ -10,9 +10,13 @@ An implicit step solves (I − γJ) z = r with J = [[0, I], [−M⁻¹K, −M⁻
 
 a matrix of half the size. It is symmetric unless an effect is not, and definite without the negative part of K.
 
+A run of 464 steps of BDF on the square web of 3120 lines, 0.7 s, takes 0.20 s for 570 solutions, 0.12 s for 26
+factorizations, 0.07 s for forces, 0.17 s within SUNDIALS, and 0.19 s for what is observed in the middle and at the end
+of each step. The last factors are kept where CVODE asks for them anew and nothing has changed, a third of all times.
+
 May change: `SHORT`, `STILL` and `RENEWED`, which change cost and digits within the tolerance. Must stay: arguments of
 `set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which sksundae calls them; `precondition`
-uses the factors of the last `set_up`; the Jacobian is the derivative of `right_side`. Keys of ``[solve]`` are those of
+uses the factors of the last `set_up` with another γ or tangent; the Jacobian is the derivative of `right_side`. Keys of ``[solve]`` are those of
 `registry.INTEGRATORS`. Tests: ``tests/dynamics/integrators/test_cvode.py``.
 """
 
@@ -81,6 +85,7 @@ class Cvode(Sundials):
         if self._sparing:
             self.choice += f"; none where a step is short, γω ≤ {SHORT:g}"
         self._gamma, self._plain, self._set_up_at, self._due = None, False, None, 0
+        self._factored = None  # γ of the factors, None where these are of another tangent
         if self._consistent:
             self._mass_values = system.mass.values.copy()
             self._mass_values[system.pattern.diagonal[self._inner]] = 1.0  # of what has no velocity
@@ -132,14 +137,16 @@ class Cvode(Sundials):
         jnew[0] = 0
         if not known or not jok and not (self._plain and self.stats["nfev"] < self._due):
             self._stiffness, self._damping = self._tangent(t, y)
+            self._factored = None
             self._K = self.system.pattern.matrix(self._stiffness)
             self._C = None if self._damping is None else self.system.pattern.matrix(self._damping)
             self._due = self.stats["nfev"] + RENEWED
             self._plain = may and self._short(gamma)
             jnew[0] = 0 if self._plain else 1  # a set-up that factorizes is still to be had
         self._gamma, self._set_up_at = gamma, t
-        if not self._plain:
+        if not self._plain and gamma != self._factored:  # CVODE asks every 20 steps, whatever has changed
             self._factorize_step(gamma)
+            self._factored = None if self.system.net.flows else gamma
 
     def _nothing_moves(self, yp, gamma):
         """Tell if accelerations change nothing within a step beyond the tolerance, as before a first contact."""
@@ -264,7 +271,7 @@ class Cvode(Sundials):
         if self.linear_solver in ("dense", "sparse"):
             return self._full_matrix(*self._whole_pattern(), 2 * self.unknowns)
         if self.linear_solver == "block":
-            self._symmetric = Symmetric(self.system.pattern)
+            self._symmetric, self._factored = Symmetric(self.system.pattern), None
             precond = CVODEPrecond(self.set_up, self.precondition)
             times = CVODEJacTimes(None, self.jacobian_times)
             return dict(linsolver="gmres", krylov_dim=10, precond=precond, jactimes=times)

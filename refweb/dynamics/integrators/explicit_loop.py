@@ -42,7 +42,7 @@ from .energy_balance import (
     write_length_force,
 )
 from .events import ended_by, note_events
-from .extremes import look_at, look_with_places, note_time, plain_value, turns_back, update_extreme
+from .extremes import look_at, look_with_places, note_time, plain_value, take_over, turns_back
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_balance import add_half_steps, push_on, set_push
 from .neighbour_list import covered, reach_all, show_near, update_neighbours
@@ -200,11 +200,12 @@ def run_steps(
         turned, ending, known[1] = False, begun + step == planned or math.isnan(looked[0]), -1.0
         note_time(looked, now)
         for i in followed:
-            if not plain_value(i, flat_x, lines, plain, scales, known):
+            simple = plain_value(i, flat_x, lines, plain, scales, known)
+            if not simple:
                 known[0] = look_at(i, now, x, v, f, lines, observed, where)
             turned = turns_back(i, known[0], signs[i], values[i], recent, ending) or turned
             if signs[i] * known[0] > signs[i] * values[i]:
-                update_extreme(i, known[0], now, x, v, f, lines, observed, where, extremes)
+                take_over(simple, i, now, x, v, f, lines, known, observed, where, extremes)
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from ...kernels import Integers, Matrix, Record, Vector, inner, kernel
-from ...results.probes import NODES, PLACE, farthest, largest_in
+from ...results.probes import NODES, PLACE, element_of, largest_in, largest_square, row_of_square
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -127,11 +127,12 @@ def plain_value(i, x, lines, plain, scales, known):
     """Write the value of a plain probe, see `refweb.results.probes.plain_of`, to ``known[0]``; whether it is one.
 
     Displacements x are in a row. ``known`` holds behind that the probe before it of a column in this step, −1 for none,
-    and the largest of that, which may be of the same elements.
+    the largest of that, which may be of the same elements, and the square of the last displacement.
     """
     kind = plain[i, 0]
     if kind == NODES:
-        known[0] = farthest(x, plain[i, 1], plain[i, 2])
+        known[3] = largest_square(x, plain[i, 1], plain[i, 2])
+        known[0] = math.sqrt(known[3])
     elif kind > 0:
         j = int(known[1])
         if j < 0 or plain[i, 1] != plain[j, 1] or plain[i, 2] != plain[j, 2] or plain[i, 3] != plain[j, 3]:
@@ -184,6 +185,28 @@ def update_extreme(
     look_at(i, t, x, v, f, lines, observed, where)
     extremes.values[i], extremes.times[i], extremes.places[i], where[1] = value, t, where[0], 0
     extremes.corrections[i] = 0.0
+
+
+@kernel(leaf=True, apart=("watched",))
+def update_plain_extreme(
+    i: int, t: float, x: Vector, lines: Matrix, known: Vector, observed: Observed, extremes: Extremes
+) -> None:
+    """Take over what `plain_value` has written, with its time and place: while a web deepens, that is each step."""
+    plain = observed.plain
+    extremes.values[i], extremes.times[i], extremes.corrections[i] = known[0], t, 0.0
+    if plain[i, 0] == NODES:
+        extremes.places[i] = row_of_square(x, plain[i, 1], plain[i, 2], known[3])
+    else:
+        extremes.places[i] = element_of(lines, plain[i, 1], plain[i, 2], plain[i, 3], observed.scales[i], known[0])
+
+
+@kernel(leaf=True, forceinline=True)
+def take_over(simple, i, t, x, v, f, lines, known, observed, where, extremes):
+    """Take over the value ``known[0]`` of a probe, which `plain_value` has written if it is ``simple``."""
+    if simple:
+        update_plain_extreme(i, t, x.reshape(-1), lines, known, observed, extremes)
+    else:
+        update_extreme(i, known[0], t, x, v, f, lines, observed, where, extremes)
 
 
 @kernel(leaf=True, apart=("looks",))

@@ -67,6 +67,8 @@ class Sundials(StepObserver):
         self._inner = (
             np.zeros(0, dtype=np.int64) if internal is None else np.searchsorted(system.free, internal.components)
         )
+        heavy = bool((np.repeat(system.net.mass, 3)[system.free] > 0.0).all())
+        self._definite = heavy and system.convex and not len(self._inner)  # M + γ²K is, since K has no negative part
 
     def tolerance(self):
         """Absolute tolerances of unknown displacements and of velocities, each of shape (unknowns,)."""
@@ -171,7 +173,7 @@ class Sundials(StepObserver):
         self._factor = self._symmetric
         if able:
             self._factor.update(values)
-            self._true = not self._factor.negative_pivots()
+            self._true = self._definite or not self._factor.negative_pivots()
         if not self._true:
             self.stats["nlu"] += 1
             self._factor.update(definite())

@@ -21,8 +21,10 @@ class Workspace(Record):
     ----------
     where : ndarray of int, shape (2,)
         The place of a value.
-    reaction, known, push : ndarray, shape (3,)
-        Force of the supports [N], what is known of plain probes, and the force that is integrated along the steps [N].
+    reaction, push : ndarray, shape (3,)
+        Force of the supports, and the force that is integrated along the steps [N].
+    known : ndarray, shape (4,)
+        Values of plain probes, see `refweb.dynamics.integrators.extremes.plain_value`.
     before : ndarray, shape (driven, 7)
         State of rows whose motion is prescribed, ahead of a step.
     aside, extra, half, momenta : ndarray, shape (rows, 3)
@@ -56,7 +58,7 @@ class Workspace(Record):
         return cls(
             where=np.zeros(2, dtype=np.int64),
             reaction=np.zeros(3),
-            known=np.zeros(3),
+            known=np.zeros(4),
             push=np.zeros(3),
             before=np.empty((len(model.inertia.driven), 7)),
             aside=next(vectors),

@@ -8,6 +8,7 @@ studies. Tests: ``tests/test_scene.py``, ``tests/results/test_selections.py``.
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any
 
 from ...accepted import accepts, any_of, array
@@ -216,12 +217,17 @@ class Observe(Table):
         return self.observable.probe(system)._replace(sign=SIGN[self.reduce], average=self.average or 0.0)
 
 
+@functools.cache
+def _of_nets():
+    """Default observables of a net."""
+    names = {"deflection": "displacement", "max_stress": "stress", "max_tension": "tension"}
+    return tuple(Observe(name=name, quantity=quantity, reduce="max") for name, quantity in names.items())
+
+
 def default(threads=()):
     """Observables of a scene without ``[[observe]]``, with the tension of each thread by its name."""
     return (
-        Observe(name="deflection", quantity="displacement", reduce="max"),
-        Observe(name="max_stress", quantity="stress", reduce="max"),
-        Observe(name="max_tension", quantity="tension", reduce="max"),
+        *_of_nets(),
         *(
             Observe(
                 name=f"tension_{name if _is_plain(name) else number}", quantity="tension", thread=name, reduce="max"

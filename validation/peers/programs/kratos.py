@@ -74,9 +74,9 @@ def positions(problem, part):
     return problem.points + [list(node.GetSolutionStepValue(Kratos.DISPLACEMENT)) for node in part.Nodes]
 
 
-def newton(part, scheme):
+def newton(part, scheme, relative=1e-10, absolute=1e-9):
     solver = ConstructSolver(Kratos.Parameters('{"solver_type": "LinearSolversApplication.sparse_lu"}'))
-    criterion = Kratos.ResidualCriteria(1e-10, 1e-9)
+    criterion = Kratos.ResidualCriteria(relative, absolute)
     builder = Kratos.ResidualBasedBlockBuilderAndSolver(solver)
     strategy = Kratos.ResidualBasedNewtonRaphsonStrategy(part, scheme, criterion, builder, 100, False, False, True)
     strategy.SetEchoLevel(0)
@@ -106,7 +106,7 @@ def statics(problem):
 
 def implicit(problem, steps):
     part = net(problem)
-    strategy = newton(part, Kratos.ResidualBasedNewmarkDisplacementScheme())
+    strategy = newton(part, Kratos.ResidualBasedNewmarkDisplacementScheme(), 1e-8, 1e-8)
     for time in np.linspace(0.0, problem.duration, steps + 1)[1:].tolist():
         step(part, strategy, time)
     return positions(problem, part)

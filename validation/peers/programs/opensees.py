@@ -79,8 +79,8 @@ def impact(problem, steps):
 
 def implicit(problem, steps, integrator=("Newmark", 0.5, 0.25)):
     moving(problem)
-    ops.system("UmfPack")
-    ops.test("NormDispIncr", 1e-9, 50)
+    ops.system("SparseSYM")
+    ops.test("NormDispIncr", 1e-6, 50)
     ops.algorithm("Newton")
     ops.integrator(*integrator)
     ops.analysis("Transient")
