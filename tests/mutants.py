@@ -532,7 +532,13 @@ MUTANTS = [
     Mutant("effects/thread_slips", "if pull == low or pull == high:", "if high - low < 1e-3 * ea:"),
     Mutant("effects/thread_slips", "total += (high - low) * (first + slope * middle)", "total += (high - low) * first"),
     Mutant("effects/thread_slips", "w[SLIP, r] = w[BEFORE, r] + math.copysign(reach, moved)", "w[SLIP, r] += 0.0"),
-    Mutant("dynamics/integrators/explicit_loop", "covered(reach, running.x", "covered(0.5 * reach, running.x"),
+    Mutant("dynamics/integrators/step_bound", "within = FASTER * span * (", "within = 0.01 * span * ("),
+    Mutant("dynamics/integrators/neighbour_list", "skin.past + depth <= SHARE * skin.outer < math.inf", "True"),
+    Mutant(
+        "dynamics/integrators/explicit_loop", "if clock.time == corner < times[n]", "if clock.time == corner == -1.0"
+    ),
+    Mutant("effects/self_contact/search", "approach * (1.0 + 2.0 * touch / second)", "approach"),
+    Mutant("effects/contact/penalty", "1.0 if touch.xi < 0.5 else 2.0", "2.0 if touch.xi < 0.5 else 1.0"),
     Mutant("effects/wound_mass", "signs[-1] = -1.0 if thread.at_last else 1.0", "signs[-1] = 1.0"),
     Mutant("effects/wound_mass", "rate = b[r, size] * given", "rate = 0.0"),
     Mutant("results/columns", '"work" in books or system.works', '"work" in books'),

@@ -89,7 +89,7 @@ def step_by_pairs(
     """Bound the step as `safe_step` does, for lines that touch lines, by the speed of each pair.
 
     Pairs are found anew, so that steps do not depend on which pairs happen to be listed, as they would where a run is
-    taken row by row. What forces add to speeds is that of a time ``early`` [s], see
+    taken row by row. Forces add to speeds for a time ``early`` [s], see
     `refweb.effects.self_contact.search.foresee`.
     """
     nearby, terms, linear, inverse = model.nearby, model.terms, model.inertia.linear, model.inertia.inverse

@@ -30,7 +30,7 @@ NOWHERE = -1.0
 CLOSE = 1e-8
 """Step of Newton's method behind which its next one is rounding."""
 NO_VECTOR = (0.0, 0.0, 0.0)
-"""What a straight element does not bend by, and a curved one has no place for."""
+"""Second derivative of a straight element along itself; vectors of the `Course` of a curved one."""
 
 
 class ContactPoint(NamedTuple):

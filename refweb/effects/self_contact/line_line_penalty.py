@@ -328,7 +328,7 @@ def room_left(limit, touch, scale, stored_now, moving):
 def depth_ahead(reach, speed, x, mass, cells, data, c):
     """c² − D that pair c may come to within a reach at some speed, see `refweb.effects.contact.penalty.foresight`."""
     geometry, of, pair = place_of(x, cells, data, c), numbers_of(data, c), record_at(PAIR, data, c, 0)
-    square, touch, reach = nearest(geometry.p, geometry.u, geometry.w)[2], of.touch, min(reach, pair.way)
+    square, touch, reach = nearest(geometry.p, geometry.u, geometry.w)[2], of.touch, min(reach, pair.approach)
     if not square < (REACH * touch + reach) ** 2:
         return 0.0
     first_mass, second_mass = mass[cells[c, 0]] + mass[cells[c, 1]], mass[cells[c, 2]] + mass[cells[c, 3]]

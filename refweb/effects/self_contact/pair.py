@@ -30,7 +30,7 @@ PAIR = np.dtype(
         ("second", float),
         ("vectors", float, (3, 3)),
         ("elements", float, (2,)),
-        ("way", float),
+        ("approach", float),
         ("speed", float),
     ]
 )

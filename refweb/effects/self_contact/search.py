@@ -192,7 +192,7 @@ def paired(chosen, cells, data):
         pair.length, pair.second = first.length, second.length
         pair.friction, pair.slip_velocity, pair.rolls = first.friction, first.slip_velocity, first.rolls
         pair.elements[0], pair.elements[1] = a, b
-        pair.way = pair.speed = math.inf
+        pair.approach = pair.speed = math.inf
         for k in range(3):
             pair.vectors[0, k] = first.ends[1, k] - first.ends[0, k]
             pair.vectors[1, k] = second.ends[0, k] - first.ends[0, k]
@@ -226,7 +226,7 @@ def foresee(span, early, v, f, inverse, cells, data):
                 fastest, hardest = max(fastest, speed), max(hardest, push)
         pair = record_at(PAIR, data, c, 0)
         pair.speed = FASTER * (math.sqrt(fastest) + early * math.sqrt(hardest))
-        pair.way = span * pair.speed
+        pair.approach = span * pair.speed
 
 
 @kernel()
@@ -253,18 +253,18 @@ def from_axis(p, u, w):
 
 
 @kernel(forceinline=True)
-def axes_apart(p, u, w, touch, way):
-    """Least distance of each element from the axis of the other, at least, when rows have come nearer by a way.
+def axes_apart(p, u, w, touch, approach):
+    """Least distance of each element from the axis of the other, at least, when rows have come nearer by an approach.
 
     An element touches points that are within the distance of touch of its axis, and no further beyond its ends. There
     the axis moves by more than its nodes, by 2 touch over the length of the element. 0 where an element may have become
-    shorter than the way.
+    shorter than the approach.
     """
-    first, second = math.sqrt(dot(u, u)) - way, math.sqrt(dot(w, w)) - way
+    first, second = math.sqrt(dot(u, u)) - approach, math.sqrt(dot(w, w)) - approach
     if not min(first, second) > 0.0:
         return 0.0
-    of_first = from_axis(p, u, w) - way * (1.0 + 2.0 * touch / second)
-    of_second = from_axis((-p[0], -p[1], -p[2]), w, u) - way * (1.0 + 2.0 * touch / first)
+    of_first = from_axis(p, u, w) - approach * (1.0 + 2.0 * touch / second)
+    of_second = from_axis((-p[0], -p[1], -p[2]), w, u) - approach * (1.0 + 2.0 * touch / first)
     return max(min(of_first, of_second), 0.0)
 
 
