@@ -125,7 +125,7 @@ MEMORY = np.dtype([("tag", np.int64), ("step", np.int64), ("force", float, (3,))
 """A contact as it is remembered until the next step: its tag, the number of the step, and its force by ``basis``."""
 CONTACTS, PARTS = types.Array(from_dtype(CONTACT), 1, "C"), types.Array(from_dtype(PART), 1, "C")
 MEMORIES = types.Array(from_dtype(MEMORY), 2, "C")
-DETECT = types.int64(MATRIX, INDICES, MATRIX, CONTACTS, PARTS, types.int64)
+DETECT = types.int64(MATRIX, INDICES, MATRIX, MATRIX, CONTACTS, PARTS, types.int64)
 LAW = types.float64(_f, types.int64, types.int64, MATRIX, MATRIX, CONTACTS, PARTS)
 DUE = np.dtype([("path", float), ("chosen", np.int64)])
 """A cell that is checked only when it is due: the approach in all drifts after which that is [m]. The list also has the

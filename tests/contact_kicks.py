@@ -59,7 +59,7 @@ class Solved:
         ends, count = [], 0
         for m, term in enumerate(self.terms):
             begin = count
-            count = term.velocity.implicit.detect(x, term.cells, term.data, contacts, parts, begin)
+            count = term.velocity.implicit.detect(x, term.cells, term.data, np.empty((0, 0)), contacts, parts, begin)
             contacts["term"][begin:count] = m
             ends.append((begin, count))
         assert count <= SPACE

@@ -378,7 +378,7 @@ TABLES = {
 }
 SOLVED = ("detection", "law")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
-LISTED += ("relax", "motion", "work of lengths", "impulse", "near", "collisions", "probe")
+LISTED += ("relax", "motion", "work of lengths", "impulse", "near", "within", "ahead", "collisions", "probe")
 TERM = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: TERM for name in ("gravity", "load", "contact", "pressure", "thrust", "bending", "thread")}
 KERNELS |= {name: {**TERM, "impulse": 1} for name in ("gravity", "load")}
@@ -575,8 +575,8 @@ FILLED = "from refweb.compiled import numba_internals as n; print(*(s for s, slo
 MANY = 70
 """Kernels of a plain impact, at most: some forty of the loop, and those of its effects and observables."""
 ABSENT = (
-    "inner_stages", "turn_on", "carry_nodes", "move_supports", "set_lengths", "set_masses", "exchange_masses",
-    "viscous_kick", "rubbing_kick",
+    "inner_stages", "advance_rotation", "carry_nodes", "move_supports", "set_lengths", "set_masses", "exchange_masses",
+    "viscous_kick", "contact_kick", "narrow_all", "step_by_pairs",
     "take_pairs", "stays_free", "set_push", "average", "note_events", "look_at_books", "book_powers",
     "add_half_steps", "turning", "relax", "set_growth",
 )  # fmt: skip

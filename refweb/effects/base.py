@@ -168,19 +168,25 @@ class ContactForce(NamedTuple):
         As ``near``, if cells are elements of which any two may act on each other, or pairs of them. Finds (numbers of
         the elements, their rows, their data) of the pairs that may act soon. Such a term has no stiffness. None if the
         cells themselves act.
+    foresee : kernel, optional
+        With ``finder``: writes to the data of pairs how near they may come in a span, and how fast they are then.
     crossing : Crossing, optional
         Penetration check of lines with lines, if the cells are lines that push each other.
     passing : kernel, optional
         Penetration check of lines with a body, for contact of bodies with straight lines. It tells, as a kernel
         `refweb.kernels.MEETS`, if lines come as deep in a body as its middle in a drift.
+    places : int
+        Number of columns behind a `TOUCH` with the places of contact, which the detection of friction reads.
     """
 
     felt: tuple[int, ...] = ()
     pairs: tuple[tuple[RigidBody, RigidBody], ...] = ()
     near: Callable[..., Any] | None = None
     finder: Callable[..., Any] | None = None
+    foresee: Callable[..., Any] | None = None
     crossing: Crossing | None = None
     passing: Callable[..., Any] | None = None
+    places: int = 0
 
     @property
     def with_lines(self) -> bool:
@@ -390,7 +396,7 @@ class ForceTerm:
     def columns(self) -> int:
         """Number of values per cell that ``force`` writes to its ``out``."""
         if self.contact.felt:
-            return CONTACT_COLUMNS
+            return CONTACT_COLUMNS + self.contact.places
         if self.adds_tension and self.balance.power is None:
             return DAMPED_TENSION + 1
         if self.observed:

@@ -226,10 +226,11 @@ def slip_size(b, c, y, z, slip):
     """Root r of slip²/r² + b²/(r + y)² + c²/(r + z)² = 1, with y, z ≥ 0: never below the root of large steps."""
     r = max(slip, math.sqrt(b * b + c * c) - max(y, z))
     for _ in range(100):
-        p, q, s = slip / r, b / (r + y), c / (r + z)
+        by_slip, by_b, by_c = 1.0 / r, 1.0 / (r + y), 1.0 / (r + z)
+        p, q, s = slip * by_slip, b * by_b, c * by_c
         p, q, s = p * p, q * q, s * s
         total = p + q + s
-        step = total * (math.sqrt(total) - 1.0) / (p / r + q / (r + y) + s / (r + z))
+        step = total * (math.sqrt(total) - 1.0) / (p * by_slip + q * by_b + s * by_c)
         r += step
         if not abs(step) > 1e-15 * r:
             break

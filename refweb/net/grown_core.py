@@ -104,12 +104,13 @@ def grown_box(l0, l1, l2, radius, c0, c1, c2, thin):
     w0, w1, w2 = _beyond(l0, c0), _beyond(l1, c1), _beyond(l2, c2)
     distance = math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
     if distance > 0.0 and (thin or distance >= (1.0 - EXACT) * radius):
-        g0, g1, g2 = -w0 / distance, -w1 / distance, -w2 / distance
+        inverse = 1.0 / distance
+        g0, g1, g2 = -w0 * inverse, -w1 * inverse, -w2 * inverse
         b0 = (1.0 if w0 != 0.0 else 0.0) - g0 * g0
         b1 = (1.0 if w1 != 0.0 else 0.0) - g1 * g1
         b2 = (1.0 if w2 != 0.0 else 0.0) - g2 * g2
-        bend = (-b0 / distance, g0 * g1 / distance, g0 * g2 / distance)
-        return radius - distance, (g0, g1, g2), (*bend, -b1 / distance, g1 * g2 / distance, -b2 / distance)
+        bend = (-b0 * inverse, g0 * g1 * inverse, g0 * g2 * inverse)
+        return radius - distance, (g0, g1, g2), (*bend, -b1 * inverse, g1 * g2 * inverse, -b2 * inverse)
     f0, f1, f2 = c0 - abs(l0), c1 - abs(l1), c2 - abs(l2)
     smallest = min(f0, f1, f2)
     at = 0 if f0 == smallest else 1 if f1 == smallest else 2
@@ -145,10 +146,11 @@ def depth(p, grown):
     if not grown.round:
         thin = (c[0] > 0.0) + (c[1] > 0.0) + (c[2] > 0.0) < 2
         return grown_box(p[0], p[1], p[2], grown.radius, c[0], c[1], c[2], thin)
-    out = math.hypot(p[0], p[1])
-    e0, e1 = (p[0] / out, p[1] / out) if out > 0.0 else (1.0, 0.0)
+    out = math.sqrt(p[0] * p[0] + p[1] * p[1])
+    inverse = 1.0 / out if out > 0.0 else 0.0
+    e0, e1 = (p[0] * inverse, p[1] * inverse) if out > 0.0 else (1.0, 0.0)
     values = grown_box(out, 0.0, p[2], grown.radius, c[0], math.inf, c[2], c[0] == 0.0)
     deep, (g, _, g2), (b, _, b02, _, _, b22) = values
-    around = g / out if out > 0.0 else b
+    around = g * inverse if out > 0.0 else b
     bend = (b * e0 * e0 + around * e1 * e1, (b - around) * e0 * e1, b02 * e0, b * e1 * e1 + around * e0 * e0)
     return deep, (g * e0, g * e1, g2), (*bend, b02 * e1, b22)

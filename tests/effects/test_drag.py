@@ -117,7 +117,10 @@ def test_contacts_that_share_a_row_have_no_parts():
     term = next(term for term in system.terms if term.name == "drag")
     contacts, parts = np.zeros(4, CONTACT), np.zeros(4, PART)
     contacts["count"], contacts["first"] = 10**6, np.arange(4)
-    assert term.velocity.implicit.detect(np.zeros((3, 3)), term.cells, term.data, contacts, parts, 0) == 4
+    assert (
+        term.velocity.implicit.detect(np.zeros((3, 3)), term.cells, term.data, np.empty((0, 0)), contacts, parts, 0)
+        == 4
+    )
     assert contacts["group"].tolist() == [1, 2, 0, 1] and contacts["count"].tolist() == [1, 1, 0, 1]
 
 

@@ -425,8 +425,8 @@ def test_more_pairs_than_elements_are_remembered(monkeypatch):
     ends = [end for line in (*below, *above) for end in line]
     runs = []
     for limit, method, keys in (
-        (0, "central-difference", {"safety": 0.1}),
         (0, "central-difference", {"safety": 0.05}),
+        (0, "central-difference", {"safety": 0.025}),
         (20_000, "cvode", {"rtol": 1e-9}),
     ):
         monkeypatch.setattr(table, "LISTED", limit)

@@ -43,7 +43,7 @@ from .momentum_balance import CLOSURE, MomentumBalance, open_balance, refuse_ope
 from .monitors import Observed, begin_monitors
 from .neighbour_list import forget, look_at_all
 from .records import CLOCK, Model, Running, Scheme
-from .step_bound import safe_step
+from .step_bound import SPAN, safe_step
 from .workspace import Workspace
 
 TWIN_STEPS = math.sqrt(2.0)
@@ -252,8 +252,15 @@ class CentralDifference(Integrator):
     @cached_property
     def _scheme(self):
         least_steps, step = 1.0 if self.step_size else 0.5 / self.safety, self.step_size or 0.0
-        numbers = (self.safety * self.stretch, least_steps, step, self.finer)
+        numbers = (self.safety * self.stretch, least_steps, step, self.finer, 0.0)
         return Scheme(self.kicks, self.drifts, *map(float, numbers))
+
+    @cached_property
+    def _planned(self):
+        """The scheme of a run: where lines touch lines, steps are planned for spans that may be shorter than rows."""
+        if self.step_size or not len(self.model.nearby.at):
+            return self._scheme
+        return replace(self._scheme, span=SPAN * self.safety * self.stretch * self.bound(reach=0.0))
 
     def _records(self, course):
         """(`Running`, `Workspace`) of a course; those of the last one where it has the same arrays."""
@@ -282,7 +289,7 @@ class CentralDifference(Integrator):
         work = len(self.drifts) * sum(len(term.cells) for term in self.system.terms)
         done, breath = 0, self.breath or max(BREATH // max(work, 1), 1)
         running, workspace = self._records(course)
-        records = self._scheme, self.model, self._observed, running, workspace
+        records = self._planned, self.model, self._observed, running, workspace
         clock = running.clock
         if len(self.model.ccd.checks):
             reset_checks.call(self.model.ccd)

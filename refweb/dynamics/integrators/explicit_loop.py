@@ -45,7 +45,7 @@ from .events import ended_by, note_events
 from .extremes import look_at, look_with_places, note_time, plain_value, take_over, turns_back
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_balance import add_half_steps, push_on, set_push
-from .neighbour_list import covered, reach_all, show_near, update_neighbours
+from .neighbour_list import reach_all, show_near, update_neighbours
 from .rows import energies_now, write_row
 from .step import (
     add_forces,
@@ -60,7 +60,7 @@ from .step import (
     turn_supports,
     viscous_kick,
 )
-from .step_bound import safe_step, step_by_elements
+from .step_bound import EARLY, SPAN, safe_step, step_by_pairs
 from .vector_spread import spread_of
 from .workspace import Workspace
 
@@ -237,10 +237,10 @@ def steps_until(end, changing, scheme, model, running):
         fastest = min(fastest, spread_of(v[: model.inertia.linear]) + interval * math.sqrt(push))
     reach = 2.0 * interval * fastest
     reach_all(reach, running.x, model.nearby, model.terms)
-    if not model.nearby.at.shape[0] or covered(reach, running.x, model.nearby, model.terms):
+    if not model.nearby.at.shape[0]:
         return interval / (scheme.safety * safe_step(time, end, changing, reach, fastest, running.x, f, model))
-    bound = step_by_elements(time, end, changing, reach, fastest, model, running)
-    return interval / (scheme.safety * bound)
+    early = EARLY / SPAN * scheme.span
+    return interval / (scheme.safety * step_by_pairs(time, end, early, changing, reach, fastest, model, running))
 
 
 @kernel(leaf=True, apart=())
@@ -276,6 +276,15 @@ def end_of_steps(corners, time, row):
     return corners[first] if first < corners.size and corners[first] < row * (1.0 - SAME) else row
 
 
+@kernel(leaf=True)
+def end_of_span(time, end, span):
+    """The end of the next of equal spans to ``end``, none longer than ``span``; ``end`` where that is 0."""
+    if not span > 0.0:
+        return end
+    parts = math.ceil((end - time) / span * (1.0 - 1e-9))
+    return time + (end - time) / parts if parts > 1.0 else end
+
+
 @kernel(apart=())
 def advance_rows(
     times: Vector,
@@ -305,7 +314,8 @@ def advance_rows(
         if not clock.begun:
             set_lines(clock.time, running.x, model)
         while clock.time < times[n] and not stopped:
-            end, begun = end_of_steps(model.corners, clock.time, times[n]), clock.begun
+            corner, begun = end_of_steps(model.corners, clock.time, times[n]), clock.begun
+            end = end_of_span(clock.time, corner, scheme.span)
             changing = lengths.corners.size > 2 and lengths.corners[0] < end and lengths.corners[-3] > clock.time
             if not begun:
                 clock.since = clock.time
@@ -334,7 +344,7 @@ def advance_rows(
                 add_half_steps(halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             if (model.inertia.driven.size or lengths.growth >= 0) and turn_supports(clock.time, model, running):
                 look_behind(model, observed, running, space)
-            if clock.time < times[n]:  # a corner: what is stored may be gone again at the row
+            if clock.time == corner < times[n]:  # what is stored at a corner may be gone again at the row
                 largest = energies_now(model, running, total)[1]
                 if not math.isfinite(largest):
                     break

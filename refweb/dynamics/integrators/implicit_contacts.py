@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...effects.base import CONTACT_COLUMNS
 from ...effects.contact_solver import carry, prepare
 from ...kernels import (
     CONTACT,
@@ -130,14 +131,25 @@ def lines_in_touch(depths, elements, pieces):
 
 
 @kernel()
+def known_places(chosen, outs, elements):
+    """Columns of what the push of some cells shows that stand behind a `TOUCH`."""
+    known = np.empty((chosen.size, outs.shape[1] - CONTACT_COLUMNS))
+    for n in range(chosen.size):
+        for k in range(known.shape[1]):
+            known[n, k] = outs[elements[chosen[n]], CONTACT_COLUMNS + k]
+    return known
+
+
+@kernel()
 def detect(m, x, terms, implicit_contacts, contacts, parts, begin):
     """Write the contacts of term m from ``begin`` on; the number behind them."""
     i, elements = implicit_contacts.terms[m], implicit_contacts.depths[m]
     if elements < 0:
-        return implicit_contacts.detects[m](x, terms.cells[i], terms.data[i], contacts, parts, begin)
+        return implicit_contacts.detects[m](x, terms.cells[i], terms.data[i], np.empty((0, 0)), contacts, parts, begin)
     chosen = lines_in_touch(terms.outs[elements], implicit_contacts.elements[m], implicit_contacts.pieces)
     cells, data = rows_of(chosen, terms.cells[i], terms.data[i])
-    end = implicit_contacts.detects[m](x, cells, data, contacts, parts, begin)
+    known = known_places(chosen, terms.outs[elements], implicit_contacts.elements[m])
+    end = implicit_contacts.detects[m](x, cells, data, known, contacts, parts, begin)
     for n in range(begin, min(end, contacts.size)):
         contacts[n].cell = contacts[n].owner = chosen[contacts[n].cell]
     return end

@@ -111,6 +111,8 @@ class Scheme(Record):
         Largest step instead [s], 0 where the bound says.
     finer : float
         Factor on the number of steps of each row.
+    span : float
+        Largest time for which steps are planned [s], 0 where it is a row.
     """
 
     kicks: Vector
@@ -119,6 +121,7 @@ class Scheme(Record):
     least_steps: float
     step_size: float
     finer: float
+    span: float
 
 
 class Inertia(Record):

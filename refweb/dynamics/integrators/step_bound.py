@@ -12,11 +12,19 @@ import math
 from typing import TYPE_CHECKING
 
 from ...effects.natural_lengths import set_lengths
+from ...effects.self_contact.search import FASTER
 from ...kernels import BOUND, Matrix, kernel
 from ...net.rotation_bounds import carry_rates, pull_rates
+from .vector_spread import spread_of
 
 if TYPE_CHECKING:
     from .records import ForceTerms, Inertia, Model, Running
+
+SPAN, EARLY = 64.0, 2.0
+"""Number of steps of the lines alone for which steps of lines that touch lines are planned; number of these for which a
+force at the start of a span is taken to act."""
+FAR = 8.0
+"""Reach above which pairs are not found for a bound, over the largest depth of a skin around pairs."""
 
 
 @kernel(leaf=True, apart=())
@@ -71,16 +79,36 @@ def safe_step(
 
 
 @kernel(apart=("pairs",))
-def step_by_elements(
-    start: float, end: float, changing: bool, reach: float, speed: float, model: Model, running: Running
+def step_by_pairs(
+    start: float,
+    end: float,
+    early: float,
+    changing: bool,
+    reach: float,
+    speed: float,
+    model: Model,
+    running: Running,
 ) -> float:
-    """Bound the step as `safe_step` does, by the elements themselves where the pairs are not all that can touch."""
-    nearby, terms = model.nearby, model.terms
-    first = 2 * len(terms.data) - len(terms.cells)  # see `refweb.dynamics.integrators.records.ForceTerms`
+    """Bound the step as `safe_step` does, for lines that touch lines, by the speed of each pair.
+
+    Pairs are found anew, so that steps do not depend on which pairs happen to be listed, as they would where a run is
+    taken row by row. Forces add to speeds for a time ``early`` [s], see
+    `refweb.effects.self_contact.search.foresee`.
+    """
+    nearby, terms, linear, inverse = model.nearby, model.terms, model.inertia.linear, model.inertia.inverse
+    x, v, f, hardest = running.x, running.v, running.f, 0.0
+    for r in range(linear):
+        a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
+        hardest = max(hardest, a0 * a0 + a1 * a1 + a2 * a2)
+    first, span = 2 * len(terms.data) - len(terms.cells), end - start  # see `records.ForceTerms`
+    early = min(early, span)
+    within = FASTER * span * (spread_of(v[:linear]) + 2.0 * early * math.sqrt(hardest))
+    if not within < FAR * nearby.skin[0].widest:
+        within = math.inf
     for m in range(nearby.terms.size):
         i = nearby.terms[m]
         nearby.cells[m], nearby.data[m] = terms.cells[i], terms.data[i]
-        terms.cells[i], terms.data[i] = terms.cells[first + m], terms.data[first + m]
+        nearby.aheads[m](i, m, within, span, early, x, v, f, inverse, terms.cells, terms.data)
     bound = safe_step(start, end, changing, reach, speed, running.x, running.f, model)
     for m in range(nearby.terms.size):
         i = nearby.terms[m]

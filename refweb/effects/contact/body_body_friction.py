@@ -130,7 +130,7 @@ def kernels(first, second):
         slopes(x, v, blocks, cells, data, True)
 
     @kernel(DETECT)
-    def detect_all(x, cells, data, contacts, parts, begin):
+    def detect_all(x, cells, data, known, contacts, parts, begin):
         space, count = space_of(data), begin
         for c in range(cells.shape[0]):
             for m in range(detect(0.0, x, cells, data, c, space)):

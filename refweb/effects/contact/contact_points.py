@@ -26,10 +26,14 @@ from ...kernels import Indices, Matrix, kernel
 from ...net.rotation import times
 from ..vectors import dot
 from .nearest_point import SAMPLES, far, in_box, point, share
-from .pair import LineContacts, Pair, from_shape, pair_of, pairing
+from .pair import LineContacts, Pair, from_shape, pairing
 
 NOWHERE = -1.0
 """Coordinate ξ of an element without any contact."""
+CLOSE = 1e-8
+"""Step of Newton's method behind which its next one is rounding."""
+NO_VECTOR = (0.0, 0.0, 0.0)
+"""Second derivative of a straight element along itself; vectors of the `Course` of a curved one."""
 
 
 class ContactPoint(NamedTuple):
@@ -182,6 +186,57 @@ def within_of(depth, spins):
     return within
 
 
+class Course(NamedTuple):
+    """An element relative to a body, for its `ContactPoint` at any place.
+
+    Attributes
+    ----------
+    pair : Pair
+        The element and the body.
+    y, d : tuple of 3 float
+        First node of a straight element from the row of the body, and the vector to its last node, along the body's
+        axes [m]; zero of a curved element.
+    at : tuple of 3 float
+        The first node from the centre of the shape.
+    """
+
+    pair: Pair
+    y: tuple[Any, ...]
+    d: tuple[Any, ...]
+    at: tuple[Any, ...]
+
+
+@functools.cache
+def along(depth, spins, nodes, functions):
+    """Kernels of an element that is looked at in several places: its axes are found once.
+
+    ``(x, cells, data, c)`` gives the `Course` of cell c, and ``(x, cells, data, c, course, xi)`` its `ContactPoint` at
+    ξ. Parameters are those of `places`.
+    """
+    paired, within = pairing(spins), within_of(depth, spins)
+
+    @kernel(forceinline=True)
+    def course_of(x, cells, data, c):
+        pair = paired(x, cells, data, c, nodes)
+        if nodes > 2:
+            return Course(pair, NO_VECTOR, NO_VECTOR, NO_VECTOR)
+        y, d, _ = point(x, cells, data, c, nodes, functions, 0.0)
+        y, d = times(pair.axes, y), times(pair.axes, d)
+        return Course(pair, y, d, from_shape(y, data, c, nodes) if spins == 2 else y)
+
+    @kernel(forceinline=True)
+    def spot_of(x, cells, data, c, course, xi):
+        if nodes > 2:
+            return within(x, cells, data, c, nodes, functions, xi)
+        y, d, at = course.y, course.d, course.at
+        at = at[0] + xi * d[0], at[1] + xi * d[1], at[2] + xi * d[2]
+        deep, gradient, hessian = depth(at, course.pair.shape)
+        y = y[0] + xi * d[0], y[1] + xi * d[1], y[2] + xi * d[2]
+        return ContactPoint(y, d, NO_VECTOR, deep, gradient, hessian)
+
+    return course_of, spot_of
+
+
 @functools.cache
 def places(depth, spins, pieces, nodes, functions):
     """Kernels that find where lines touch.
@@ -202,63 +257,69 @@ def places(depth, spins, pieces, nodes, functions):
     pieces, nodes, functions
         See `refweb.effects.contact.penalty.kernels`.
     """
-    paired, within, convex = pairing(spins), within_of(depth, spins), getattr(depth, "convex", True)
+    course_of, spot_of, convex = *along(depth, spins, nodes, functions), getattr(depth, "convex", True)
 
     @kernel(forceinline=True)
     def touch_of(x, cells, data, buffer, n):
         c, xi = buffer[n].cell, buffer[n].xi
-        spot = within(x, cells, data, c, nodes, functions, xi)
+        course = course_of(x, cells, data, c)
+        spot = spot_of(x, cells, data, c, course, xi)
         weight, share = (1.0, 1.0) if convex else (buffer[n].weight, buffer[n].share)
-        return PointContact(c, xi, buffer[n].inner > 0.0, paired(x, cells, data, c, nodes), spot, weight, share)
+        return PointContact(c, xi, buffer[n].inner > 0.0, course.pair, spot, weight, share)
 
     if not convex:
         from .nonconvex_contacts import PLACES, several
 
-        return Places(*several(within, rise, pieces, nodes, functions), touch_of, PLACES)
+        return Places(*several(within_of(depth, spins), rise, pieces, nodes, functions), touch_of, PLACES)
 
-    @kernel()
-    def climbed(x, cells, data, c, low, high, xi):
-        moved, pair = math.inf, pair_of(data, c, nodes)
+    @kernel(forceinline=nodes == 2)
+    def climbed(x, cells, data, c, course, low, high, xi):
+        moved, pair, close = math.inf, course.pair, False
         if pair.once:
             for end in (low, high):
-                spot = within(x, cells, data, c, nodes, functions, end)
+                spot = spot_of(x, cells, data, c, course, end)
                 slope = dot(spot.gradient, spot.d)
                 if (end == 0.0 and slope <= 0.0) or (end == 1.0 and slope >= 0.0):
                     return end, spot.depth
         for _ in range(100):
-            spot = within(x, cells, data, c, nodes, functions, xi)
+            spot = spot_of(x, cells, data, c, course, xi)
             deep, slope = spot.depth, dot(spot.gradient, spot.d)
+            if moved <= 1e-15 or close:
+                break
             if nodes == 2 and deep + max(slope * (high - xi), slope * (low - xi)) <= 0.0:
                 return (NOWHERE if high - low == 1.0 else xi), deep  # concave: nowhere deep enough
             value, curve = rise(pair, xi, spot)
             low, high, moved, xi = climb(value, curve, low, high, moved, xi)
-            if moved <= 1e-15:
-                break
-        return xi, within(x, cells, data, c, nodes, functions, xi).depth
+            close = moved < CLOSE and abs(abs(value) - moved * abs(curve)) < 1e-6 * abs(value)
+        return xi, deep
 
     @kernel()
-    def felt(x, cells, data, c, xi):
-        deep, pair = within(x, cells, data, c, nodes, functions, xi).depth, pair_of(data, c, nodes)
+    def felt(x, cells, data, c, course, xi):
+        deep, pair = spot_of(x, cells, data, c, course, xi).depth, course.pair
         return window(pair.once, xi, True)[0] ** (1.0 / (pair.exponent + 1.0)) * deep if deep > 0.0 else deep
 
-    @kernel()
-    def deepest(x, cells, data, c):
+    @kernel(forceinline=nodes == 2)
+    def deepest_of(x, cells, data, c, course):
         if nodes > 2:  # from the places where samples are largest, of which there may be several
             largest, where, depth_there = -math.inf, 0.0, 0.0
-            before, current = -math.inf, felt(x, cells, data, c, 0.0)
+            before, current = -math.inf, felt(x, cells, data, c, course, 0.0)
             for n in range(SAMPLES + 1):
                 at, after = n / SAMPLES, -math.inf
                 if n < SAMPLES:
-                    after = felt(x, cells, data, c, at + 1.0 / SAMPLES)
+                    after = felt(x, cells, data, c, course, at + 1.0 / SAMPLES)
                 if current >= before and current > after:
                     low, high = max(at - 1.0 / SAMPLES, 0.0), min(at + 1.0 / SAMPLES, 1.0)
-                    xi, deep = climbed(x, cells, data, c, low, high, at)
-                    value = felt(x, cells, data, c, xi)
+                    xi, deep = climbed(x, cells, data, c, course, low, high, at)
+                    value = felt(x, cells, data, c, course, xi)
                     if value > largest:
                         largest, where, depth_there = value, xi, deep
                 before, current = current, after
             return where, depth_there
-        return climbed(x, cells, data, c, 0.0, 1.0, 0.5)
+        return climbed(x, cells, data, c, course, 0.0, 1.0, 0.5)
+
+    @kernel()
+    def deepest(x, cells, data, c):
+        return deepest_of(x, cells, data, c, course_of(x, cells, data, c))
 
     @kernel(leaf=True, apart=())
     def contacts(x: Matrix, cells: Indices, data: Matrix, first: int, buffer: LineContacts) -> int:
@@ -266,11 +327,12 @@ def places(depth, spins, pieces, nodes, functions):
         for c in range(first, first + pieces):
             if far(x, cells, data, c, nodes):
                 continue
-            xi, deep = deepest(x, cells, data, c)
+            course = course_of(x, cells, data, c)
+            xi, deep = deepest_of(x, cells, data, c, course)
             if xi == NOWHERE:
                 continue
             inner = 0.0 < xi < 1.0
-            if pair_of(data, c, nodes).once:
+            if course.pair.once:
                 if deep > best:
                     best, count = deep, 1
                     set_place(buffer[0], c, xi, 1.0 if inner else 0.0)
@@ -279,7 +341,7 @@ def places(depth, spins, pieces, nodes, functions):
                 set_place(buffer[count], c, xi, 1.0)
                 count += 1
             for end in range(2):
-                if within(x, cells, data, c, nodes, functions, float(end)).depth > 0.0:
+                if spot_of(x, cells, data, c, course, float(end)).depth > 0.0:
                     set_place(buffer[count], c, float(end), 0.0)
                     count += 1
         return count

@@ -22,7 +22,7 @@ from ...net.rotation import times, times_transposed
 from ..base import ImplicitContactKernels
 from ..contact_solver import direction, friction_law, set_basis, set_part
 from ..vectors import cross, dot
-from .contact_points import hessian_times, places
+from .contact_points import hessian_times, places, set_place
 from .friction import facing
 from .nearest_point import share
 from .pair import LINE_CONTACT
@@ -75,6 +75,22 @@ def set_contact(contact, parts, touch, cells, spins, functions):
     contact.count = at - contact.first + (2 if spins else 1)
 
 
+@kernel(forceinline=True)
+def take_known(known, first, pieces, buffer):
+    """Write the contacts of a line that the push has found, in the order in which it does; their number."""
+    count = 0
+    for c in range(first, first + pieces):
+        xi, ends = known[c, 0], int(known[c, 1])
+        if xi > 0.0:
+            set_place(buffer[count], c, xi, 1.0)
+            count += 1
+        for end in range(2):
+            if ends & (1 << end):
+                set_place(buffer[count], c, float(end), 0.0)
+                count += 1
+    return count
+
+
 def kernels(depth, pieces, functions, spins):
     """The `ImplicitContactKernels` of elements with two nodes.
 
@@ -92,11 +108,15 @@ def detecting(depth, pieces, functions, spins):
     _, contacts_of, touch_of, limit = places(depth, spins, pieces, 2, functions)
 
     @kernel(DETECT)
-    def detect(x, cells, data, contacts, parts, begin):
+    def detect(x, cells, data, known, contacts, parts, begin):
         buffer, count = np.empty(limit * pieces, LINE_CONTACT), begin
         at_node = np.full(x.shape[0], -1)
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts_of(x, cells, data, first, buffer)):
+            if known.shape[1]:
+                touching = take_known(known, first, pieces, buffer)
+            else:
+                touching = contacts_of(x, cells, data, first, buffer)
+            for n in range(touching):
                 if count < contacts.size:
                     touch = touch_of(x, cells, data, buffer, n)
                     if not touch.inner:

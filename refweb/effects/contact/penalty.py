@@ -28,9 +28,9 @@ import numpy as np
 from ...compiled.rows import record_at
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, Indices, Matrix, Vector, kernel
 from ...net.rotation import times_transposed, to_quaternion
-from ..base import TOUCH
+from ..base import CONTACT_COLUMNS, TOUCH
 from ..vectors import cross, dot
-from .contact_points import hessian_times, place_moves, places, reaching, window, within_of
+from .contact_points import along, hessian_times, place_moves, places, reaching, window
 from .nearest_point import lightness, point, share
 from .pair import LINE_CONTACT, lever_of, pair_of, pairing, power_of_depth
 from .rotational_stiffness import add_moments, add_push, add_rotation, set_arms
@@ -109,16 +109,18 @@ def foresight(depth, spins, pieces, nodes, functions):
     `refweb.effects.contact.contact_points.places`.
     """
     deepest = places(depth, spins, pieces, nodes, functions).deepest
-    within, reaches = within_of(depth, spins), reaching(depth, spins)
+    (course_of, spot_of), reaches = along(depth, spins, nodes, functions), reaching(depth, spins)
 
     @kernel(apart=())
     def depth_ahead(
         careful: bool, reach: float, speed: float, x: Matrix, mass: Vector, cells: Indices, data: Matrix, c: int
     ) -> Foreseen:
         reduced_mass, body, pair = 0.0, mass[cells[c, nodes]], pair_of(data, c, nodes)
+        course = course_of(x, cells, data, c)
+        first, last = spot_of(x, cells, data, c, course, 0.0).depth, spot_of(x, cells, data, c, course, 1.0).depth
+        if nodes == 2 and 0.5 * (first + last + math.sqrt(dot(course.d, course.d))) + reach <= 0.0:
+            return Foreseen(0.0, 0.0)
         xi, deep = deepest(x, cells, data, c)
-        first = within(x, cells, data, c, nodes, functions, 0.0).depth
-        last = within(x, cells, data, c, nodes, functions, 1.0).depth
         _, d, _ = point(x, cells, data, c, nodes, functions, xi)
         length = math.sqrt(dot(d, d))
         deep = max(deep, first, last)
@@ -211,6 +213,8 @@ def kernels(depth, pieces, nodes, functions, spins=0):
     _, contacts, touch_of, limit = places(depth, spins, pieces, nodes, functions)
     depth_ahead = foresight(depth, spins, pieces, nodes, functions)
 
+    # Behind a TOUCH, ``out`` may have the place of the contact between the ends, 0 without one, and which ends touch, 1
+    # for the first and 2 for the last: `line_body_friction` then need not search for them again.
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         buffer = np.empty(limit * pieces, LINE_CONTACT)
@@ -221,6 +225,11 @@ def kernels(depth, pieces, nodes, functions, spins=0):
                 c, push = touch.c, push_of(touch)
                 shows = record_at(TOUCH, out, c, 0)
                 shows.value = max(shows.value, touch.spot.depth)
+                if out.shape[1] > CONTACT_COLUMNS:
+                    if touch.inner:
+                        out[c, CONTACT_COLUMNS] = touch.xi
+                    else:
+                        out[c, CONTACT_COLUMNS + 1] += 1.0 if touch.xi < 0.5 else 2.0
                 g = times_transposed(touch.pair.axes, touch.spot.gradient)
                 for k in range(3):
                     for a in range(nodes):

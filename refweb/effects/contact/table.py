@@ -252,7 +252,9 @@ class Contact(Table):
             (force, energy, stiffness, bound), within = kernels(depth, *element, spins), in_reach(depth, spins)
         if net.order == 1:  # explicit steps take no other elements
             passes = None if net.quasi_static else passing(depth, *element[1:], spins)
-            pairs["contact"] = pairs["contact"]._replace(near=near(*element, within), passing=passes)
+            places = 2 if depth is not None and self._rubs(bodies) else 0
+            contact = pairs["contact"]._replace(near=near(*element, within), passing=passes, places=places)
+            pairs["contact"] = contact
         return ForceTerm(
             **pairs,
             force=force,
@@ -260,6 +262,11 @@ class Contact(Table):
             tangent=Tangent(stiffness, bound, symmetric=spins == 0 or all(body.prescribed for body in bodies)),
             balance=Balance("contact_energy", internal=True),
         )
+
+    def _rubs(self, bodies):
+        """True if friction of lines may read where they touch bodies: any has losses, and all are convex."""
+        convex = all(getattr(body.shape.depth(), "convex", True) and not body.shape.once for body in bodies)
+        return convex and any(self._of(body, key) > 0.0 for body in bodies for key in ("damping", "friction"))
 
     def _friction(self, net, element, depth, spins, bodies):
         from .friction import kernels

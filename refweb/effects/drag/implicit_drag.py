@@ -108,7 +108,7 @@ def implicit_drag(nodes):
     End = end_of(nodes)
 
     @kernel(DETECT)
-    def detect(x, cells, data, contacts, parts, begin):
+    def detect(x, cells, data, known, contacts, parts, begin):
         for c in range(cells.shape[0] if begin + cells.shape[0] <= contacts.size else 0):
             contact, end = contacts[begin + c], record_at(End, data, c, 0)
             t, _ = direction(x, cells, c, end)

@@ -247,7 +247,7 @@ def set_contact(contact, parts, cell, c, normal, cells, data, rows, shares):
 
 
 @kernel(DETECT)
-def detect(x, cells, data, contacts, parts, begin):
+def detect(x, cells, data, known, contacts, parts, begin):
     rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
     count, chosen = begin, np.empty((0, 2), dtype=np.int64)
     if cells.shape[1] != 4:

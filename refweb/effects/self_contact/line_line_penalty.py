@@ -38,8 +38,8 @@ from ...compiled.rows import record_at
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..vectors import cross, dot
 from .overlap_integrals import add_second, first
-from .pair import ELEMENT, Numbers, angle_factor, apart, nearest, numbers_of, place_of
-from .search import REACH, near_pairs
+from .pair import ELEMENT, PAIR, Numbers, angle_factor, apart, nearest, numbers_of, place_of
+from .search import REACH, axes_apart, near_pairs
 
 MARGIN = 0.75
 """Factor on the bound for a rigid body: no row sum of 4000 random pairs is above 0.7 of the bound."""
@@ -331,8 +331,8 @@ def room_left(limit, touch, scale, stored_now, moving):
 @kernel(forceinline=True)
 def depth_ahead(reach, speed, x, mass, cells, data, c):
     """c² − D that pair c may come to within a reach at some speed, see `refweb.effects.contact.penalty.foresight`."""
-    geometry, of = place_of(x, cells, data, c), numbers_of(data, c)
-    square, touch = nearest(geometry.p, geometry.u, geometry.w)[2], of.touch
+    geometry, of, pair = place_of(x, cells, data, c), numbers_of(data, c), record_at(PAIR, data, c, 0)
+    square, touch, reach = nearest(geometry.p, geometry.u, geometry.w)[2], of.touch, min(reach, pair.approach)
     if not square < (REACH * touch + reach) ** 2:
         return 0.0
     first_mass, second_mass = mass[cells[c, 0]] + mass[cells[c, 1]], mass[cells[c, 2]] + mass[cells[c, 3]]
@@ -341,21 +341,39 @@ def depth_ahead(reach, speed, x, mass, cells, data, c):
         if min(first_mass, second_mass) > 0.0
         else max(first_mass, second_mass)
     )
-    moving = 0.5 * reduced * speed * speed if speed > 0.0 else math.inf
-    left = max(math.sqrt(square) - reach, 0.0)
-    return room_left(2.0 * touch * touch - left * left, touch, of.scale, stored(x, cells, data, c), moving)
+    if pair.speed < math.inf:
+        speed = min(speed, pair.speed)
+    elif speed == 0.0:
+        speed = math.inf
+    moving = 0.5 * reduced * speed * speed
+    p, u, w = geometry
+    left, axes = max(math.sqrt(square) - reach, 0.0), axes_apart(p, u, w, touch, reach)
+    return room_left(
+        min(2.0 * touch * touch - left * left, touch * touch - axes * axes),
+        touch,
+        of.scale,
+        stored(x, cells, data, c),
+        moving,
+    )
 
 
 @kernel()
 def note_pairs(reach, speed, x, mass, cells, data, rates_here, largest):
-    """Write the sum and the largest of the bounds of all pairs of each row."""
+    """Write the sum of the bounds of all pairs of each row, and the largest that it may be.
+
+    That is `MOST` times the largest of a pair, or where pairs have speeds of their own what `note_all` takes, if that
+    is less.
+    """
     for c in range(cells.shape[0]):
         depth = depth_ahead(reach, speed, x, mass, cells, data, c)
         if depth > 0.0:
-            value = 2.0 * steepest(numbers_of(data, c), depth)
+            of = numbers_of(data, c)
+            value, limit = 2.0 * steepest(of, depth), math.inf
+            if record_at(PAIR, data, c, 0).speed < math.inf:
+                limit = steepest(of, of.touch * of.touch)
             for n in range(4):
                 rates_here[cells[c, n]] += value
-                largest[cells[c, n]] = max(largest[cells[c, n]], value)
+                largest[cells[c, n]] = max(largest[cells[c, n]], min(MOST * value, limit))
 
 
 @kernel()
@@ -393,4 +411,4 @@ def bound(reach, speed, x, mass, rates, cells, data):
         _, rows, numbers = near_pairs(reach, x, cells, data)
         note_pairs(reach, speed, x, mass, rows, numbers, rates_here, largest)
     for r in range(rates.size):
-        rates[r] += min(rates_here[r], MOST * largest[r])
+        rates[r] += min(rates_here[r], largest[r])

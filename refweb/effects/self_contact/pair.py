@@ -26,9 +26,19 @@ ELEMENT = np.dtype([*_common, ("ends", float, (2, 3))])
 line_line_penalty` [N/m⁴], 0 where it is broken, natural length [m], d [s/m], μ, v_s [m/s], whether lines roll, and
 reference positions of its nodes [m]. Behind these stand the numbers of the elements that it does not touch, being
 within the distance of touch along the net, −1 for none."""
-PAIR = np.dtype([*_common, ("second", float), ("vectors", float, (3, 3)), ("elements", float, (2,))])
+PAIR = np.dtype(
+    [
+        *_common,
+        ("second", float),
+        ("vectors", float, (3, 3)),
+        ("elements", float, (2,)),
+        ("approach", float),
+        ("speed", float),
+    ]
+)
 """Data of a pair: the same, natural length of the second element [m], from the first node of the first element the
-vectors to the three others in the web's position [m], and the numbers of both."""
+vectors to the three others in the web's position [m], and the numbers of both; for bounds the largest approach of the
+two elements [m] and their largest relative speed [m/s], infinite where only those of the net are known."""
 APART = width_of(ELEMENT)
 """First column of the data of an element behind these."""
 

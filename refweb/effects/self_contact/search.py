@@ -17,6 +17,7 @@ import numpy as np
 
 from ...compiled.rows import record_at, width_of
 from ...kernels import NEAR, kernel
+from ..vectors import dot
 from .pair import APART, ELEMENT, PAIR, nearest, place_of
 
 WIDTH = width_of(PAIR)
@@ -25,6 +26,8 @@ WIDTH = width_of(PAIR)
 REACH = math.sqrt(2.0)
 """Distance of two segments up to which they may push each other, over the distance of contact: the window of an element
 extends beyond its ends."""
+FASTER = 1.5
+"""Allowance for what other contacts add to the relative speed of a pair in a span."""
 BOXES = 4
 """Largest number of cells of the grid over that of elements."""
 
@@ -191,6 +194,7 @@ def paired(chosen, cells, data):
         pair.length, pair.second = first.length, second.length
         pair.friction, pair.slip_velocity, pair.rolls = first.friction, first.slip_velocity, first.rolls
         pair.elements[0], pair.elements[1] = a, b
+        pair.approach = pair.speed = math.inf
         for k in range(3):
             pair.vectors[0, k] = first.ends[1, k] - first.ends[0, k]
             pair.vectors[1, k] = second.ends[0, k] - first.ends[0, k]
@@ -207,6 +211,27 @@ def near_pairs(skin, x, cells, data):
 
 
 @kernel()
+def foresee(span, early, v, f, inverse, cells, data):
+    """Write how near the elements of each pair may come in a span [s], and how fast they are then.
+
+    Their nodes have the velocities v, and what the forces f add within a time ``early`` [s]. A force that is not in
+    balance turns within half a period of its line, so that it does not act for a longer span.
+    """
+    for c in range(cells.shape[0]):
+        fastest = hardest = 0.0
+        for i in range(2):
+            for j in range(2, 4):
+                r, q, speed, push = cells[c, i], cells[c, j], 0.0, 0.0
+                for k in range(3):
+                    speed += (v[r, k] - v[q, k]) ** 2
+                    push += (inverse[r, k] * f[r, k] - inverse[q, k] * f[q, k]) ** 2
+                fastest, hardest = max(fastest, speed), max(hardest, push)
+        pair = record_at(PAIR, data, c, 0)
+        pair.speed = FASTER * (math.sqrt(fastest) + early * math.sqrt(hardest))
+        pair.approach = span * pair.speed
+
+
+@kernel()
 def distances(x, cells, data):
     """Distance of the centre lines of each pair [m]."""
     apart = np.empty(cells.shape[0])
@@ -214,6 +239,35 @@ def distances(x, cells, data):
         p, u, w = place_of(x, cells, data, c)
         apart[c] = math.sqrt(nearest(p, u, w)[2])
     return apart
+
+
+@kernel(forceinline=True)
+def from_axis(p, u, w):
+    """Least distance of the points of an element u from the axis of the element w, p as in `Place`."""
+    ww, pw, uw = dot(w, w), dot(p, w), dot(u, w)
+    share, change = pw / ww, uw / ww
+    a = p[0] - share * w[0], p[1] - share * w[1], p[2] - share * w[2]
+    b = u[0] - change * w[0], u[1] - change * w[1], u[2] - change * w[2]
+    square = dot(b, b)
+    s = min(max(-dot(a, b) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    a = a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
+    return math.sqrt(dot(a, a))
+
+
+@kernel(forceinline=True)
+def axes_apart(p, u, w, touch, approach):
+    """Least distance of each element from the axis of the other, at least, when rows have come nearer by an approach.
+
+    An element touches points that are within the distance of touch of its axis, and no further beyond its ends. There
+    the axis moves by more than its nodes, by 2 touch over the length of the element. 0 where an element may have become
+    shorter than the approach.
+    """
+    first, second = math.sqrt(dot(u, u)) - approach, math.sqrt(dot(w, w)) - approach
+    if not min(first, second) > 0.0:
+        return 0.0
+    of_first = from_axis(p, u, w) - approach * (1.0 + 2.0 * touch / second)
+    of_second = from_axis((-p[0], -p[1], -p[2]), w, u) - approach * (1.0 + 2.0 * touch / first)
+    return max(min(of_first, of_second), 0.0)
 
 
 @kernel(NEAR)
@@ -227,6 +281,9 @@ def near(skin, x, cells, data, chosen):
         span = u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
         if square > 0.75 * span + 3.0 * reach * reach or nearest(p, u, w)[2] >= reach * reach:
             continue  # what is not a number is near
+        touch = record_at(PAIR, data, c, 0).touch
+        if axes_apart(p, u, w, touch, skin) > touch:
+            continue
         chosen[count] = c
         count += 1
     return count

@@ -8,6 +8,7 @@ import pytest
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.simulation import Simulation
+from refweb.effects.self_contact import table
 
 BALL = refweb.Body(name="ball", radius=0.08, mass=0.4, position=(0.03, 0.02, -0.1), velocity=(1.5, 0.5, 3.0))
 BOX = refweb.Body(name="box", shape="box", size=(0.1, 0.12, 0.08), fixed=True, position=(0.1, 0.0, 0.035))
@@ -59,8 +60,9 @@ def solver_of(scene, everything):
         case(BALL, BOX, AT_REST, friction=0.4),
         case(SPUN, friction=0.4, damping=0.3),
         case(GROUND, FALLEN, between_bodies=True),
+        case(FALLEN, friction=0.3),
     ],
-    ids=["ball", "bodies", "exponent", "shaken", "rubbing", "tumbling", "ground"],
+    ids=["ball", "bodies", "exponent", "shaken", "rubbing", "tumbling", "ground", "crate"],
 )
 def test_lists_change_no_bit(scene):
     """Of the last state, the history and all peaks: the same run with every line looked at in every step.
@@ -79,6 +81,37 @@ def test_lists_change_no_bit(scene):
             if name == "longest":  # is noted with the lists alone
                 continue
             np.testing.assert_array_equal(array, course.arrays()[name], err_msg=name)
+
+
+def test_lists_of_pairs_change_no_bit(monkeypatch):
+    """A heap of chains that fall on each other and on a crate is the same with all pairs looked at in every step."""
+    monkeypatch.setattr(table, "LISTED", 0)
+    rng, chains, courses = np.random.default_rng(5), 8, []
+    points = np.array([(0.05 * n, 0.02 * m, 0.03 * m) for m in range(chains) for n in range(7)])
+    points[7:, :2] = points[7:, :2] @ [[0.8, 0.6], [-0.6, 0.8]]  # the first lies across all others
+    lines = [(7 * m + n, 7 * m + n + 1) for m in range(chains) for n in range(6)]
+    scene = refweb.Scene(
+        web=refweb.Inline(points=points, lines=lines, supports=[]),
+        cable=refweb.Cable(law="tension-only", modulus=1e7, area=1e-6, density=1000.0),
+        effects=[
+            refweb.SelfContact(radius=2e-3, stiffness=1e3),
+            refweb.Body(name="crate", shape="box", size=(0.2, 0.2, 0.1), mass=0.2, position=(0.1, 0.1, -0.06)),
+            refweb.Contact(stiffness=1e3, friction=0.2),
+        ],
+        solve=refweb.Dynamic(duration=0.1),
+    )
+    start = np.column_stack([rng.uniform(-0.5, 0.5, (56, 2)), -2.0 + rng.uniform(-1.0, 1.0, 56)])
+    for everything in (False, True):
+        system = scene.build()
+        if everything:
+            bare = {"near": None, "finder": None, "passing": None}
+            system.terms = [replace(term, contact=term.contact._replace(**bare)) for term in system.terms]
+        solver = CentralDifference(system, step_size=2e-5)
+        courses.append(solver.start(None, np.vstack([start, np.zeros((system.rows - 56, 3))])))
+        stored = solver.advance(courses[-1], np.linspace(0.01, 0.1, 10))
+    columns = [stored.values[:, stored.names.index(name)] for name in ("self_contact", "contact")]
+    assert min(np.max(column) for column in columns) > 0.0
+    np.testing.assert_array_equal(courses[0].x, courses[1].x)
 
 
 def test_a_thrown_net_is_the_same_row_by_row():
