@@ -11,7 +11,7 @@ With lines that touch lines, lists differ in four ways. The approach is that of 
 thrown net moves as a whole. A list that lasts for `INNER` steps is taken from a wider one, which lasts longer. Before a
 new wide list is made, the actual displacements are checked, since waves may move rows back. Its skin is at most
 `WIDEST` of the length of elements, since else every element would be near another, and it lasts for fewer steps, down
-to `FEWEST`, if it costs more than the search. A capture of 1104 lines takes 0.85 of the time that it takes with the
+to `FEWEST`, if it costs more than the search. A capture of 1104 lines takes 0.87 of the time that it takes with the
 wide list alone.
 
 May change: `LASTS`, `LONGEST`, `WIDEST`, `MANY`, `FEWEST`, `PRICE` and `INNER`, which trade searches for
