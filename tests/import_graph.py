@@ -26,13 +26,12 @@ def name_of(path):
 
 def parsed(path):
     """What runs of a file: without what stands there for type checkers alone."""
-
-    class Running(ast.NodeTransformer):
-        def visit_If(self, node):
-            self.generic_visit(node)
-            return node.orelse if isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING" else node
-
-    return Running().visit(ast.parse(path.read_text(encoding="utf-8")))
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in reversed(tree.body):
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            at = tree.body.index(node)
+            tree.body[at : at + 1] = node.orelse
+    return tree
 
 
 class _Modules(Mapping):
