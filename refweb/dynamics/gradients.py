@@ -11,7 +11,8 @@ that is kept for a time in which derivatives differ has none, nor has a motion a
 
 ± is the difference from the gradient of the step-refinement run, with the factors of the results themselves, see
 `refweb.dynamics.twin_error`. At a kink of the force, of a first contact or a line that snaps taut, derivatives have
-errors of order 1 in the step, which may agree by chance; so ± takes the differences at all times before as well.
+errors of order 1 in the step, which may agree by chance; so ± takes the differences at all times before as well, and
+behind a jump of derivatives, as of a damped line that snaps taut, the factor of order 1.
 
 From the time on at which run and step refinement have no digit of a result in common, it has no gradient, see
 `refweb.dynamics.divergence`.
@@ -52,6 +53,8 @@ LEAST = 1e-7
 AMPLIFIED = 10.0
 """± of a gradient without a digit, over the size of the result over that of the number, from which on it is refused:
 a hundredth of the number changes a tenth of the result, one way or the other."""
+FINER = 0.1
+"""Smaller steps that a refusal names, over those of the scene."""
 PATHWISE = ("dissipated_energy", "work", "winch_energy", "rupture_energy", "plastic_energy", "step_size")
 """Quantities that are summed over steps."""
 SUPPORTED = (
@@ -139,12 +142,21 @@ class Gradients:
             lost = times[errors > limit].min(initial=self._runs[0].results[result].time)
             raise InputError(
                 f"the derivative of {result} by {path} is {value:.3g} ± {error:.1g}; behind the horizon, {lost:.4g} "
-                "s, it has no digit, since small motions are chaotic, as of slack lines without damping, even where "
-                "large ones are not: take a result of an earlier time, add damping, or vary the number by refweb sweep"
+                f"s, it has no digit with these steps: use {self._smaller}; where that does not help, small motions "
+                "are chaotic, as of slack lines without damping, even where large ones are not: take a result of an "
+                "earlier time, add damping, or vary the number by refweb sweep"
             )
         unit = f"{observe.unit} per {BY_LINE[path]}" if path in BY_LINE else observe.unit
         arrays: list[Any] = [None if part is None else np.array([part]) for part in (value, error, left)]
         return Gradient(result, path, "", ("",), *arrays, unit=unit, number=number.number, notes=self._notes(number))
+
+    @property
+    def _smaller(self):
+        """Text of the key of [solve] that makes steps smaller, with a value."""
+        solve = self._simulation.scene.solve
+        if solve.step_size:
+            return f"[solve] step_size = {FINER * solve.step_size:.2g} or less in place of {solve.step_size:g}"
+        return f"[solve] safety = {FINER * self._methods[0].safety:.2g} or less in place of {self._methods[0].safety:g}"
 
     def _notes(self, number):
         """Texts on stiffness of contact that refweb chose by a number."""
@@ -172,8 +184,8 @@ class Gradients:
         if time >= (horizon := self.horizon(result)):
             raise InputError(
                 f"{name}: its time, {time:.4g} s, is behind the horizon, {horizon:.4g} s, from which on the run and "
-                "its step refinement have no digit of it in common: take a result of an earlier time, smaller steps "
-                "where these are to blame, or, where the motion is chaotic, refweb trust and an ensemble"
+                f"its step refinement have no digit of it in common: take a result of an earlier time, {self._smaller} "
+                "where steps are to blame, or, where the motion is chaotic, refweb trust and an ensemble"
             )
         if first.stopped and time >= first.time:
             raise InputError(
@@ -211,17 +223,17 @@ class Gradients:
             self._linear(method, run, numbers) for method, run in zip(self._methods, self._runs, strict=True)
         )
         sizes = np.array([number.size for number in numbers])
-        every = {
-            name: _with_errors(self._observed[name], first, finer, self._factor, self._runs[0].results[name], sizes)
-            for name in first.peaks
-        }
+        every = {}
+        for name in first.peaks:
+            result = self._runs[0].results[name]
+            order = 1 if first.snapped <= result.time else 2
+            every[name] = _with_errors(self._observed[name], first, finer, self._factor(order), result, sizes)
         for n, number in enumerate(numbers):
             self._known[number.path] = number, {name: parts[n] for name, parts in every.items()}
 
-    @property
-    def _factor(self):
-        """± over the difference of run and step refinement."""
-        return SPREAD / (1.0 - (self._runs[0].nsteps / self._runs[1].nsteps) ** 2)
+    def _factor(self, order=2):
+        """± over the difference of run and step refinement, of errors of an order in the step."""
+        return SPREAD / (1.0 - (self._runs[0].nsteps / self._runs[1].nsteps) ** order)
 
     def _linear(self, integrator, run, numbers):
         """The `LinearRun` of a method."""
@@ -236,7 +248,7 @@ class Gradients:
     def _error_of(self, name):
         """± of a result, of the solution where it has one."""
         first, finer = (run.results[name].value for run in self._runs)
-        return max(self._given[name], self._factor * abs(first - finer))
+        return max(self._given[name], self._factor() * abs(first - finer))
 
 
 class Known(NamedTuple):
@@ -267,7 +279,7 @@ def _with_errors(observe, first, finer, factor, result, sizes):
         apart = np.maximum(apart, [largest_mean(times, column, end) for column in np.abs(rows - beside).T])
     error = factor * apart + LEAST * np.maximum(np.abs(pool.value), np.abs(pool.left))
     errors, before, known = factor * np.abs(rows - beside)[times <= end].T, times[times <= end], []
-    low, high = kept(first.samples.get(name, []), main.value, sizes)
+    right, falling = kept(first.samples.get(name, []), main.value, sizes)
     for n in range(len(sizes)):
         value, left = pool.value[n], pool.left[n]
         if abs(value - left) <= error[n]:
@@ -282,14 +294,18 @@ def _with_errors(observe, first, finer, factor, result, sizes):
                 "a result of an instant, or smaller steps"
             )
         total = error[n] + spread
-        if high[n] > max(value, left) + total or low[n] < min(value, left) - total:
+        beyond = (
+            (right[1, n] - value, left - falling[0, n]) if sign > 0.0 else (value - right[0, n], falling[1, n] - left)
+        )
+        if max(beyond) > total:
+            low, high = min(right[0, n], falling[0, n]), max(right[1, n], falling[1, n])
             stays = (
-                f"it keeps {main.value:.6g} {unit} for a time, in which its derivatives are from {low[n]:.3g} to "
-                f"{high[n]:.3g}: take a result of an instant, or another start"
+                f"it keeps {main.value:.6g} {unit} for a time, in which its derivatives are from {low:.3g} to "
+                f"{high:.3g}: take a result of an instant, or another start"
             )
         if n in first.kinks and first.kinks[n][0] < end:
             stays = (
-                f"at {first.kinks[n][0]:.4g} s {first.kinks[n][1]}, and stays so; a number that rises changes the "
+                f"at {first.kinks[n][0]:.4g} s {first.kinks[n][1]}; a number that rises changes the "
                 "motion otherwise than one that falls: change the start or the number a little, or use refweb sweep"
             )
         known.append(Known(value, left if left != value else None, total, before, errors[n], rivals, stays))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .responses import BENT, step_of
+from .responses import BENT, ROUNDED, step_of
 
 FELT = 1e-6
 """Change of a force over the largest one below which it does not count."""
@@ -72,6 +72,7 @@ class Forces:
         low, high = ends(term, 1.0)
         first, second = (_largest(np.where(free, part, 0.0)) for part in (high - low, high + low - 2.0 * force))
         bent = (second > BENT * first) & (second > FELT * np.maximum(first, second).max(initial=0.0))
+        bent &= second > ROUNDED * _largest(force)
         if not bent.any():
             return ()
         low, high = ends(term, 0.5)

@@ -23,6 +23,7 @@ from ..messages import quote
 from ..reference.paths import with_value
 from ..statics.gradients import number_and_size
 from ..system.static_system import at_rest
+from .integrators.snaps import gaps_of
 
 CHANGE = 3e-7
 """Largest relative change of data by a step: its square and rounding over it leave errors of 1e-9 of a derivative."""
@@ -76,6 +77,11 @@ class Parameter:
             raise InputError(f"path {quote(path)} is no number of the motion: it sets what is computed of it, or how")
         self.number, self.size = number_and_size(self._given, path)
         self.step, self.systems = self._beside = self._changed()
+        if not all(np.array_equal(changed.corners, system.corners) for changed in self.systems):
+            raise InputError(
+                f"{path} = {self.number:g} is a time of a table, at which steps end, and has no gradient: vary it by "
+                "refweb sweep"
+            )
         low, high = self.systems
         self.start = (_start_of(high) - _start_of(low)) / (2.0 * self.step)
         if equilibrium is not None:
@@ -86,6 +92,8 @@ class Parameter:
             self.differing = sorted({*self.differing, *over})
         self._lighter = self._inverse_of(high) - self._inverse_of(low)
         self._outs = system.per_cell()
+        over = any(system.terms[n].over_lines for n in self.differing)
+        self._damped = over and "damping_time" in (system.net.line_data.dtype.names or ())
 
     def _changed(self):
         """(Step, systems) for a change of data by `CHANGE`."""
@@ -106,11 +114,8 @@ class Parameter:
     def _built(self, step):
         """Systems with the number less and more a step."""
         systems = tuple(self.system_at(self.number + sign * step) for sign in (-1.0, 1.0))
-        for changed in systems:
-            if not _same_net(changed, self._system):
-                raise InputError(f"{self.path} changes the net itself, and has no gradient")
-            if not np.array_equal(changed.corners, self._system.corners):
-                raise InputError(f"{self.path} changes times at which steps end, and has no gradient")
+        if not all(_same_net(changed, self._system) for changed in systems):
+            raise InputError(f"{self.path} changes the net itself, and has no gradient")
         return systems
 
     @cached_property
@@ -175,15 +180,33 @@ class Parameter:
                     term = system.terms[n]
                     term.force(t, x, v, force, term.cells, system.data_of(term, t), self._outs[n])
                 by_side.append(force)
-            rate += inverse * ((by_side[1] - by_side[0]) / (2.0 * self.step))
+            change = by_side[1] - by_side[0]
+            if self._damped:
+                self._take_one_side(t, x, v, change)
+            rate += inverse * (change / (2.0 * self.step))
 
-    def driven(self, t, h, rows):
-        """Derivatives of positions at t, and of velocities in the step h before, of rows with prescribed motion."""
+    def _take_one_side(self, t, x, v, change):
+        """Take the change of the force of elements whose damping is in one of the systems alone to the other side.
+
+        It is twice the difference from the motion, where the line is slack or taut as well.
+        """
+        low, high = self.systems
+        sides = [gaps_of(system, t, x) >= 0.0 for system in (low, self._system, high)]
+        for same, ends in ((sides[1] == sides[2], (self._system, high)), (sides[1] == sides[0], (low, self._system))):
+            at = np.flatnonzero(same & (sides[0] != sides[2]))
+            for n in [n for n in self.differing if self._system.terms[n].over_lines and len(at)]:
+                for system, factor in ((high, -1.0), (low, 1.0), (ends[1], 2.0), (ends[0], -2.0)):
+                    term, force = system.terms[n], np.zeros_like(x)
+                    term.force(t, x, v, force, term.cells[at], system.data_of(term, t)[at], self._outs[n][at])
+                    change += factor * force
+
+    def driven(self, t, at, rows):
+        """Derivatives of positions at t, and of velocities ``at`` a time, of rows with prescribed motion."""
         ends = []
         for system in self.systems:
             x, v, aside = (np.zeros((system.rows, 3)) for _ in range(3))
             system.drive(t, x)
-            system.drive(t - 0.5 * h, aside, v)
+            system.drive(at, aside, v)
             ends.append((x[rows], v[rows]))
         (x_low, v_low), (x_high, v_high) = ends
         return (x_high - x_low) / (2.0 * self.step), (v_high - v_low) / (2.0 * self.step)

@@ -94,14 +94,15 @@ def pooled(peaks, time, sign):
 
 
 def kept(peaks, value, sizes):
-    """Range of the derivatives at times at which the largest ``value`` is kept, (low, high) of shape (numbers,).
+    """Ranges of the derivatives at times at which the largest ``value`` is kept, shape (2, 2, numbers).
 
-    A time counts for a number of which a change by `KINK` of its size makes up for the difference of values.
+    They are for numbers that rise and that fall, the least and the largest. A time counts for a number of which a
+    change by `KINK` of its size makes up for the difference of values.
     """
-    low, high = np.full(len(sizes), np.inf), np.full(len(sizes), -np.inf)
+    ranges = np.tile(np.array([np.inf, -np.inf])[:, None], (2, 1, len(sizes)))
     for peak in peaks:
-        right, left, _ = peak.slopes
-        near = abs(peak.value - value) <= KINK * sizes * np.maximum(np.abs(right), np.abs(left))
-        low = np.where(near, np.minimum(low, np.minimum(right, left)), low)
-        high = np.where(near, np.maximum(high, np.maximum(right, left)), high)
-    return low, high
+        sides = np.array([peak.slopes.value, peak.slopes.left])
+        near = abs(peak.value - value) <= KINK * sizes * np.abs(sides).max(axis=0)
+        ranges[:, 0] = np.where(near, np.minimum(ranges[:, 0], sides), ranges[:, 0])
+        ranges[:, 1] = np.where(near, np.maximum(ranges[:, 1], sides), ranges[:, 1])
+    return ranges

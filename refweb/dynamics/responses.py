@@ -207,11 +207,14 @@ def _is_bent(part, first, second):
 def _sides(part, low, high, lower, higher, step, rate):
     """Derivatives (right, left) of a part, by values at a step and at half of it: at a kink, else ``rate`` for both.
 
-    At a kink the second difference goes as the step, elsewhere as its square.
+    At a kink the second difference goes as the step, elsewhere as its square. Where the part jumps, as the tension of a
+    damped line that snaps taut at this instant, it does not change, and both derivatives are those of the same side.
     """
     first, second, half = np.abs(high - low), np.abs(high + low - 2.0 * part), np.abs(higher + lower - 2.0 * part)
-    kink = _is_bent(part, first, second) & (np.abs(second - 2.0 * half) < 0.1 * second)
-    return np.where(kink, (high - part) / step, rate), np.where(kink, (part - low) / step, rate)
+    bent, right, left = _is_bent(part, first, second), (high - part) / step, (part - low) / step
+    kink, jump = bent & (np.abs(second - 2.0 * half) < 0.1 * second), bent & (np.abs(second - half) < 0.1 * second)
+    rate = np.where(jump, np.where(np.abs(right) < np.abs(left), right, left), rate)
+    return np.where(kink, right, rate), np.where(kink, left, rate)
 
 
 class Slopes(NamedTuple):

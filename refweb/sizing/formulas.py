@@ -18,10 +18,14 @@ import math
 
 import numpy as np
 
-from ..sweeps.expressions import Expression, Interval, exact
+from ..errors import InputError
+from ..messages import quote
+from ..sweeps.expressions import ANY, Expression, Interval, exact
 
 MOST_SIDES = 16
 """Largest number of sides that are told apart."""
+MOST_POWER = 100
+"""Largest size of an exponent."""
 FALSE, TRUE = exact(-1.0), exact(1.0)
 """Reserves of what has no number, such as an equation."""
 
@@ -41,6 +45,8 @@ class Criterion(Expression):
 
     def __init__(self, text, names, compares):
         super().__init__(text, names, compares)
+        self.compares = compares
+        _refuse_powers(self)
         self.parts = list(_parts(self.tree)) if compares else [self.tree]
         self._sides = _sides_of(self.tree) if compares else [self.parts]
 
@@ -56,6 +62,20 @@ class Criterion(Expression):
         names = [node.id for part in alone.parts for node in ast.walk(part) if isinstance(node, ast.Name)]
         alone.used = {self._aliases[name] for name in names if name in self._aliases}
         return alone
+
+    @property
+    def limits(self):
+        """Limits of names by numbers on each side, a list of dicts of (low, high) by name; both ends are left out."""
+        return [_limits_of(parts, self._aliases) for parts in self._sides] if self.compares else [{}]
+
+    def is_decided(self, values):
+        """Tell if it has a value, or is true or false, with numbers by name; True where these are no numbers."""
+        try:
+            if self.compares:
+                return self(values) is not None
+            return self.number(values) != ANY
+        except InputError:
+            return True
 
     def number(self, values):
         """The `refweb.sweeps.expressions.Interval` of an arithmetic expression, with values by name."""
@@ -155,6 +175,29 @@ def _sides_of(node, false=False):
     if false:
         return [[ast.UnaryOp(ast.Not(), part)] for part in parts]
     return [parts]
+
+
+def _limits_of(parts, aliases):
+    """Intervals of names that are compared with a number, by name."""
+    limits = {}
+    for part in parts:
+        if isinstance(part, ast.Compare) and isinstance(part.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
+            upper, lower, _ = _compared(part)
+            for node, number, above in ((upper, lower, True), (lower, upper, False)):
+                if isinstance(node, ast.Name) and _is_number(number):
+                    low, high = limits.get(name := aliases[node.id], ANY)
+                    value = float(ast.literal_eval(number))
+                    limits[name] = Interval(max(low, value), high) if above else Interval(low, min(high, value))
+    return limits
+
+
+def _refuse_powers(criterion):
+    """Refuse an exponent of numbers that is beyond `MOST_POWER`."""
+    for node in ast.walk(criterion.tree):
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            named = any(isinstance(part, ast.Name) for part in ast.walk(node.right))
+            if not named and not abs(criterion._value(node.right, {}).low) <= MOST_POWER:
+                raise InputError(f"{quote(criterion.text)}: an exponent must be from -{MOST_POWER} to {MOST_POWER}")
 
 
 def _compared(node):

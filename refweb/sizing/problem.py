@@ -15,7 +15,7 @@ from typing import Any
 from ..errors import InputError, in_file
 from ..messages import quote, short
 from ..results.observables.observe import bounds_by_name
-from ..sweeps.expressions import ANY, Interval
+from ..sweeps.expressions import ANY, Interval, exact
 from .case import QUANTITIES, SIZES, sizes_of
 from .formulas import MOST_SIDES, Criterion
 from .requirements import Free
@@ -23,6 +23,8 @@ from .space import Design, Space, setting
 
 ALIKE = 1e-12
 """Relative difference of sizes up to which a free number has no effect on them."""
+TRIED = 8
+"""Number of values of names with which a formula must have a value once."""
 
 
 class Problem:
@@ -51,8 +53,8 @@ class Problem:
     Raises
     ------
     InputError
-        For unknown names and paths, values that make no scene, a requirement that is always or never true, and a
-        minimum that depends on no free number.
+        For unknown names and paths, values that make no scene, a requirement that is always or never true,
+        limits that exclude each other, formulas that never have a value, and a minimum that depends on no free number.
     """
 
     def __init__(self, sizing):
@@ -82,6 +84,7 @@ class Problem:
         for name, requirement in sizing.requirements.items():
             with in_file(f"requirements: {short(name)}"):
                 self.requirements[name] = Criterion(requirement.condition, [*self.space.names, *known], True)
+                self._refuse_undecided(self.requirements[name], within)
                 self._refuse_certain(self.requirements[name], within)
                 self._refuse_equations(self.requirements[name], {*names, *QUANTITIES, *self.space.free} - {*of_throw})
         formulas = [self.objective, *self.requirements.values()]
@@ -89,7 +92,9 @@ class Problem:
         self.quantities = tuple(name for name in QUANTITIES if name in self.used)
         self.results = tuple(name for name in (*names, *QUANTITIES) if name in self.used)
         with in_file("minimise"):
+            self._refuse_undecided(self.objective, within)
             self._refuse_constant(first)
+        self._refuse_contradictions()
 
     def sides(self):
         """Requirements by name for each choice of the sides of conditions with ``or``; none where they are too many."""
@@ -149,6 +154,31 @@ class Problem:
             always = "is true of every design within bounds" if verdict else "is true of no design within bounds"
             raise InputError(f"{quote(formula.text)} {always}: leave it out or change its limit")
 
+    def _refuse_undecided(self, formula, within):
+        """Refuse a formula that has no value, whatever numbers names have: of `TRIED` ones within bounds."""
+        values = {}
+        for number in range(TRIED):
+            for n, name in enumerate(sorted(formula.used)):
+                low, high = within.get(name, ANY)
+                values[name] = exact(min(max((1.0 + 0.37 * n) * 10.0 ** (2 * number - TRIED), low), high))
+            if formula.is_decided(values):
+                return
+        raise InputError(
+            f"{quote(formula.text)} has no value, whatever its names are, as a division by 0: check its divisors and "
+            "roots"
+        )
+
+    def _refuse_contradictions(self):
+        """Refuse limits of one name that exclude each other: in a requirement, and in all without a probability."""
+        sure = {name: f for name, f in self.requirements.items() if self.sizing.requirements[name].probability is None}
+        for group in [{name: f} for name, f in self.requirements.items()] + [sure]:
+            sides = [f.limits for f in group.values()]
+            if not group or math.prod(map(len, sides)) > MOST_SIDES:
+                continue
+            empty = [_excluded(chosen) for chosen in itertools.product(*sides)]
+            if all(empty):
+                raise InputError(f"requirements: {', '.join(map(short, group))}: {empty[0]}: change one of them")
+
     def _refuse_equations(self, formula, measured):
         """Refuse a condition that results or numbers between bounds are equal to something."""
         if any(isinstance(node, ast.Eq) for node in ast.walk(formula.tree)) and (of := sorted(formula.used & measured)):
@@ -172,6 +202,17 @@ class Problem:
         *_, scene = self.space.scene(design, self.drawn[0])
         sizes = sizes_of(scene.build())
         return [sizes[name] for name in sorted(used)]
+
+
+def _excluded(limits):
+    """Text of limits of a name, dicts by name, that exclude each other; None where there are none."""
+    together = {}
+    for name, (low, high) in itertools.chain(*(part.items() for part in limits)):
+        below, above = together.get(name, ANY)
+        together[name] = below, above = max(low, below), min(high, above)
+        if below > above:
+            return f"no {short(name)} is above {below:g} and below {above:g}"
+    return None
 
 
 def _differ(before, after):

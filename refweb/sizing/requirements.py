@@ -283,8 +283,9 @@ class Sizing(Table):
     Raises
     ------
     InputError
-        For bounds that are reversed, a catalogue without rows, a requirement that is always or never true, and a
-        minimum that depends on no free number. For draws without a count, and a probability that no number of
+        For bounds that are reversed, a catalogue without rows, a requirement that is always or never true,
+        limits of a result that exclude each other, formulas that never have a value, and a minimum that depends on no
+        free number. For draws without a count, and a probability that no number of
         successes in so many draws shows.
 
     Examples

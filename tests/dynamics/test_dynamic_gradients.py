@@ -676,7 +676,7 @@ def test_wrong_names(tmp_path):
         ("given", "cable.area", None, 'quantity = "work" have none'),
         ("slack", "cable.area", None, 'quantity = "slack_fraction" have none'),
         ("moved", "solve.duration", None, "is no number of the motion"),
-        ("moved", "load.0.factor.1.0", None, "changes times at which steps end"),
+        ("moved", "load.0.factor.1.0", None, "is a time of a table, at which steps end, and has no gradient: vary"),
         ("moved", "cable.subdivide", None, "cannot be changed to both sides"),
     ):
         with pytest.raises(InputError, match=text):

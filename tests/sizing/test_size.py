@@ -367,14 +367,14 @@ def test_designs_that_are_as_good_within_their_error(tmp_path):
 
 
 def test_where_nothing_is_decided_and_where_the_minimum_has_no_value(tmp_path):
-    """A stress of 3 ± 0.5 may be below 3: the status says so. 1/0 is no size that designs are ordered by."""
+    """A stress of 3 ± 0.5 may be below 3: the status says so. The root of −1 is no size that designs are ordered by."""
     executor = MadeUp()
     executor.error = 0.5
     keys = {"requirements": {"below": "max_stress < 3"}, "parameters": {"cable.area": [3e-5, 4e-5]}}
     found = sized(tmp_path, executor, minimise="max_stress", **keys)
     assert found.status == "undecided" and found.message.endswith("a run with a smaller ± decides it")
     with pytest.raises(refweb.SolverError, match="has no finite value"):
-        sized(tmp_path, MadeUp(), minimise="1/(max_stress - max_stress)", **keys)
+        sized(tmp_path, MadeUp(), minimise="sqrt(2 - max_stress)", **keys)
 
 
 @pytest.mark.slow
@@ -549,6 +549,17 @@ WRONG = {
     "always": ({"requirements": {"strong": "deflection > -1"}}, "is true of every design within bounds"),
     "never": ({"requirements": {"strong": "cable.area > 1"}}, "is true of no design within bounds"),
     "constant": ({"requirements": {"strong": "1 < 2"}}, "is true of every design within bounds"),
+    "no value": ({"requirements": {"strong": "1/(max_stress - max_stress) < 2"}}, "has no value, whatever its names"),
+    "no least": ({"minimise": "cable_mass/(max_stress - max_stress)"}, "has no value, whatever its names are, as a di"),
+    "a power": ({"requirements": {"strong": "max_stress**9**9 < 1e8"}}, "an exponent must be from -100 to 100"),
+    "excluded": (
+        {"requirements": {"strong": "max_stress < 1e8 and 2e8 < max_stress"}},
+        "strong: no max_stress is above 2e+08 and below 1e+08: change one of them",
+    ),
+    "excluded by two": (
+        {"requirements": {"a": "max_stress < 1e8 or cable.area > 9e-4", "b": "2e8 < max_stress and cable.area < 8e-4"}},
+        "a, b: no max_stress is above 2e+08 and below 1e+08: change one of them",
+    ),
     "no condition": ({"requirements": {"strong": "max_stress"}}, "compares nothing"),
     "a condition": ({"minimise": "max_stress < 1"}, "is a condition, and must be a number"),
     "a number": ({"minimise": "3"}, "depends on no free number"),

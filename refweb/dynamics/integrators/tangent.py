@@ -6,7 +6,9 @@ With a derivative δ by a number p, K = −∂f/∂x and C = −∂f/∂v at the
 
 This is the derivative of the steps themselves, to rounding, where each force is differentiable at each step: K and C
 are the kernels of implicit methods. A force with a kink, as of a line that goes slack, has the derivative of the side
-on which it is; the step that passes the kink leaves an error of order 1 in its size.
+on which it is; the step that passes the kink leaves an error of order 1 in its size. A force that jumps is one with a
+jump of δv, see `refweb.dynamics.integrators.snaps`. At a corner of a table a step ends: its kick has the velocities of
+prescribed motion before the corner, as the run has, and δa behind the kick is that behind it.
 ∂(M⁻¹f)/∂p are differences of forces of systems with other values of p, of the terms alone whose numbers differ.
 
 Losses of contacts are stiff, and steps solve for them with the θ of `refweb.effects.contact_solver`. Their derivative
@@ -30,6 +32,8 @@ from numba import types
 
 from ...errors import IntegrationError
 from ...kernels import INDICES, kernel
+from .integrator import SAME
+from .snaps import Snaps
 
 CUBE = types.Array(types.float64, 3, "C")
 MOST_ROUNDS, CLOSE = 200, 1e-13
@@ -37,6 +41,8 @@ MOST_ROUNDS, CLOSE = 200, 1e-13
 
 SKIN = 0.1
 """Approach over the mean length of elements up to which the cells of contact are not looked for again."""
+BESIDE = 1e-6
+"""Time before a corner of a table at which numbers are those before it, over a step."""
 SMALL, TERMS = 0.25, 11
 """Norm of a matrix up to which its decay is a series, and the number of terms, whose remainder is 1e-14."""
 
@@ -171,6 +177,10 @@ class Tangent:
     ----------
     x, v, a : ndarray, shape (p, rows, 3)
         δx, δv and δa.
+    before : tuple or None
+        (v, a, δx, δv, δa) before a corner of a table at the end of the last step, else None.
+    snaps : refweb.dynamics.integrators.snaps.Snaps or None
+        Lines that snap taut, where they are damped.
     """
 
     def __init__(self, integrator, numbers, t, x, v, f):
@@ -186,10 +196,10 @@ class Tangent:
         self._driven = np.concatenate([[], *(drive.cells[:, 0] for drive in self.system.drives)]).astype(int)
         shape = len(numbers), *x.shape
         self.x, self.v = (np.array([number.start[k] for number in numbers]).reshape(shape) for k in (0, 1))
-        self.a = self._rates(t, x, v, f)
-        for losses in (self._damped, self._rubbing):
-            losses.set(self.system, t, x, v)
-            self.a += self.inverse * losses.forces(self.v)
+        self.before = None
+        self._set_rates(t, x, v, f)
+        damped = "damping_time" in (self.system.net.line_data.dtype.names or ())
+        self.snaps = Snaps(self.system, numbers, x, v, self.x) if damped else None
 
     def _rates(self, t, x, v, f):
         """∂(M⁻¹f)/∂p − M⁻¹K δx, shape (p, rows, 3)."""
@@ -199,21 +209,47 @@ class Tangent:
             number.add_rate(t, x, v, f, self.inverse, rate)
         return rates
 
-    def step(self, t, h, x, v, f):
-        """Take a step h to the time t, at the end of which the motion is at x, v with the force f."""
-        self.v += 0.5 * h * self.a
-        self.x += h * self.v
+    def _set_rates(self, t, x, v, f):
+        """Take δa of the state, without a step."""
+        self.a = self._rates(t, x, v, f)
+        for losses in (self._damped, self._rubbing):
+            losses.set(self.system, t, x, v)
+            self.a += self.inverse * losses.forces(self.v)
+
+    def _drive(self, t, at):
+        """Take the derivatives of prescribed motion: of positions at t, of velocities ``at`` a time."""
         if len(self._driven):
             for number, dx, dv in zip(self.numbers, self.x, self.v, strict=True):
-                dx[self._driven], dv[self._driven] = number.driven(t, h, self._driven)
-        rates = self._rates(t, x, v, f)
-        rub = self._rub(h, t, x, v)
+                dx[self._driven], dv[self._driven] = number.driven(t, at, self._driven)
+
+    def step(self, t, h, x, v, f, corner=False):
+        """Take a step h to the time t, at the end of which the motion is at x, v with the force f.
+
+        At a ``corner`` of a table these are the velocity and the force behind it.
+        """
+        self.v += 0.5 * h * self.a
+        self.x += h * self.v
+        self._drive(t, t - 0.5 * h)
+        if self.snaps:
+            self.snaps.add(t, h, x, self.x, self.v, self.inverse)
+        now, behind = t, (v, f)
+        if corner:
+            now, v = t - BESIDE * h, v.copy()
+            self.system.drive(t - 0.5 * h, np.zeros_like(x), v)
+            f = self.system.force(now, x, v)
+        rates = self._rates(now, x, v, f)
+        rub = self._rub(h, now, x, v)
         if self._damped.terms:
-            self._damped.set(self.system, t, x, v)
-            self.a = self._solved(t, h, rates, rub)
+            self._damped.set(self.system, now, x, v)
+            self.a = self._solved(now, h, rates, rub)
         else:
             self.a = rub(rates)
         self.v += 0.5 * h * self.a
+        self.before = None
+        if corner:
+            self.before = v, self.inverse * f, self.x.copy(), self.v.copy(), self.a
+            self._drive(t, t)
+            self._set_rates(t, x, *behind)
 
     def _rub(self, h, t, x, v):
         """Function of δa without losses of contacts that gives it with them."""
@@ -265,11 +301,11 @@ class Steps:
         self.integrator.breath = 1
 
     def follow(self, times, on_step):
-        """Go to each of the times, and call ``on_step(t, h)`` behind each step h, which ends at the time t."""
+        """Go to each of the times, and call ``on_step(t, h, corner)`` behind each step h to a time t, corner or not."""
         integrator, course, corners = self.integrator, self.course, self.integrator.system.corners
-        integrator.on_progress = lambda t: on_step(float(t), integrator.step)
+        integrator.on_progress = lambda t: on_step(float(t), integrator.step, False)
         inner = corners[(corners > course.time) & (corners < times[-1])]
         for end in np.union1d(times, inner):
             if end > course.time and not course.stopped:
                 integrator.advance(course, [end])
-                on_step(course.time, integrator.step)
+                on_step(course.time, integrator.step, bool(np.isclose(corners, end, rtol=SAME, atol=0.0).any()))

@@ -1,0 +1,118 @@
+"""Lines that snap taut in a step: jumps of the derivatives of velocities where the damping force of a line jumps.
+
+A line with a damping time τ that passes its slackness ε0 from below has the damping force N = τ σ'(ε) ε̇ [N] at once,
+at a time t* that changes with a number p: by δt* = −δg/ġ of the gap g = ε − ε0. So the derivatives of velocities jump
+by M⁻¹ ΔF δg/ġ, with ΔF the jump of the force: the saltation of an event, R. I. Leine and H. Nijmeijer, "Dynamics and
+Bifurcations of Non-Smooth Mechanical Systems", Springer 2004. ΔF is along the line and in proportion to ġ,
+which falls out: the node at the end of the line has the impulse
+
+    −τ Δσ' δg t,        t the direction of the line, Δσ' the jump of the slope of its law [N].
+
+This is the limit of refined steps. The derivative of the steps themselves does not have it, since a small change of p
+moves t* into no other step. At a line that goes slack and at a contact nothing jumps: the force of the line has come
+to 0 before, and that of a contact, with its losses, begins at 0.
+
+A law whose slope changes over a strain that is short against that of a step is one with a jump; the curvature at both
+ends of the step gives the part of Δσ' that is in the steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...net.laws.law import evaluate
+
+JUMP = 0.1
+"""Change over EA of the slope of a law that a step does not resolve, from which on it is a jump."""
+AT_CORNER = 1e-12
+"""Distance from the slackness, in strain, up to which a line is neither slack nor taut."""
+BESIDE = 1e-9
+"""Distance from the slackness, in strain, at which slopes of a law are those on either side of it."""
+MOVED = 1e-6
+"""Change of this distance over that of a number, over its size, from which on it counts; below it is rounding."""
+
+
+def strains_of(system, t, x):
+    """Strain of each straight element of a system, without cancellation, shape (elements,)."""
+    lines, (a, b) = system.line_data(t), system.net.cells.T
+    moved, natural = x[b] - x[a], lines.natural_length
+    length = np.linalg.norm(lines.reference + moved, axis=1)
+    square = ((2.0 * lines.reference + moved) * moved).sum(axis=1)
+    return (square + (lines.distance - natural) * (lines.distance + natural)) / (natural * (length + natural))
+
+
+def gaps_of(system, t, x):
+    """Strain of each element of a system above its slackness, shape (elements,)."""
+    return strains_of(system, t, x) - system.line_data(t).slackness
+
+
+class Snaps:
+    """Jumps of derivatives by some numbers, where lines with a damping time snap taut.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        The system, of straight elements.
+    numbers : sequence of refweb.dynamics.parameters.Parameter
+        The numbers p.
+    x, v : ndarray, shape (rows, 3)
+        State at t = 0.
+    dx : ndarray, shape (p, rows, 3)
+        Derivatives of x.
+
+    Attributes
+    ----------
+    kinks : dict of int to str
+        Text of a line that snaps taut at the start for numbers of one side alone, by the index of the number.
+    delays : ndarray, shape (p, snaps)
+        δt* of lines that snapped taut in the last step [s per unit of the number].
+    """
+
+    def __init__(self, system, numbers, x, v, dx):
+        self._system, self._numbers, self._cells, self._law = system, numbers, system.net.cells, system.net.law
+        self.kinks, self.delays, self._known = {}, np.zeros((len(numbers), 0)), self._of(0.0, x)
+        lines = system.line_data(0.0)
+        below, above = (
+            evaluate(self._law.tangent, lines.slackness + s * BESIDE, lines, self._law.columns) for s in (-1.0, 1.0)
+        )
+        at = np.flatnonzero((np.abs(gaps_of(system, 0.0, x)) <= AT_CORNER) & (above - below > JUMP * lines.ea))
+        changes, (rates,) = self._changes(0.0, x, dx, at, True)[0], self._changes(0.0, x, v[None], at, False)[0]
+        for n, number in enumerate(numbers):
+            for e in at[(rates > 0.0) & (np.abs(changes[n]) * number.size > MOVED)][:1]:
+                self.kinks[n] = f"line {system.net.line[e]} is neither slack nor taut, and its damping force jumps"
+
+    def _of(self, t, x):
+        """Strain, and slope and curvature of the law [N], of each element."""
+        strain, lines = strains_of(self._system, t, x), self._system.line_data(t)
+        slopes = [evaluate(part, strain, lines, self._law.columns) for part in (self._law.tangent, self._law.curvature)]
+        return strain, *slopes
+
+    def _changes(self, t, x, moves, at, explicit):
+        """Changes of g of some elements by moves of nodes, and by numbers where ``explicit``; and directions."""
+        (a, b), lines = self._cells[at].T, self._system.line_data(t)
+        pull = lines.reference[at] + x[b] - x[a]
+        to = pull / np.linalg.norm(pull, axis=1)[:, None]
+        changes = ((moves[:, b] - moves[:, a]) * to).sum(axis=2) / lines.natural_length[at]
+        for number, change in zip(self._numbers if explicit else (), changes, strict=False):
+            low, high = (gaps_of(beside, t, x)[at] for beside in number.systems)
+            change += (high - low) / (2.0 * number.step)
+        return changes, to
+
+    def add(self, t, h, x, dx, dv, inverse):
+        """Add what a step h to the time t, which ends at the displacement x, jumps to its derivatives ``dv``."""
+        (before, slope, bend), lines = self._known, self._system.line_data(t)
+        self._known = self._of(t, x)
+        strain, jump = self._known[0], self._known[1] - slope
+        grown = strain - before
+        jump -= 0.5 * (bend + self._known[2]) * grown
+        at = np.flatnonzero((grown > 0.0) & (np.abs(jump) > JUMP * lines.ea))
+        left = h * np.clip((strain[at] - lines.slackness[at]) / grown[at], 0.0, 1.0)
+        changes, to = self._changes(t, x, dx, at, len(at) > 0)
+        changes -= left * self._changes(t, x, dv, at, False)[0]
+        self.delays = -changes * h / grown[at]
+        impulses = (lines.damping_time[at] * jump[at] * changes)[:, :, None] * to
+        for change, impulse in zip(dv, impulses, strict=True):
+            total = np.zeros_like(change)
+            for side, sign in zip(self._cells[at].T, (1.0, -1.0), strict=True):
+                np.add.at(total, side, sign * impulse)
+            change += inverse * total
