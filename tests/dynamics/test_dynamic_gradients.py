@@ -85,6 +85,15 @@ CASES = [  # law, effects, paths
 ]
 
 
+@pytest.mark.ordinary(
+    "tension-only-cable.modulus",
+    "linear-damping.time",
+    "table-load.0.force.2",
+    "smooth-body.0.mass",
+    "tension-only-drag.normal",
+    "linear-motion.0.displacement.1.3",
+    "linear-reel.0.factor.1.1",
+)
 @pytest.mark.parametrize(("law", "effects", "paths"), CASES, ids=[f"{law}-{paths[0]}" for law, _, paths in CASES])
 def test_taylor_remainders(law, effects, paths):
     """|J(p + h) − J(p) − h dJ/dp| falls as h² of each result: the slope is 2 unless rounding is left."""
@@ -255,6 +264,7 @@ def on_a_rail(duration, step, contact, velocity, height, observe):
     )
 
 
+@pytest.mark.ordinary("sliding")
 @pytest.mark.parametrize("duration", [0.1, 0.4], ids=["sliding", "rolling"])
 def test_friction(duration):
     """A ball slides until it rolls: x'' = −μ g q, slip u' = −μ g (1 + m a²/I) q, q = u/√(u² + v_s²), as in scipy."""

@@ -193,6 +193,7 @@ def test_a_drum_is_turned_at_a_rate():
         np.testing.assert_allclose(run.observe("angle"), angle, rtol=1e-12)
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("name", ["central-difference", "ida"])
 def test_branches_are_independent(name):
     run = driven(refweb.start(scene(STEPS[name], **MOVED)), until=0.09)

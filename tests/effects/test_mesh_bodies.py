@@ -54,6 +54,7 @@ def force_of(term, x):
     return force
 
 
+@pytest.mark.ordinary("ell-1-1.5", "torus-1-1", "torus-1-1.5")
 @pytest.mark.parametrize("exponent", [1, 1.5])
 @pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["ell", "torus"])

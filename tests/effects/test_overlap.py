@@ -69,6 +69,9 @@ def pressed(force, stiffness, steps=(1.0,), modulus=1e5, gap=-1e-4):
 # Closed forms
 
 
+@pytest.mark.ordinary(
+    "central-difference-1.0", "central-difference-1.5", "explicit-1.0", "explicit-1.5", "cvode-1.5", "ida-1.0"
+)
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
 @pytest.mark.parametrize("method", METHODS)
 def test_deepest_overlap_of_a_hit(method, exponent):

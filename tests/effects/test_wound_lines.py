@@ -70,7 +70,7 @@ HAULED, SLIPPED, TURNED = (TENSION, 0.0, 30.0), (BRAKE, -1.5, 0.0), (SPEEDS, 0.0
 LIFTED = (POWER, 0.0, MASS * G)
 
 
-@pytest.mark.ordinary("central-difference-winch1-*", "central-difference-winch3-*", "ida-winch*")
+@pytest.mark.ordinary("central-difference-winch1--1.5-0.0", "central-difference-winch3-0.0-19.62")
 @pytest.mark.parametrize(
     "method, winch, start, pull",
     [

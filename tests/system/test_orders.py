@@ -122,6 +122,13 @@ def held_ends(web, cable):
     return supported
 
 
+@pytest.mark.ordinary(
+    "light-tension-only-1",
+    "light-tension-only-2",
+    "light-tension-only-3",
+    "inclined-tension-only-1",
+    "inclined-tension-only-3",
+)
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("law", nets.some(["tension-only", "linear"], 2))
 @pytest.mark.parametrize("case", nets.some(CASES, 2))

@@ -20,9 +20,10 @@ from .vector_spread import spread_of
 if TYPE_CHECKING:
     from .records import ForceTerms, Inertia, Model, Running
 
-SPAN, EARLY = 64.0, 2.0
-"""Number of steps of the lines alone for which steps of lines that touch lines are planned; number of these for which a
-force at the start of a span is taken to act."""
+SPAN = 64.0
+"""Length of a span for which steps are planned where lines touch lines, over the step that the lines alone allow."""
+EARLY = 2.0
+"""Time for which a force at the start of a span changes the speed of a pair, over the same step."""
 FAR = 8.0
 """Reach above which pairs are not found for a bound, over the largest depth of a skin around pairs."""
 

@@ -167,8 +167,9 @@ def add_stiffness(blocks, touch, definite, nodes, functions, z):
 def add_row_sums(rates, ahead, speed, mass, cells, data, c, nodes, spins):
     """Add the row sums of the stiffness of an element's contacts; nothing passes through between two steps.
 
-    Half the bound are steps of a tenth of the body's thickness. A body that turns has a rotation among its unknowns, of
-    the lever that its light ends make of its moment of inertia; it is scaled as the body is.
+    In a step of half the bound, rows move by a tenth of the thickness of the body at most. A body that turns has a
+    rotation among its unknowns, of the lever that its light ends make of its moment of inertia; it is scaled as the
+    body is.
     """
     scale = 1.0 if nodes == 2 else float(nodes * nodes)  # curved elements: row sums of shares and of their slopes
     deep, length, pair = ahead.depth, ahead.length, pair_of(data, c, nodes)

@@ -48,7 +48,7 @@ MOST = 6.0
 FAR = 4.0
 """Reach over the longest element above which a bound does not search near elements."""
 OF_REACH = 0.5
-"""Largest approach of pairs, over the reach of a bound: it is twice the approach of two rows at its speed."""
+"""Largest approach of two elements over the reach of a bound, which is twice that."""
 NOT_SEEN = -1.0
 """Overlap of a pair without contact, as a mark."""
 NO_PUSH = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

@@ -116,7 +116,7 @@ CASES += [("adams", 12, "block", order, mass) for order in (1, 2, 3) for mass in
 CASES += [("adams", 12, "dense", 3, True), ("adams", 12, "sparse", 2, False)]
 
 
-@pytest.mark.ordinary("bdf-1-dense-1-False", "adams-12-fixed-point-1-False", "adams-12-block-2-True")
+@pytest.mark.ordinary("bdf-1-dense-1-False", "adams-12-fixed-point-1-False")
 @pytest.mark.parametrize("family, highest, linear_solver, order, consistent", nets.some(CASES, 3))
 def test_error_falls_with_the_tolerance(family, highest, linear_solver, order, consistent):
     system, tolerances = small([PUSH], order=order, consistent=consistent, size=3), TOLERANCES[highest]
