@@ -270,7 +270,7 @@ def places(depth, spins, pieces, nodes, functions):
     if not convex:
         from .nonconvex_contacts import PLACES, several
 
-        return Places(*several(within_of(depth, spins), rise, pieces, nodes, functions), touch_of, PLACES)
+        return Places(*several(course_of, spot_of, rise, pieces, nodes, functions), touch_of, PLACES)
 
     @kernel(forceinline=nodes == 2)
     def climbed(x, cells, data, c, course, low, high, xi):

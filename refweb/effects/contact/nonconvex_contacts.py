@@ -30,7 +30,7 @@ import numpy as np
 from ...kernels import Indices, Matrix, kernel
 from ..vectors import dot
 from .nearest_point import far, point
-from .pair import LINE_CONTACT, LineContacts, pair_of, power_of_depth
+from .pair import LINE_CONTACT, LineContacts, power_of_depth
 
 SAMPLES = 256
 """Largest number of parts of an element for samples of the slope."""
@@ -77,14 +77,14 @@ def share_out(buffer, begin, end):
 
 
 @functools.cache
-def several(within, rise, pieces, nodes, functions):
+def several(course_of, spot_of, rise, pieces, nodes, functions):
     """(kernel of the deepest place of an element, kernel of all contacts of a line), as in `places`."""
 
     @kernel()
-    def between(x, cells, data, c, low, high, xi, sign):
-        pair, moved = pair_of(data, c, nodes), math.inf
+    def between(x, cells, data, c, course, low, high, xi, sign):
+        pair, moved = course.pair, math.inf
         for _ in range(100):  # Newton's method, by bisection where it leaves the bracket or comes no nearer
-            value, curve = rise(pair, xi, within(x, cells, data, c, nodes, functions, xi))
+            value, curve = rise(pair, xi, spot_of(x, cells, data, c, course, xi))
             if sign * value > 0.0:
                 low = xi
             else:
@@ -98,15 +98,15 @@ def several(within, rise, pieces, nodes, functions):
         return xi
 
     @kernel()
-    def dip(x, cells, data, c, low, high, begin, end):
+    def dip(x, cells, data, c, course, low, high, begin, end):
         """A place between two where the slope of F has another sign than at both, 2 where there is none."""
-        pair, sign = pair_of(data, c, nodes), 1.0 if begin[0] > 0.0 else -1.0
+        pair, sign = course.pair, 1.0 if begin[0] > 0.0 else -1.0
         for _ in range(LOOKS):
             width = high - low
             if not (sign * begin[1] < 0.0 and sign * end[1] > 0.0):
                 break
             xi = low + width * least_between(begin[0], width * begin[1], end[0], width * end[1])
-            value, curve = rise(pair, xi, within(x, cells, data, c, nodes, functions, xi))
+            value, curve = rise(pair, xi, spot_of(x, cells, data, c, course, xi))
             if (value > 0.0) != (sign > 0.0):
                 return xi
             if abs(value) > abs(curve) * width:
@@ -120,11 +120,12 @@ def several(within, rise, pieces, nodes, functions):
     @kernel()
     def scan(x, cells, data, c, buffer, begin):
         """Write the contacts of a cell between its ends to rows from ``begin`` on; (row behind, depths of its ends)."""
-        pair, count = pair_of(data, c, nodes), begin
+        course, count = course_of(x, cells, data, c), begin
+        pair = course.pair
         _, d, _ = point(x, cells, data, c, nodes, functions, 0.5)
         steepest = STEEPEST * math.sqrt(dot(d, d)) * (1.0 if nodes == 2 else float(nodes * nodes))
         first = last = -math.inf
-        middle = within(x, cells, data, c, nodes, functions, 0.5)
+        middle = spot_of(x, cells, data, c, course, 0.5)
         convex = nodes == 2 and pair.shape.fine == math.inf
         if middle.depth + 0.5 * (abs(dot(middle.gradient, middle.d)) if convex else steepest) <= 0.0:
             return count, first, last
@@ -132,7 +133,7 @@ def several(within, rise, pieces, nodes, functions):
         n, last_n, sure, low, before, deep_before = 0, -1, 0, 0.0, (0.0, 0.0), 0.0
         while True:
             xi = n / parts
-            spot = within(x, cells, data, c, nodes, functions, xi)
+            spot = spot_of(x, cells, data, c, course, xi)
             clear = deep_before + spot.depth + steepest * (n - last_n) / parts <= 0.0
             if not clear and n > sure:  # look again nearer to what was certain
                 n = sure
@@ -142,14 +143,14 @@ def several(within, rise, pieces, nodes, functions):
                 first = spot.depth
             elif not clear and n == last_n + 1:
                 turn = (before[0] > 0.0) != (value[0] > 0.0)
-                inner = 2.0 if turn else dip(x, cells, data, c, low, xi, before, value)
+                inner = 2.0 if turn else dip(x, cells, data, c, course, low, xi, before, value)
                 for k in range(1 if turn else 2 if inner < 1.0 else 0):
                     begins, ends = (low, xi) if turn else (low, inner) if k == 0 else (inner, xi)
                     sign = 1.0 if (before[0] > 0.0) == (k == 0) else -1.0
                     at = before[0] / (before[0] - value[0]) if turn else 0.5
                     at = begins + at * (ends - begins)
-                    at = between(x, cells, data, c, begins, ends, at, sign)
-                    deep = within(x, cells, data, c, nodes, functions, at).depth
+                    at = between(x, cells, data, c, course, begins, ends, at, sign)
+                    deep = spot_of(x, cells, data, c, course, at).depth
                     if deep > 0.0 and 0.0 < at < 1.0:
                         felt = 4.0 * at * (1.0 - at) * deep * power_of_depth(pair.exponent, deep)
                         record(buffer[count], c, at, 1.0, sign, felt)
@@ -167,9 +168,9 @@ def several(within, rise, pieces, nodes, functions):
     def deepest(x, cells, data, c):
         buffer, where, largest = np.empty(PLACES, LINE_CONTACT), 0.0, -math.inf
         count, first, last = scan(x, cells, data, c, buffer, 0)
-        largest = max(first, last)
+        course, largest = course_of(x, cells, data, c), max(first, last)
         for n in range(count):
-            deep = within(x, cells, data, c, nodes, functions, buffer[n].xi).depth
+            deep = spot_of(x, cells, data, c, course, buffer[n].xi).depth
             if deep > largest:
                 where, largest = buffer[n].xi, deep
         return where, largest
