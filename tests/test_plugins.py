@@ -337,6 +337,18 @@ def sliced_spring(t, x, v, f, cells, data, out):
 
 
 @kernel(FORCE)
+def late_spring(t, x, v, f, cells, data, out):
+    for c in range(len(cells)):
+        f[cells[c, 0], 2] -= data[c, 0 if t < 5e-3 else 9] * x[cells[c, 0], 2]
+
+
+@kernel(FORCE)
+def far_spring(t, x, v, f, cells, data, out):
+    for c in range(len(cells)):
+        f[cells[c, 0], 2] -= x[cells[c, 0] + (0 if x[cells[c, 0], 2] == 0.0 else 1000), 2]
+
+
+@kernel(FORCE)
 def wary_spring(t, x, v, f, cells, data, out):
     for c in range(len(cells)):
         out[c, 0] = 0.0
@@ -367,6 +379,14 @@ WRONG_PARTS = {
     "rows of a cell": (
         changed(force=lambda k: pair_spring),
         r"force: cells\[c, 1\] reaches beyond cells, which has 1 columns: give each cell all rows",
+    ),
+    "a column that a time computes": (
+        changed(force=lambda k: late_spring),
+        r"force: line \d+ of test_plugins.py reaches beyond data, which has 7 columns: give each cell all numbers",
+    ),
+    "a row that a motion computes": (
+        changed(force=lambda k: far_spring),
+        r"force: line \d+ of test_plugins.py reaches beyond x, which has \d+ rows: rows are those of the numbers",
     ),
     "a part of the data": (
         changed(force=lambda k: sliced_spring),

@@ -21,6 +21,8 @@ def add_arguments(parser):
 
 def run(arguments):
     """Print the pages of a table, a term, a guide or a verb."""
+    from ..errors import InputError
+    from ..messages import closest
     from ..reference.glossary import explained
     from ..reference.pages import names
     from ..reference.words import as_markdown, as_text, guide, guides, overview
@@ -37,7 +39,7 @@ def run(arguments):
         from ..reference.words import MATERIALS_TEXT
 
         print(f"{as_table()}\n\n{textwrap.fill(MATERIALS_TEXT.replace('`', ''), 100)}")
-    elif (name := arguments.table.replace("how-to/", "own-")) in guides():
+    elif (name := arguments.table.strip().replace("how-to/", "own-").replace(" ", "-")) in guides():
         print(guide(name), end="")
     elif arguments.table in COMMANDS and arguments.table not in names() and explained(arguments.table) is None:
         verb = load(COMMANDS[arguments.table])
@@ -47,6 +49,8 @@ def run(arguments):
         verb.add_arguments(parser)
         parser.print_help()
     elif arguments.table in names() or (text := explained(arguments.table)) is None:
+        if arguments.table not in names() and (close := closest(name, [*names(), *guides()])) in guides():
+            raise InputError(f'help {arguments.table}: there is no such table, did you mean "{close}"?')
         print(as_text(arguments.table))
     else:
         print(text)

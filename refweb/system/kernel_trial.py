@@ -1,8 +1,9 @@
 """Trial of the kernels of a plug-in: indices beyond their arrays, which compiled kernels would read as other memory.
 
-Python runs the kernels of a term, and what they call, on some of its cells at the reference configuration. Branches
-that are not taken there are read in the source, as far as they name a column by a number or a constant.
-`effect_parts` calls `refuse_overruns` for effects of other packages alone.
+Python runs the kernels of a term, and what they call, on some of its cells: at the reference configuration, and at
+random displacements, velocities and times. Branches that are not taken there are read in the source, as far as they
+name a column by a number or a constant. An index that is computed in such a branch is not seen. `effect_parts` calls
+`refuse_overruns` for effects of other packages alone.
 """
 
 from __future__ import annotations
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
 
 CELLS = 20
 """Largest number of cells of a trial."""
+STATES = (0.0, 0.0), (1e-2, 0.3), (10.0, 1.0), (1e4, 3.0)
+"""Times [s], and displacements over the size of the web, of trials: kernels may take other branches."""
+ROWS = "rows are those of the numbers in cells, or of a cell"
+"""Remedy for a row that an array does not have."""
 REMEDIES = {
     "data": "give each cell all numbers that its kernels read",
     "cells": "give each cell all rows that its kernels couple",
@@ -39,7 +44,7 @@ REMEDIES = {
 
 
 class _OverrunError(IndexError):
-    """An index beyond an array: name and shape of the whole array. As an `IndexError` it ends loops over arrays."""
+    """An index beyond an array: its name, shape and axis. As an `IndexError` it ends loops over arrays."""
 
 
 class _Watched(np.ndarray):
@@ -54,13 +59,19 @@ class _Watched(np.ndarray):
         try:
             return super().__getitem__(index)
         except IndexError:
-            raise _OverrunError(self.name, self.full_shape) from None
+            raise _OverrunError(self.name, self.full_shape, self._axis(index)) from None
 
     def __setitem__(self, index, value):
         try:
             super().__setitem__(index, value)
         except IndexError:
-            raise _OverrunError(self.name, self.full_shape) from None
+            raise _OverrunError(self.name, self.full_shape, self._axis(index)) from None
+
+    def _axis(self, index):
+        """Axis of the whole array that an index goes beyond."""
+        first = index[0] if isinstance(index, tuple) else index
+        within = not isinstance(first, int | np.integer) or -len(self) <= first < len(self)
+        return min(len(self.full_shape) - self.ndim + int(within), len(self.full_shape) - 1)
 
 
 def refuse_overruns(term: ForceTerm, net: Net, title: str) -> None:
@@ -73,17 +84,20 @@ def refuse_overruns(term: ForceTerm, net: Net, title: str) -> None:
     """
     if term.data is None or not len(term.cells):
         return
-    for name, kernel, arguments in _calls(term, net):
+    calls = (call for state in STATES for call in _calls(term, net, *state))
+    for name, kernel, arguments in calls:
         overrun = _in_source(kernel.py_func, arguments) or _by_trial(kernel.py_func, arguments)
         if overrun:
-            array, shape, location = overrun
-            size = f"{shape[1]} columns" if len(shape) == 2 else f"the shape {shape}"
-            remedy = REMEDIES.get(array, "see the signatures in refweb.kernels")
+            array, shape, axis, location = overrun
+            size = f"{shape[axis]} {('rows', 'columns')[axis]}" if len(shape) == 2 else f"the shape {shape}"
+            if array in ("data", "cells", "out") and axis == 0:
+                size = "a row for each cell"
+            remedy = REMEDIES.get(array, "see the signatures in refweb.kernels") if axis else ROWS
             raise InputError(f"{title}: {name}: {location} reaches beyond {array}, which has {size}: {remedy}")
 
 
-def _calls(term, net) -> Iterator[tuple[str, Any, dict[str, Any]]]:
-    """Name, kernel and arguments by name of each kernel of a term that has a trial."""
+def _calls(term, net, t, moved_by) -> Iterator[tuple[str, Any, dict[str, Any]]]:
+    """Name, kernel and arguments by name of each kernel of a term that has a trial, at a time and for displacements."""
     some = np.unique(np.linspace(0, len(term.cells) - 1, CELLS).astype(int))
     rows, count, width = len(net.points), len(some), 3 * term.cells.shape[1]
 
@@ -93,14 +107,16 @@ def _calls(term, net) -> Iterator[tuple[str, Any, dict[str, Any]]]:
             given[name].name, given[name].full_shape = name, array.shape
         return given
 
-    x, v, f = (np.zeros((rows, 3)) for _ in range(3))
+    size = moved_by * float(np.ptp(net.points, axis=0).max(initial=0.0))
+    x, v = size * np.random.default_rng(0).uniform(-1.0, 1.0, (2, rows, 3))
+    f = np.zeros((rows, 3))
     cells = {"cells": term.cells[some], "data": term.data[some]}
-    moved, blocks = {"t": 0.0, **arrays(x=x, v=v)}, np.zeros((count, width, width))
+    moved, blocks = {"t": t, **arrays(x=x, v=v)}, np.zeros((count, width, width))
     yield "force", term.force, {**moved, **arrays(f=f, **cells, out=np.zeros((count, term.columns)))}
     bounds = {"reach": np.inf, "speed": 0.0, **arrays(x=x, mass=net.mass.copy(), rates=np.zeros(rows), **cells)}
     others = {
-        "energy": (term.energy, {"t": 0.0, **arrays(x=x, **cells, out=np.zeros(count))}),
-        "impulse": (term.balance.impulse, {"t": 0.0, **arrays(x=x, **cells, total=np.zeros(3))}),
+        "energy": (term.energy, {"t": t, **arrays(x=x, **cells, out=np.zeros(count))}),
+        "impulse": (term.balance.impulse, {"t": t, **arrays(x=x, **cells, total=np.zeros(3))}),
         "tangent.stiffness": (term.tangent.stiffness, {**moved, **arrays(blocks=blocks, **cells), "definite": False}),
         "tangent.bound": (term.tangent.bound, bounds),
         "velocity.damping": (term.velocity.damping, {**moved, **arrays(blocks=blocks, **cells), "definite": False}),
@@ -110,7 +126,7 @@ def _calls(term, net) -> Iterator[tuple[str, Any, dict[str, Any]]]:
 
 
 def _by_trial(function, arguments):
-    """Name and shape of an array, and the line that goes beyond it when Python runs a kernel; None without one."""
+    """Name, shape and axis of an array, and the line that goes beyond it when Python runs a kernel; None without."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         try:
@@ -144,12 +160,12 @@ def _plain(value, known):
 
 
 def _in_source(function, arguments):
-    """Name and shape of an array, and a column in the source that it does not have; None without one."""
+    """Name, shape and axis of an array, and a column in the source that it does not have; None without one."""
     names = dict(zip(inspect.signature(function).parameters, arguments, strict=False))
     for name, column, text in _columns_of(function):
         array = names.get(name)
         if array in ("data", "cells") and column >= arguments[array].shape[1]:
-            return array, arguments[array].shape, text
+            return array, arguments[array].shape, 1, text
     return None
 
 

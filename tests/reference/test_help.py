@@ -210,6 +210,8 @@ def test_overview_has_a_line_for_each_table(capsys):
         ("modulus", "it is a key of cable, cable.groups"),
         ("mesh", "it is a key of web.paper, web.window, web.layers"),
         ("", "known: scene, web, cable"),
+        ("quick-strat", 'did you mean "quick-start"?'),
+        ("own-efect", 'did you mean "own-effect"?'),
     ],
 )
 def test_a_misspelt_table_gets_the_nearest(table, hint, capsys):
