@@ -49,7 +49,7 @@ def run(arguments):
         verb.add_arguments(parser)
         parser.print_help()
     elif arguments.table in names() or (text := explained(arguments.table)) is None:
-        if arguments.table not in names() and (close := closest(name, [*names(), *guides()])) in guides():
+        if name.partition(".")[0] not in names() and (close := closest(name, [*names(), *guides()])) in guides():
             raise InputError(f'help {arguments.table}: there is no such table, did you mean "{close}"?')
         print(as_text(arguments.table))
     else:
