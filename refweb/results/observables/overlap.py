@@ -1,4 +1,4 @@
-"""Depth of lines in bodies.
+"""Depth of lines in bodies, and the probe of the largest speed of a point of a body.
 
 May change: private functions; the class docstring, which is help: then write ``validation/REFERENCE.md`` anew. Must
 stay: rows of the probes, which are those of `system.contact_forces`; `probe_of…` and `probes_between`, by which
