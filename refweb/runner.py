@@ -3,7 +3,8 @@
 May change: private functions, words of findings, `STIFFENINGS` and `MOST_TIMES`. Must stay: `run`, `trust` and
 `resume`, which users call; `_attempt` uses the same attributes of both simulations (``columns``, ``rows``, ``done``,
 ``system``, ``price``, ``follow``, ``remarks``); `_before` asks for keys that `refweb.dynamics.simulation` writes to
-checkpoints; wrong input writes nothing. Tests: ``tests/results/test_remarks.py``, ``tests/test_faults.py``.
+checkpoints; wrong input writes nothing; `notices` and `simulation_of`, which `commands.check` imports. Tests:
+``tests/results/test_remarks.py``, ``tests/test_faults.py``.
 """
 
 from __future__ import annotations

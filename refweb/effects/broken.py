@@ -4,7 +4,8 @@ Every system with broken elements has this term, also if they were broken in the
 
 May change: how the kernels are written. Must stay: the column `HELD`, which `system.broken_lines` writes and
 `results.folder` reads by its name; the name "rupture_energy", a column of ``history.csv``; EA = 0 as the mark of a
-broken element, which `system.broken_lines` sets. Tests: ``tests/effects/test_rupture.py``.
+broken element, which `system.broken_lines` sets; `held_energy`, which `rupture` and `system.broken_lines` import.
+Tests: ``tests/effects/test_rupture.py``.
 """
 
 from __future__ import annotations

@@ -23,7 +23,9 @@ May change: `ROUNDING`. Must stay: the name "plastic", by which `statics.monoton
 columns behind `ROW` (curve of the yield stress), which kernels read by position and `corners` counts by
 ``plastic_force_…``; the order of what `kernels` returns, which this file takes by number; the order of internal
 variables in rows; ``taken_on``, ``grown``, ``drive`` and ``settled``, which `System` and `integrators.yielding` call
-through `InternalVariables.follower`. Tests: ``tests/effects/test_plastic.py``.
+through `InternalVariables.follower`; `PlasticLines`, which `build` imports; `strain_at`, which `rupture`,
+`statics.monotone_loading` and `integrators.rupture` import; `plastic_strain`, which `results.state`,
+`statics.monotone_loading` and `integrators.rupture` import. Tests: ``tests/effects/test_plastic.py``.
 """
 
 from __future__ import annotations

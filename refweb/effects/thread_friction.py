@@ -28,7 +28,8 @@ May change: how the kernels are written; `LEAST` keeps a step from being 0. Must
 which `statics.gradients.KNOWN` and `studies.modes` have; the order of a thread's numbers in its rows and of ``out``
 (four columns, tensions of segments, slips of rings), which `net.threads.ThreadLine` and `results.observables.thread`
 read by position; fields of `FrictionKernels`, which `winch_power`, `wound_lines` and `wound_mass` use; methods of
-`Slips`, which `integrators.yielding` calls as the ``follower``. Tests: ``tests/effects/test_thread_friction.py``,
+`Slips`, which `integrators.yielding` calls as the ``follower``; `with_slips` and `settled`, which `thread` imports;
+`numbers_of`, which `wound_mass` imports. Tests: ``tests/effects/test_thread_friction.py``,
 ``tests/effects/test_winch.py``.
 """
 

@@ -20,8 +20,8 @@ counted, and nothing is remembered from step to step.
 Must stay: length, gradient and tangent of one formula, which `around.winding_length` has in Python for the web as
 built: change both together; the name "thread", which `statics.gradients.KNOWN` and `studies.modes` have; columns of
 ``out``, those of `net.threads.COLUMNS` and then a `base.TOUCH` for each segment on a body with the force on it, which
-`system.contact_forces` adds up; fields of `SEGMENT`, which `half_turns` reads by name. Tests:
-``tests/effects/test_around.py``, ``tests/test_contract.py``.
+`system.contact_forces` adds up; fields of `SEGMENT`, which `half_turns` reads by name; `segments_of`, which
+`half_turns` imports. Tests: ``tests/effects/test_around.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

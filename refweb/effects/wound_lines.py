@@ -17,8 +17,8 @@ May change: private functions and messages. Must stay: the name "winch" of the t
 columns from `FIRST` on (`KIND`, `NUMBERS`, `POWERED`) and the order of an element's numbers in its row (`SLIP`,
 `UNTIL`, `TAKEN`, …), which kernels, `numbers_in` and `wound_mass` read; ``wound`` of the net, where `winch` notes the
 lines; `with_wound`, which `system.system` calls, `rewind` and `standing`, which `dynamics.initial_state` and
-`results.observables` call; methods of `WoundLines`, which `integrators.yielding` calls as the ``follower``. Tests:
-``tests/effects/test_wound_lines.py``.
+`results.observables` call; methods of `WoundLines`, which `integrators.yielding` calls as the ``follower``; `settled`
+and `write_numbers`, which `winch` imports. Tests: ``tests/effects/test_wound_lines.py``.
 """
 
 from __future__ import annotations

@@ -16,8 +16,9 @@ have columns for the quaternion q = (w, u); those of p follow by δw = −½ u·
 
 May change: `ACROSS`, which moves no body, private methods but `_state`, which `attached_nodes.Carried` calls. Must
 stay: of the two rows of rotation the first has the rotation vector, the second no unknown; names of public methods,
-which `System`, `statics` and `studies` call through `System.carriers`. Must follow a change of `attached_nodes`. Tests:
-``tests/statics/test_free_bodies.py``, ``tests/effects/test_axles.py``.
+which `System`, `statics` and `studies` call through `System.carriers`. Must follow a change of `attached_nodes`. Must
+stay as well: `RestingBodies`, which `system` imports. Tests: ``tests/statics/test_free_bodies.py``,
+``tests/effects/test_axles.py``.
 """
 
 from __future__ import annotations

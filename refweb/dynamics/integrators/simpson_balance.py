@@ -11,8 +11,9 @@ steps book what each kick and drift gives instead, which closes to rounding, see
 `step_observer` makes the book, and hands its own state over as ``course``. May change: `UNEVEN`, which trades cost for
 the error of the balance. Must stay: the last seven entries of ``flow`` and ``before`` are work of motion, impulse of
 supports and impulse from outside: `step_observer` splits integrals by these places, and `rates` adds there what
-`system.material_flow` brings; fields of `Sample` and `Piece`, which `measurements`, `events` and `passages` read.
-Tests: ``tests/dynamics/integrators/test_step_observer.py``, ``test_cvode.py``.
+`system.material_flow` brings; fields of `Sample` and `Piece`, which `measurements`, `events` and `passages` read;
+public names of `SimpsonBalance`, which other files use. Tests: ``tests/dynamics/integrators/test_step_observer.py``,
+``test_cvode.py``.
 """
 
 from __future__ import annotations

@@ -13,7 +13,8 @@ which stand in ``run.json``; `WAY`, which follows from the bound of `body_body_p
 `record`, `note_way` and `note_met`, which `dynamics.history` calls (`statics.body_penetration` `record` alone);
 `refuse`, `touched` and `remarks`, which `overlap.Overlaps` calls; `plain` and `passage`, which the simulations read,
 and `deepest`, which `dynamics.history` and `statics.body_penetration` read; texts of `DeepestPair` for which
-`overlap.Deepest` asks. Tests: ``tests/effects/test_between_bodies.py``.
+`overlap.Deepest` asks; `PairOverlaps`, which `dynamics.simulation` and `statics.body_penetration` import. Tests:
+``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

@@ -9,7 +9,8 @@ May change: private functions, `OUT_OF_REACH` and messages. Must stay: the name 
 has; keys and docstring of `Contact` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); the
 order of `KEYS`, which is that of `pair.pair_data` and of contact between bodies; names in `Balance`, columns of
 ``history.csv``; `law_of`, `left_out`, `with_stiffness` and `friction_of`, which `scene`, `overlap` and `pair_overlap`
-call. Tests: ``tests/effects/test_contact.py``, ``tests/test_contract.py``.
+call; public names of `Contact`, which other files use. Tests: ``tests/effects/test_contact.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

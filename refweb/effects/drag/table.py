@@ -6,7 +6,8 @@ May change: private functions, messages, and the coefficient of spheres `SPHERE`
 name "drag", by which `integrators.tangent` tells the term from contacts that rub; keys and docstring of `Drag` (scene
 format and help; after a change write ``validation/REFERENCE.md`` anew); cells of a node one after another, which
 `implicit_drag` takes as one group; the order of numbers of a cell, read by `force.end_of`, of which `without` sets the
-first two to 0. Tests: ``tests/effects/test_drag.py``, ``tests/test_contract.py``.
+first two to 0; public names of `Drag`, which other files use. Tests: ``tests/effects/test_drag.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

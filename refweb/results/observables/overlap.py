@@ -2,8 +2,8 @@
 
 May change: private functions; the class docstring, which is help: then write ``validation/REFERENCE.md`` anew. Must
 stay: rows of the probes, which are those of `system.contact_forces`; `probe_of…` and `probes_between`, by which
-`dynamics.history` follows contact. Tests: ``tests/results/test_contact_force.py``,
-``tests/results/test_every_number.py``.
+`dynamics.history` follows contact; `probe_of_speed` and `probe_of_touch`, which `dynamics.history` imports. Tests:
+``tests/results/test_contact_force.py``, ``tests/results/test_every_number.py``.
 """
 
 from __future__ import annotations
