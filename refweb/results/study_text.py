@@ -1,8 +1,8 @@
 """Results of a study as text: rows for each result, condition and index, for the console and the page.
 
 May change: all texts, which are for readers. Must stay: keys that are read, those of `sweeps.study_result` and
-`sweeps.chances`; the functions, which `commands.console` and `pages.study` call; all names that `pages.study` and
-`commands.console` import. Tests: ``tests/sweeps/test_study_pages.py``.
+`sweeps.chances`; the functions, which `commands.console` and `pages.study` call. Tests:
+``tests/sweeps/test_study_pages.py``.
 """
 
 from __future__ import annotations
