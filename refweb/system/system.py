@@ -1,8 +1,7 @@
 """The sum of effects: M v' = f(t, x, v), x' = v, with supports eliminated.
 
-A `System` from `build` concatenates the terms of its effects once and has the interface of one of them: force, energy,
-stiffness. ``x`` is the displacement of each row from its reference position, shape (rows, 3); a solver sees only the
-system.
+A `System` concatenates the terms of its effects once and has the interface of one of them: force, energy, stiffness.
+``x`` is the displacement of each row from its reference position, shape (rows, 3); a solver sees only the system.
 
 Where effects prescribe natural lengths, the numbers of the lines are a function of time, `System.line_data`: every
 force and energy uses the numbers of its time t, and `System.at` returns the system with the numbers of one time. The
