@@ -2,7 +2,9 @@
 
 May change: the insides of functions. Must stay: ``accepts`` says the same as the reader that carries it, in JSON Schema
 of draft 4: `refweb.reference` makes the schema of scenes and the help of it, and plug-ins with readers of their own
-call the functions here. Tests: ``tests/reference/test_schema.py``, ``tests/reference/test_help.py``.
+call the functions here; `any_of`, which `settings`, `tables` and other files import; `array`, which `settings`,
+`tables` and other files import; `by_name`, which `tables`, `net.inline` and other files import; `limits`, which
+`tables` and `effects.body` import. Tests: ``tests/reference/test_schema.py``, ``tests/reference/test_help.py``.
 """
 
 from __future__ import annotations

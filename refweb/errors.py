@@ -2,7 +2,8 @@
 
 May change: docstrings. Must stay: names of classes, which users catch, and their bases; ``code``, a key of
 `refweb.findings.CODES`; ``stiffness``, which `runner` reads to repeat a run, and ``drift``, which `accuracy_loop`
-reads. The command line shows errors of refweb's classes without their type; of others it says "internal error". Tests:
+reads. The command line shows errors of refweb's classes without their type; of others it says "internal error". Must
+stay as well: all names that `gym.environment`, `integrators.central_difference` and other files import. Tests:
 ``tests/test_findings.py``, ``tests/commands/test_cli.py``.
 """
 

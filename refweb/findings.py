@@ -3,7 +3,7 @@
 May change: meanings in `CODES`, which are words of the reference, to be written anew (CONTRIBUTING). Must stay: codes,
 severities and fields of `Finding`, which stand in ``run.json`` and are read back; programs of users ask for them. A new
 code needs a row in `CODES` and a `Finding` that has it, and a row whose code nothing uses has to go:
-``tests/test_findings.py``.
+``tests/test_findings.py``. Must stay as well: all names that `runner`, `commands.console` and other files import.
 """
 
 from __future__ import annotations

@@ -37,7 +37,8 @@ all its digits, which it loses when positions are the unknowns.
 
 May change: insides of the small kernels at the end. Must stay: signatures, and names and order in dtypes: a changed one
 changes every kernel that has it, in `effects`, `integrators` and effects of users, and all their callers. A further
-field of a dtype compiles these kernels again and needs a value wherever its rows are filled. Tests:
+field of a dtype compiles these kernels again and needs a value wherever its rows are filled. Must stay as well: all
+names that `integrators.records`, `integrators.neighbour_list` and other files import. Tests:
 ``tests/test_contract.py``, ``tests/how_to/test_effect.py``.
 """
 

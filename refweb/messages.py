@@ -2,7 +2,9 @@
 
 May change: the insides of functions, if messages stay on one line. Must stay: no import of refweb at the head, since
 `errors` and the package itself import this file; phrases such as "did you mean" and the cuts at 60 and 150 characters,
-which tests quote. Tests: ``tests/test_tables.py``, ``tests/commands/test_cli.py``.
+which tests quote; `one_line`, which `errors`, `dynamics.controllers` and other files import; `short`, which `__main__`,
+`runner` and other files import; `closest`, which `tables` imports; `row_of`, which `statics.gradients` and
+`sweeps.expressions` import. Tests: ``tests/test_tables.py``, ``tests/commands/test_cli.py``.
 """
 
 from __future__ import annotations

@@ -11,8 +11,9 @@ table has, and for help.
 May change: private functions. Must stay: names in these tables, the format of scenes and of the command line; no module
 of refweb is imported at the head. A class that moves needs its new ``"module:name"`` here; a further effect, shape,
 law, observable, integrator or verb is one line. `LINE_COLUMNS` has the names that no parameter of a law may take: a new
-column of lines belongs there. Tests: ``tests/test_plugins.py``, ``tests/test_pay_for_what_you_call.py``,
-``tests/reference/test_schema.py``.
+column of lines belongs there. Must stay as well: all names that `scene`, `reference.pages` and other files import;
+public names of `Method`, which other files use. Tests: ``tests/test_plugins.py``,
+``tests/test_pay_for_what_you_call.py``, ``tests/reference/test_schema.py``.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """From a scene to a solution: the solver runs, and files, history and progress follow it.
 
 May change: private functions, words of findings, `STIFFENINGS` and `MOST_TIMES`. Must stay: `run`, `trust` and
-`resume`, which users call; `_attempt` uses the same attributes of both simulations (``columns``, ``rows``, ``done``,
-``system``, ``price``, ``follow``, ``remarks``); `_before` asks for keys that `refweb.dynamics.simulation` writes to
-checkpoints; wrong input writes nothing. Tests: ``tests/results/test_remarks.py``, ``tests/test_faults.py``.
+`resume`, which users and verbs call, and `run` also `sweeps.case`, `sizing.case` and `sizing.size`; `_attempt` uses the
+same attributes of both simulations (``columns``, ``rows``, ``done``, ``system``, ``price``, ``follow``, ``remarks``);
+`_before` asks for keys that `refweb.dynamics.simulation` writes to checkpoints; wrong input writes nothing; `notices`
+and `simulation_of`, which `commands.check` imports. Tests: ``tests/results/test_remarks.py``, ``tests/test_faults.py``.
 """
 
 from __future__ import annotations

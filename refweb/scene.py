@@ -7,7 +7,8 @@ May change: private functions, words of messages, and `MAX_HISTORY_ROWS`, a limi
 fields, which are tables of scene files and arguments in scripts of users; `from_dict` reads the same scene from what
 `to_dict` writes, since result folders keep that as ``scene.toml``; `SHORTEST_INTERVAL` and `ROWS_OF_LONG_RUNS`, the
 default interval (``tests/dynamics/test_default_rows.py``). A new table stands in `registry` as well, and the reference
-is written anew (CONTRIBUTING). Tests: ``tests/test_scene.py``, ``tests/reference/test_schema.py``.
+is written anew (CONTRIBUTING). Must stay as well: all names that `commands.new`, `sizing.requirements` and other files
+import. Tests: ``tests/test_scene.py``, ``tests/reference/test_schema.py``.
 """
 
 from __future__ import annotations

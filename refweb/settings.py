@@ -3,7 +3,9 @@
 May change: words of docstrings, which are the text of ``refweb help`` and of the schema: the reference is written anew
 with them (CONTRIBUTING). Must stay: names, defaults and values (`START_STATES`) of keys, the format of scenes; keys of
 `Dynamic` are also arguments of integrators, listed in `registry.INTEGRATORS`. A new key needs its docstring, a check of
-its range and a line in CHANGELOG. Tests: ``tests/test_scene.py``, ``tests/reference/test_schema.py``.
+its range and a line in CHANGELOG. Must stay as well: all names that `refweb`, `scene` and other files import; public
+names of `Dynamic`, `Accuracy`, `Static`, `Event` and `Control`, which other files use. Tests: ``tests/test_scene.py``,
+``tests/reference/test_schema.py``.
 """
 
 from __future__ import annotations

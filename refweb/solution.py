@@ -2,7 +2,8 @@
 
 May change: private functions. Must stay: public names, which users call; `load` reads the keys that
 `results.solution.SolutionData.summary` and `results.folder` write to ``run.json`` and ``checkpoint.npz``: a renamed key
-changes both sides, and older folders are still read. Tests: ``tests/results/test_loaded.py``,
+changes both sides, and older folders are still read; `Solution`, which `refweb`, `runner` and other files import;
+`scene_of` and `summary_of`, which `runner` imports. Tests: ``tests/results/test_loaded.py``,
 ``tests/results/test_results.py``.
 """
 

@@ -8,8 +8,8 @@ well: `table` is a ``dataclass_transform`` (PEP 681), which wants defaults by na
 May change: private functions. `LARGEST` and `SMALLEST` stand in the schema and the reference, which are then written
 anew (CONTRIBUTING). Must stay: names and arguments of readers and of `Table`, which plug-ins use; messages name value,
 limit and nearest name, and tests quote them; ``accepts`` says what a reader checks, since `refweb.reference` makes the
-schema of it: change both together. Tests: ``tests/test_tables.py``, ``tests/test_scene.py``,
-``tests/reference/test_schema.py``.
+schema of it: change both together; all names that `settings`, `effects.body` and other files import. Tests:
+``tests/test_tables.py``, ``tests/test_scene.py``, ``tests/reference/test_schema.py``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Arguments that several verbs have, and what they print as JSON."""
 
 # May change: help texts, which are those of verbs. Must stay: names of options, and of the parsed arguments ("scene",
-# "values", "json", "force", "workers", "scheduler"), which verbs read; what the functions return. Tests:
-# tests/commands/test_cli.py, tests/commands/test_values.py.
+# "values", "json", "force", "workers", "scheduler"), which verbs read; what the functions return; all names that
+# `check`, `run` and other files import. Tests: tests/commands/test_cli.py, tests/commands/test_values.py.
 
 import contextlib
 import json

@@ -2,7 +2,8 @@
 
 # May change: all texts and their layout, as programs read `run.json` and `--json` instead. Must stay: names and
 # arguments of `print_…`, which verbs call; keys that are read, those of `run.json` and `trust.json`. Sentences on
-# results belong in `results.summary_text`. Tests: tests/commands/test_cli.py, tests/results/test_results.py.
+# results belong in `results.summary_text`. Must stay as well: all names that `run`, `cost` and other files import;
+# `_box` and `_columns`, which a test calls. Tests: tests/commands/test_cli.py, tests/results/test_results.py.
 
 from __future__ import annotations
 

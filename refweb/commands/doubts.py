@@ -5,8 +5,8 @@ in MPa, an area in mm², a body that never meets the web. Nothing is solved for 
 """
 
 # May change: all limits and texts, as `commands.check` alone prints these findings. Must stay: codes of findings, which
-# stand in `refweb.findings.CODES`; `doubts_on`, which `check` calls; that nothing is solved. Tests:
-# tests/commands/test_doubts.py, which has a scene and its neighbour for each doubt.
+# stand in `refweb.findings.CODES`; `doubts_on`, which `check` calls; that nothing is solved; `_largest_area`, which a
+# test calls. Tests: tests/commands/test_doubts.py, which has a scene and its neighbour for each doubt.
 
 from __future__ import annotations
 

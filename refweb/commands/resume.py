@@ -1,6 +1,7 @@
 """Continue a dynamic run that was killed, interrupted or failed."""
 
-# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
+# This docstring is the help of the verb. `runner.resume` goes on with the rows, frames and ``run.json`` in DIR, which
+# then hold the whole run; this file prints. May change: texts. Must stay: `add_arguments` and `run`, which
 # `refweb.__main__` calls; the name of the verb, which messages of `results.folder.remedy` tell users. Tests:
 # tests/test_faults.py.
 

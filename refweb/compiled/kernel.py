@@ -9,8 +9,8 @@ compiled at the first call.
 May change: private functions, and how kernels are collected in `needed`, if none is left out. Must stay: arguments of
 `kernel`, which effects of users call; `machine_code_key` and `_numba_type_`, which `keys` and numba call; `COMMON`,
 which decides the bits of all results; `RECORDS`, which `records` fills and annotations are looked up in. A name in
-``apart`` that `dynamics.integrators.features` never gives is not prepared, and its call ends the run. Tests:
-``tests/compiled/test_kernel.py``.
+``apart`` that `dynamics.integrators.features` never gives is not prepared, and its call ends the run. Must stay as
+well: `type_of`, which `records` imports. Tests: ``tests/compiled/test_kernel.py``.
 """
 
 from __future__ import annotations

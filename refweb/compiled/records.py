@@ -19,7 +19,8 @@ Callers that fill a record by position, and fields that go into checkpoints by n
 
 May change: private names. Must stay: public names of `Record` and the annotations at the end, which `kernels` hands on;
 the order of words in `_block`, in which `_read_field` finds a field: change both together. Names of records are unique
-in refweb. Tests: ``tests/compiled/test_pointers.py``.
+in refweb. Must stay as well: `Cube`, `IntegerMatrix`, `Integers` and `Matrix`, which `kernels` imports. Tests:
+``tests/compiled/test_pointers.py``.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ the array, and its sizes.
 
 May change: private names but ``_items`` and ``_head``. Must stay: words that Python writes and the code that reads them
 change together; ``_items`` and ``_head`` exist as long as the table, since kernels have their addresses; references to
-arrays are counted as here, else memory leaks or is read after its end; names that `records` and `kernels` import.
-Tests: ``tests/compiled/test_pointers.py``.
+arrays are counted as here, else memory leaks or is read after its end; names that `records`, `kernels` and
+`integrators.neighbour_list` (`ArraysType`) import. Tests: ``tests/compiled/test_pointers.py``.
 """
 
 from __future__ import annotations

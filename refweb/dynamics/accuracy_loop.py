@@ -6,7 +6,8 @@ Each run has a value of it.
 May change: constants (number and size of repeated runs) and words of messages. Must stay: keys of
 `AccuracyState.arrays`, which stand in ``checkpoint.npz`` and which `runner._before` checks; codes of findings, those of
 `findings.CODES`. Runs fill ``reduced``, ``findings``, ``throw`` and ``twin_end`` of the solution, which `runner` and
-`results` read. Tests: ``tests/dynamics/test_budget.py``, ``test_accuracy.py``.
+`results` read. Must stay as well: `CLIMBS`, `reach_digits` and `run_within_drift`, which `simulation` imports. Tests:
+``tests/dynamics/test_budget.py``, ``test_accuracy.py``.
 """
 
 from __future__ import annotations

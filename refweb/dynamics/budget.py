@@ -6,7 +6,7 @@ exceed the remaining budget, and it is ended if it will exceed it.
 May change: `SEEN`, `SURE` and `SLOWEST`, which decide when a run counts as too dear. Must stay: `clock`, which tests
 replace by a count of steps; names that `simulation`, `accuracy_loop`, `twin_error`, `expected_cost`, `runner` and
 `studies.further_runs` import. With `LEAST` or `RUNS` the help text of `settings.Accuracy` changes, which has them in
-words. Tests: ``tests/dynamics/test_budget.py``.
+words. Must stay as well: public names of `Budget`, which other files use. Tests: ``tests/dynamics/test_budget.py``.
 """
 
 from __future__ import annotations

@@ -11,7 +11,9 @@ May change: private methods, `SHORTEST` and `NEAR`. `NUMBERS` has the keys after
 a restart use the system again. Must stay: keys of `INPUTS` and `RATES`, which are paths that users write; numbers are
 written in place, so that arrays of the compiled loop keep their addresses; texts of `save` and `arrays`, which
 checkpoints keep. A further input is an entry there and nothing else, if the numbers of its term follow from the new
-table of the effect. Tests: ``tests/dynamics/test_stepped_run.py``, ``test_control.py``.
+table of the effect. Must stay as well: all names that `stepped_run`, `sweeps.episodes` and other files import; public
+names of `Inputs` and `Commands`, which other files use. Tests: ``tests/dynamics/test_stepped_run.py``,
+``test_control.py``.
 """
 
 from __future__ import annotations

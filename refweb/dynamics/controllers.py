@@ -3,8 +3,8 @@
 May change: private functions and words of messages. A further effect that controls may set needs its unit in `UNITS`
 and, if it takes a vector, its name in `VECTORS`. Must stay: keys and order in `Controller.arrays`, which checkpoints
 keep, and of `plain`, which stand in ``run.json``; a `Controller` measures in the columns of a history row, so that it
-sees what ``history.csv`` has. `simulation`, `commands` and `sweeps.episodes` use the public names. Tests:
-``tests/dynamics/test_control.py``, ``test_attitude.py``.
+sees what ``history.csv`` has. `simulation`, `commands` and `sweeps.episodes` use the public names. Must stay as well:
+`commands_of`, which `simulation` imports. Tests: ``tests/dynamics/test_control.py``, ``test_attitude.py``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ times, until no digit is left. The run and its step-refinement run are two such 
 
 May change: constants; they decide from which growth on results have no ±. Must stay: rows are those of
 `Watch.compared`, time first and the balance of energy last; fields of `Divergence`, which `twin_error` and `gradients`
-read. Tests: ``tests/results/test_error_budget.py``, ``tests/dynamics/test_dynamic_gradients.py``.
+read; `divergence`, which `gradients` and `twin_error` import; `lost_before`, which `gradients` imports. Tests:
+``tests/results/test_error_budget.py``, ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ From the time on at which run and step refinement have no digit of a result in c
 `refweb.dynamics.divergence`.
 
 May change: private functions, and constants, which decide what is refused and how wide ± is. Must stay:
-`Gradients.gradient` and ``follow``, which `solution.gradient` and ``refweb gradient`` call; answers are
+`Gradients.gradient`, ``follow`` and ``refuse``, which `solution.gradient` and ``refweb gradient`` call; answers are
 `statics.gradients.Gradient`; steps are those of the run itself. An effect that gains a derivative leaves the list of
 `_refuse` and enters the text `SUPPORTED`. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """

@@ -7,7 +7,8 @@ May change: private functions. Must stay: probes stand in the order of observabl
 are found by number; the break of lines is the last event, as `integrators.rupture` expects; columns of `table`, the
 format of ``history.csv``, and of `compared`, which `twin_error`, `divergence` and `gradients` read by position; keys of
 `breaks`, which stand in ``run.json``. `SPREAD` widens ± of all dynamic results; `AT_REST` and `REST_SHARE` are defaults
-of ``[[event]]``, which `settings.Event` says in words. Tests: ``tests/dynamics/test_dynamics.py``.
+of ``[[event]]``, which `settings.Event` says in words. Must stay as well: `Watch` with its public names, which
+`controllers` and `simulation` import. Tests: ``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

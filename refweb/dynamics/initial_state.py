@@ -3,7 +3,8 @@
 May change: private functions, words of messages, and `OFF`, `JUMP` and `SAME`, which decide what is reported or
 refused. Must stay: fields of `Start`, keys ``begin_…`` of ``checkpoint.npz``; the keys in `_STATE` and ``body_…``,
 which `results.folder` writes: a renamed one breaks folders of users. `simulation`, `runner` and `studies` call the
-public functions. Tests: ``tests/dynamics/test_starts.py``, ``test_internal_start.py``.
+public functions. Must stay as well: all names that `simulation` and `studies.trials` import. Tests:
+``tests/dynamics/test_starts.py``, ``test_internal_start.py``.
 """
 
 from __future__ import annotations

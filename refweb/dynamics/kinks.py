@@ -4,6 +4,10 @@ A motion passes a kink within a step, which leaves an error of order 1 in the st
 rest whose lines are neither slack nor taut, a number that rises changes it otherwise than one that falls. Forces are
 compared beside an instant, along its derivatives: their second difference goes as the step at a kink, elsewhere as its
 square. Forces of lines are compared line by line, since those of two lines at a node may make up for each other.
+
+May change: private functions, messages and `FELT`. Must stay: `kinks_of` and `text_of`, which `linear_run` calls;
+`TOUCHING`, names of the terms of contact. Tests: ``tests/dynamics/test_dynamic_gradients.py``,
+``tests/dynamics/test_gradient_jumps.py``.
 """
 
 from __future__ import annotations

@@ -2,6 +2,9 @@
 
 The state of the last three steps stays, so that the derivatives at a peak between them are known. `gradients` follows
 a method and its step refinement by one `LinearRun` each, and reads the attributes.
+
+May change: private functions. Must stay: attributes and arguments of `LinearRun` and `follow`, which `gradients` uses.
+Tests: ``tests/dynamics/test_dynamic_gradients.py``, ``tests/dynamics/test_gradient_jumps.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 May change: the order of `OTHERS` and words of texts. Must stay: keys of `arrays`, which stand in ``checkpoint.npz``,
 and of `record`, which stand in ``run.json``; `simulation` calls the public methods. A new method of dynamics that may
-stand in for others belongs in `OTHERS`. Tests: ``tests/dynamics/test_fallback.py``.
+stand in for others belongs in `OTHERS`. Must stay as well: `MethodFallback`, which `simulation` imports. Tests:
+``tests/dynamics/test_fallback.py``.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ motion, are differences of order 2 of those terms alone whose data differ.
 May change: how steps are sought (`PROBED`, `SHRINKS`, `TRIES`). `CHANGE` balances two errors, of its square and of
 rounding. Must stay: public attributes and methods of `Parameter`, which `integrators.tangent`, `gradients` and
 `responses` use; a number that changes the net or times of steps is refused. ``refweb gradient`` leaves out the tables
-in `FIXED`. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
+in `FIXED`. Must stay as well: `SELF`, which `gradients` imports. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,9 @@ each. Where they are equal, the result has the largest of them for a number that
 falls, as lines that share a largest value; where they are not, ± covers all.
 
 May change: the insides of functions, if answers stay. Must stay: `Peaks.step` is called with the value at each step in
-turn, and `end` after the last; fields of `Peak` and `Pool`, which `gradients` reads. `TIED` and `KINK` are those of
-`responses`. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
+turn, and `end` after the last; fields of `Peak`, which `linear_run` fills, and of `Pool`: `gradients` reads both.
+`TIED` and `KINK` are those of `responses`. Must stay as well: `kept` and `pooled`, which `gradients` imports. Tests:
+``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,9 @@ so that a difference passes no kink of a largest value.
 
 May change: `MOVED`, private functions; `TIED` and `KINK` decide which derivatives are given to both sides. Must stay:
 values are those that ``history.csv`` and results have for the same observable; fields of `Instant`, `Rates` and
-`Slopes`, which `gradients` and `peaks` read. `between` is the polynomial of `integrators.step.interpolate_kicks`:
-change both together. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
+`Slopes`, which `linear_run`, `gradients` and `peaks` read. `between` is the polynomial of
+`integrators.step.interpolate_kicks`: change both together. Must stay as well: all names that `linear_run` and `kinks`
+import. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

@@ -6,8 +6,9 @@ method, times `SPREAD`. The second run takes place beside the first or after it.
 May change: `PAUSE`, private functions that do not change a factor. Must stay: fields of `TwinRun`; rows are those of
 `Watch.compared`; the name `THREADS`, which `sweeps.case` sets. A changed factor, or another constant than `PAUSE`,
 changes ± of all dynamic results: `accuracy_loop._throw` repeats that of `add_errors`, `SPREAD`/(1 − `error_share`), and
-``python -m validation coverage`` counts how often ± holds. Tests: ``tests/dynamics/test_agreement_by_chance.py``,
-``test_one_row.py``.
+``python -m validation coverage`` counts how often ± holds. Must stay as well: `Twin` with its public names, which
+`accuracy_loop` imports; `largest_mean`, which `gradients` and `studies.further_runs` import; `_add_lateness`, which a
+test calls. Tests: ``tests/dynamics/test_agreement_by_chance.py``, ``test_one_row.py``.
 """
 
 from __future__ import annotations

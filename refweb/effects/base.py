@@ -20,7 +20,9 @@ May change: helpers below `ForceTerm` (`with_rows`, `refuse_flows`, `without`, â
 Must stay: names, order and defaults of the fields of `ForceTerm`, its parts, `PrescribedMotion`, `Constraint` and
 `BreakLimits`, since effects of users make them (a new field needs a default); columns of `LINE_OUT` (numbers of which
 are `TENSION` to `LENGTH_POWER`), `TOUCH` and `FELT`, and the mark `CONTACT`, which kernels write and `results.probes`,
-`results.state` and `system.contact_forces` read. `system.effect_parts` checks what effects make. Tests:
+`results.state` and `system.contact_forces` read. `system.effect_parts` checks what effects make. Must stay as well: all
+names that `contact.table`, `damping` and other files import; public names of `InternalVariables`, `ContactForce`,
+`VelocityForce`, `ImplicitContactKernels`, `Balance`, `Timing` and `CellElements`, which other files use. Tests:
 ``tests/test_contract.py``, ``tests/test_plugins.py``.
 """
 

@@ -2,9 +2,9 @@
 
 May change: private functions, checks and their messages, and `EVEN`, a tolerance of these. Must stay: keys and
 docstring of `Body` (scene format and help; after a change write ``validation/REFERENCE.md`` anew), to which each class
-in `registry.SHAPES` adds its fields; rows of bodies in the order of their tables, behind all nodes; the fields of
-`refweb.net.rigid_body.RigidBody` that `extend` fills. Tests: ``tests/effects/test_contact.py``,
-``tests/effects/test_faulty_bodies.py``.
+in `registry.SHAPES` adds its fields; rows of bodies in the order of their tables, behind all nodes;
+`Body.without_mass`, which `build` reads; the fields of `refweb.net.rigid_body.RigidBody` that `extend` fills. Tests:
+``tests/effects/test_contact.py``, ``tests/effects/test_faulty_bodies.py``.
 """
 
 from __future__ import annotations

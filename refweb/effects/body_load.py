@@ -4,10 +4,10 @@ With the rotation R of a body since the start, and a force F or a torque T along
 R F at its centre of mass, the moment R T, and a rotation δθ changes them by δθ × R F and δθ × R T. Torques have no
 potential. The power of a moment is M · ω with ω = R W Rᵀ v, see `refweb.net.rotation`.
 
-May change: the code of the kernels. Must stay: `terms_of`, which `load` calls; the factor behind the fields of
-`BODY_LOAD`, where `outer_load` puts it; cells and shape of the data for other values of force and torque, as
-`dynamics.commands` writes new numbers over them during a run. Another field of `BODY_LOAD` is also written in `_cell`.
-Tests: ``tests/dynamics/test_attitude.py``, ``tests/test_contract.py``.
+May change: the code of the kernels. Must stay: the name "load" of the terms, as in `load`; `terms_of`, which `load`
+calls; the factor behind the fields of `BODY_LOAD`, where `outer_load` puts it; cells and shape of the data for other
+values of force and torque, as `dynamics.commands` writes new numbers over them during a run. Another field of
+`BODY_LOAD` is also written in `_cell`. Tests: ``tests/dynamics/test_attitude.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

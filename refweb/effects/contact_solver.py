@@ -31,7 +31,8 @@ and a moment on the body: rows of the body replace those of the node.
 May change: `SETTLING` and `UNMIXED`, which move results within the error of a step. Must stay: the law in
 `friction_law`, which is that of `contact.friction`; fields of `refweb.kernels.CONTACT` that are read and written;
 `prepare`, `carry`, `gauss_seidel`, `warm_start` and `commit`, which `integrators.implicit_contacts` and
-`integrators.step` call. Another order of contacts or sums changes the last digits of results. Tests:
+`integrators.step` call. Another order of contacts or sums changes the last digits of results. Must stay as well: all
+names that `drag.implicit_drag`, `contact.line_body_friction` and other files import. Tests:
 ``tests/effects/test_contact_losses.py``, ``tests/effects/test_attached_contact_losses.py``.
 
 References

@@ -7,10 +7,13 @@ With x' = dx/dξ at a quadrature point, l = |x'|, L the natural length and t = x
 
 and the strain ε = (2 X'·u' + u'·u' + |X'|² − L²)/(L(l + L)), which keeps its digits at tiny displacements.
 
-May change: the code around the sums; another order of sums changes the last digits of all results. Must stay: the order
-of what `kernels` returns, which `wound_lines` and ``tests/test_contract.py`` unpack, with ∂E/∂L as the last, which
-`plastic` and `viscous` take; `strains`, which `results.state` and `statics` call, and `length_force`, which
-`natural_lengths` calls; columns of `LINE_OUT`. Tests: ``tests/test_contract.py``, ``tests/net/test_elements.py``.
+`build` adds the term to each system. May change: the code around the sums; another order of sums changes the last
+digits of all results. Must stay: the name "elasticity", which `statics.gradients.KNOWN` has; ``data=None``, by which
+`System` takes the numbers of its lines; "strain_energy", a column of ``history.csv``; `Elasticity`, which `build` and
+`statics.monotone_loading` take; the order of what `kernels` returns, which `wound_lines` and ``tests/test_contract.py``
+unpack, with ∂E/∂L as the last, which `plastic` and `viscous` take; `strains`, which `results.state`, `statics`,
+`plastic` and `viscous` call, and `length_force`, which `natural_lengths` calls; columns of `LINE_OUT`. Tests:
+``tests/test_contract.py``, ``tests/net/test_elements.py``.
 """
 
 from __future__ import annotations

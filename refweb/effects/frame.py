@@ -9,8 +9,8 @@ velocity v is
 
 May change: only the code of `on`. Must stay: the key and docstring of `Frame` (scene format and help; after a change
 write ``validation/REFERENCE.md`` anew); `MovingFrame` of its terms, from which statics, modes and reeled masses read Ω;
-the name "frame", by which `statics.critical_speed` tells it from an orbit; "frame_energy", a column of ``history.csv``.
-Tests: ``tests/effects/test_frame.py``.
+the name "frame", by which `statics.critical_speed` tells it from an orbit, and which `statics.gradients.KNOWN` and
+`statics.adjoint.MASSES` have; "frame_energy", a column of ``history.csv``. Tests: ``tests/effects/test_frame.py``.
 """
 
 from __future__ import annotations

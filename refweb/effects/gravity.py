@@ -1,8 +1,9 @@
 """Gravity: a uniform acceleration on every mass.
 
-May change: only `force`, `energy` and `impulse` together. Must stay: the key and docstring of `Gravity` (scene format
-and help; after a change write ``validation/REFERENCE.md`` anew); the acceleration times mass as the numbers of a cell;
-the energy as 0 in the web's position, from which ``history.csv`` counts. Tests: ``tests/test_contract.py``,
+May change: only `force`, `energy` and `impulse` together. Must stay: the name "gravity", which
+`statics.gradients.KNOWN` and `statics.adjoint.MASSES` have; the key and docstring of `Gravity` (scene format and help;
+after a change write ``validation/REFERENCE.md`` anew); the acceleration times mass as the numbers of a cell; the energy
+as 0 in the web's position, from which ``history.csv`` counts. Tests: ``tests/test_contract.py``,
 ``tests/dynamics/test_momentum_balance.py``.
 """
 

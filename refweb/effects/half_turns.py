@@ -1,8 +1,9 @@
 """Half turns of threads about cylinders: how far ends are from where `winding` counts their turns.
 
-May change: `MOST`, up to ½, and messages. Must stay: the order of the ``numbers`` of `End`, which the compiled
-`turns_of` reads by position; `ends_of`, `turns_of`, `MOST` and `REMEDY`, which `dynamics.half_turns` uses, and
-`refuse_half_turns`, which `statics.equilibrium` calls. Tests: ``tests/effects/test_around.py``.
+May change: `MOST`, up to ½, and messages. Must stay: the order of the three ``rows`` and of the ``numbers`` of `End`,
+which the compiled `turns_of` and `dynamics.half_turns.farthest` read by position; `ends_of`, `turns_of`, `MOST` and
+`REMEDY`, which `dynamics.half_turns` uses, and `refuse_half_turns`, which `statics.equilibrium` calls. Tests:
+``tests/effects/test_around.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ kernel over lines is `refweb.net.laws.line_data.LineData.matrix`: all terms of t
 gives its first columns their names, and `refweb.net.net.Net.law_record` those that the laws of a net read.
 
 May change: nothing without a change of the last digits of all results, since kernels of all lines inline these
-functions and their order of sums. Must stay: arguments, and what each returns. Tests: ``tests/test_contract.py``,
-``tests/net/test_elements.py``.
+functions and their order of sums. Must stay: arguments, and what each returns; all names that `viscous`, `plastic` and
+other files import. Tests: ``tests/test_contract.py``, ``tests/net/test_elements.py``.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Dead loads: forces of fixed direction on nodes, and forces and torques on bodies, with an optional factor over time.
 
 May change: messages. Must stay: keys and docstring of `Load` (scene format and help; after a change write
-``validation/REFERENCE.md`` anew); the name "load", by which `statics.simulation` finds dead loads; `numbers`, with
-which `dynamics.commands` writes another force over the first three numbers of a cell. Kernels are in `outer_load` and
-`body_load`. Tests: ``tests/test_contract.py``, ``tests/dynamics/test_attitude.py``.
+``validation/REFERENCE.md`` anew); the name "load", by which `statics.simulation` finds dead loads, and which
+`statics.gradients.KNOWN` has; `numbers`, with which `dynamics.commands` writes another force over the first three
+numbers of a cell. Kernels are in `outer_load` and `body_load`. Tests: ``tests/test_contract.py``,
+``tests/dynamics/test_attitude.py``.
 """
 
 from __future__ import annotations

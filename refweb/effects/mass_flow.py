@@ -16,8 +16,9 @@ An explicit step brings Δm in the middle of its drift, where v − v_d goes wit
 
 May change: how the kernels are written, with the order of passages kept: it makes the step of order 2. Must stay:
 fields of `MassFlow`, which `reel` fills, of `Passages`, which `wound_mass` fills, and of `FollowedMass`, which the
-explicit loop reads by name; the equations, which `system.material_flow` has for other methods. Tests:
-``tests/effects/test_reel_mass.py``, ``tests/effects/test_winch_mass.py``.
+explicit loop reads by name; the equations, which `system.material_flow` has for other methods; `set_masses`, which
+`natural_lengths` imports; `exchange_by_slips`, `exchange_masses` and `set_masses_by_slips`, which
+`integrators.energy_balance` imports. Tests: ``tests/effects/test_reel_mass.py``, ``tests/effects/test_winch_mass.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,10 @@ them to the line data of its caller.
 
 May change: how kernels are written. Must stay: fields of `NaturalLengths`, which the explicit loop reads by name; ∞ and
 −∞ behind the corners, on which `explicit_loop` and `step_bound` count; the column `GROWTH`, which `damping` adds.
-`set_lengths` is the only place that computes lengths: a new effect on them calls `with_factor`. Tests:
-``tests/effects/test_reel.py``, ``tests/effects/test_viscous.py``.
+`set_lengths` is the only place that computes lengths: a new effect on them calls `with_factor`. Must stay as well:
+`shortest_of`, which `self_contact.table` imports; `set_growth`, which `integrators.energy_balance` and
+`integrators.step` import; `work_of_lengths`, which `system.system` imports. Tests: ``tests/effects/test_reel.py``,
+``tests/effects/test_viscous.py``.
 """
 
 from __future__ import annotations

@@ -9,7 +9,8 @@ which have the difference of gravity from its value at the origin, to first orde
 and the inertia forces of the axes. `refweb.effects.turning_axes` has the kernels, with G = n² diag(3, 0, −1). The sum
 of the kinetic energy, −½ m n² (3x² − z²) and the energies of all other effects is constant: the Jacobi integral.
 
-May change: only the code of `on`. Must stay: keys and docstring of `Orbit` (scene format and help; after a change write
+May change: only the code of `on`. Must stay: the name "orbit", which `statics.gradients.KNOWN` and
+`statics.adjoint.MASSES` have; keys and docstring of `Orbit` (scene format and help; after a change write
 ``validation/REFERENCE.md`` anew); `MovingFrame` of its terms: its radius gives ± of what the linear equations neglect,
 by `System.orbit_radius`; `GRAVITATION` and `EARTH`, which are constants of nature. Tests:
 ``tests/effects/test_orbit.py``.

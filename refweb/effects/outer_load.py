@@ -6,8 +6,9 @@ step.
 
 May change: how kernels are written. Must stay: the order of the numbers of a factor (largest size, constant, slope,
 table), which `factor_at` and `factor_until` read by position, and the first of which bounds of `pressure`, `thrust` and
-`body_load` read; the numbers of a load ahead of them, over which `dynamics.commands` writes. Tests:
-``tests/test_contract.py``.
+`body_load` read; the numbers of a load ahead of them, over which `dynamics.commands` writes; the balance "work", a key
+of `System.working`; `outer_load`, which `pressure`, `thrust` and `body_load` call, and `nodal_load`, which `load`,
+`body_load` and `mass_flow` call. Tests: ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

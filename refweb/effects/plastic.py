@@ -19,10 +19,13 @@ quadrature point, then the energy that each has lost over A Y(0) [m], and L of t
 They are no unknowns: explicit steps take them on at their ends, load steps of statics at equilibria, and CVODE and IDA
 at the ends of the pieces of their steps, which end where a line that yields turns back.
 
-May change: `ROUNDING`. Must stay: the columns behind `ROW` (curve of the yield stress), which kernels read by position
-and `corners` counts by ``plastic_force_…``; the order of what `kernels` returns, which this file takes by number; the
-order of internal variables in rows; ``taken_on``, ``grown``, ``drive`` and ``settled``, which `System` and
-`integrators.yielding` call through `InternalVariables.follower`. Tests: ``tests/effects/test_plastic.py``.
+May change: `ROUNDING`. Must stay: the name "plastic", by which `statics.monotone_loading` leaves the terms out; the
+columns behind `ROW` (curve of the yield stress), which kernels read by position and `corners` counts by
+``plastic_force_…``; the order of what `kernels` returns, which this file takes by number; the order of internal
+variables in rows; ``taken_on``, ``grown``, ``drive`` and ``settled``, which `System` and `integrators.yielding` call
+through `InternalVariables.follower`; `PlasticLines`, which `build` imports; `strain_at`, which `rupture`,
+`statics.monotone_loading` and `integrators.rupture` import; `plastic_strain`, which `results.state`,
+`statics.monotone_loading` and `integrators.rupture` import. Tests: ``tests/effects/test_plastic.py``.
 """
 
 from __future__ import annotations

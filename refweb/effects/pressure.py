@@ -8,10 +8,11 @@ With the unit normal n of the plane, p per current length and x' = dx/dξ along 
 exactly, for every order: the force depends on positions and not on natural length. On a closed loop in a plane it has
 the potential −p × area. On other lines it has no potential, and its work depends on the path.
 
-May change: private functions and how the kernels are written. Must stay: keys and docstring of `Pressure` (scene format
-and help; after a change write ``validation/REFERENCE.md`` anew); `PUSH` as the first numbers of a cell, with the factor
-of `outer_load` behind, at `FACTOR`; the normal among them, which is set to 0 where an element breaks. Tests:
-``tests/test_contract.py``, ``tests/effects/test_follower_loads.py``.
+May change: private functions and how the kernels are written. Must stay: the name "pressure", which
+`statics.gradients.KNOWN` has; keys and docstring of `Pressure` (scene format and help; after a change write
+``validation/REFERENCE.md`` anew); `PUSH` as the first numbers of a cell, with the factor of `outer_load` behind, at
+`FACTOR`; the normal among them, which is set to 0 where an element breaks. Tests: ``tests/test_contract.py``,
+``tests/effects/test_follower_loads.py``.
 """
 
 from __future__ import annotations

@@ -15,11 +15,11 @@ stiffness couples every node with every other: of n nodes the matrix has a dense
 A segment that gets short turns fast: T/l_s has no bound. The bound of explicit steps takes T and l_s as they are at
 each row of the history.
 
-May change: private functions, messages, and how the kernels are written. Must stay: keys and docstring of `Thread`
-(scene format and help; after a change write ``validation/REFERENCE.md`` anew); `OF_CABLE`, which are keys of
-`refweb.Cable`; the first four numbers of ``out`` (tension, stress, strain, length), `net.threads.COLUMNS`, which
-observables read; columns of data from ``width`` on, which `net.threads` writes and `thread_segments` reads. Tests:
-``tests/effects/test_thread.py``.
+May change: private functions, messages, and how the kernels are written. Must stay: the name "thread" of the terms,
+which `statics.gradients.KNOWN` and `studies.modes` have; keys and docstring of `Thread` (scene format and help; after a
+change write ``validation/REFERENCE.md`` anew); `OF_CABLE`, which are keys of `refweb.Cable`; the first four numbers of
+``out`` (tension, stress, strain, length), `net.threads.COLUMNS`, which observables read; columns of data from ``width``
+on, which `net.threads` writes and `thread_segments` reads. Tests: ``tests/effects/test_thread.py``.
 """
 
 from __future__ import annotations

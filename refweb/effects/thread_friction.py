@@ -24,11 +24,13 @@ is at most that of separate lines: Σ_s ∂T_s/∂l_j ≤ max EA/L_s.
 Numbers of a thread stand in rows behind all places, see `refweb.effects.base.InternalVariables`: slip [m] of each ring;
 Y_to − Y_from over EA where it slipped last, with the sign of the slip; the energy lost over EA [m].
 
-May change: how the kernels are written; `LEAST` keeps a step from being 0. Must stay: the order of a thread's numbers
-in its rows and of ``out`` (four columns, tensions of segments, slips of rings), which `net.threads.ThreadLine` and
-`results.observables.thread` read by position; fields of `FrictionKernels`, which `winch_power`, `wound_lines` and
-`wound_mass` use; methods of `Slips`, which `integrators.yielding` calls as the ``follower``. Tests:
-``tests/effects/test_thread_friction.py``, ``tests/effects/test_winch.py``.
+May change: how the kernels are written; `LEAST` keeps a step from being 0. Must stay: the name "thread" of the terms,
+which `statics.gradients.KNOWN` and `studies.modes` have; the order of a thread's numbers in its rows and of ``out``
+(four columns, tensions of segments, slips of rings), which `net.threads.ThreadLine` and `results.observables.thread`
+read by position; fields of `FrictionKernels`, which `winch_power`, `wound_lines` and `wound_mass` use; methods of
+`Slips`, which `integrators.yielding` calls as the ``follower``; `with_slips` and `settled`, which `thread` imports;
+`numbers_of`, which `wound_mass` imports. Tests: ``tests/effects/test_thread_friction.py``,
+``tests/effects/test_winch.py``.
 """
 
 from __future__ import annotations

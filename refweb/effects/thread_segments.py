@@ -5,7 +5,8 @@ its vector in the web's position and the length of it [m].
 
 May change: how a kernel computes its numbers. Must stay: the columns above, which `net.threads` writes and `thread`,
 `thread_friction`, `thread_slips` and `winch_power` read: a change of the layout goes to all of them; the six numbers
-that a segment kernel returns; arguments of `energy_kernel`, which `winding` calls too. Tests:
+that a segment kernel returns; arguments of `energy_kernel`, which `winding` calls too; `add_across`, which `thread` and
+`thread_friction` import; `segment_kernel`, which `thread`, `thread_friction` and other files import. Tests:
 ``tests/effects/test_thread.py``.
 """
 

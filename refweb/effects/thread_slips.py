@@ -7,8 +7,8 @@ May change: limits of the iterations (`STEPS`, `ROUGH`, `BISECTIONS`, `DOUBLINGS
 are to be found to rounding, of which the other constants say what it is. Must stay: the rows of w by their names,
 `LONGER` to `REACH`, and `ROWS`, which `thread_friction`, `winch_power`, `wound_lines` and `wound_mass` read; the layout
 that `layout_kernels` reads: first row, ends, friction of each ring, numbers of the winch, as
-`thread_friction.numbers_of` writes them. Tests: ``tests/effects/test_thread_friction.py``,
-``tests/effects/test_winch.py``.
+`thread_friction.numbers_of` writes them; all names that `thread_friction`, `wound_mass` and `winch_power` import.
+Tests: ``tests/effects/test_thread_friction.py``, ``tests/effects/test_winch.py``.
 """
 
 from __future__ import annotations

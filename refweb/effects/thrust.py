@@ -8,9 +8,11 @@ With d = ±dx/dξ at the node, into the line, and e = d/|d|
 It has no potential. If dx/dξ is zero at the node, the line has no direction and no thrust acts.
 
 May change: how the kernels are written; `SHORTER` downwards, by which bounds of steps hold for shorter lines. Must
-stay: keys and docstring of `Thrust` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); the
-force as the first number of `end_of`, which ``without(0)`` sets to 0 at a break; ``slopes`` that begin with the node
-that is pushed. Tests: ``tests/test_contract.py``, ``tests/effects/test_follower_loads.py``.
+stay: the name "thrust", which `statics.gradients.KNOWN` has; keys and docstring of `Thrust` (scene format and help;
+after a change write ``validation/REFERENCE.md`` anew); the force as the first number of `end_of`, which ``without(0)``
+sets to 0 at a break; cells, shape of the data and force kernel for another force, since `dynamics.commands` writes new
+numbers over them during a run; ``slopes`` that begin with the node that is pushed. Tests: ``tests/test_contract.py``,
+``tests/effects/test_follower_loads.py``.
 """
 
 from __future__ import annotations

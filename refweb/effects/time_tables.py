@@ -5,7 +5,8 @@ values are constant before the first and after the last time.
 
 May change: how a row is searched. Must stay: the layout of a table in ``data`` (number of rows, then rows), which
 `flattened` writes, kernels of seven files read and `dynamics.commands` writes over; end values held. A force gives its
-times to `Timing`, so that implicit steps end there; `system.material_flow` interpolates the same tables by numpy.
+times to `Timing`, so that implicit steps end there; `system.material_flow` interpolates the same tables by numpy. Must
+stay as well: `integrate`, which `outer_load` imports; `interpolate`, which `axle`, `mass_flow` and other files import.
 Tests: ``tests/effects/test_time_tables.py``.
 """
 

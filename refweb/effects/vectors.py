@@ -1,7 +1,9 @@
 """Products of vectors of three numbers, as compiled kernels.
 
 May change: nothing: kernels of the whole room call these functions, and another order of sums changes the last digits
-of all results. Must stay: vectors as tuples of three numbers. A new product is a new function.
+of all results. Must stay: vectors as tuples of three numbers. A new product is a new function. Must stay as well:
+`cross`, which `bending`, `body_load` and other files import; `dot`, which `bending`, `contact_solver` and other files
+import; `solve`, which `contact_solver` and `drag.implicit_drag` import; `add`, which `drag.implicit_drag` imports.
 """
 
 from __future__ import annotations

@@ -19,8 +19,8 @@ a quadrature point after those of the one before.
 
 May change: `ROUNDS` and `SHORT`. Must stay: the columns behind `ROW` (bar, then EA and τ of each arm), which kernels
 read by position; the names ``arm_time_…``, by which `of` counts arms; the order of what `kernels` returns, with ∂E/∂L
-as the last; the order of states in rows; `refuse_beside`, which `damping` calls. Tests:
-``tests/effects/test_viscous.py``, ``tests/test_contract.py``.
+as the last; the order of states in rows; `refuse_beside`, which `damping` calls; `ViscousArms`, which `build` imports.
+Tests: ``tests/effects/test_viscous.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -20,10 +20,11 @@ step is P h.
 Numbers of such a winch are those of one that stands still, see `refweb.effects.winch`, and behind them its power [W],
 positive to haul in, and v [m/s]. Lines on such winches are in `refweb.effects.wound_lines`.
 
-May change: `ROUNDS` and `ROUNDING`. Must stay: `BEHIND`, the column of the power, which follows from the numbers of
-`Winch.numbers`; `rate_kernel`, which `wound_mass` calls, and fields of `PowerKernels`, which `wound_lines` uses; slip
-and energy as unknowns behind the nodes of a cell, in this order. Tests: ``tests/effects/test_winch.py``,
-``tests/test_contract.py``.
+May change: `ROUNDS` and `ROUNDING`. Must stay: the name "thread" of the terms, which `statics.gradients.KNOWN` and
+`studies.modes` have; `BEHIND`, the column of the power, which follows from the numbers of `Winch.numbers`;
+`rate_kernel`, which `wound_mass` calls, and fields of `PowerKernels`, which `wound_lines` uses; slip and energy as
+unknowns behind the nodes of a cell, in this order; `with_power`, which `thread` imports; `power_kernels`, which
+`wound_lines` imports. Tests: ``tests/effects/test_winch.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -16,10 +16,12 @@ The angle θ follows from the azimuths of both ends. Each is within half a turn 
 node on a body that turns about its axle, within half a turn of the one that it turns to. So any number of turns is
 counted, and nothing is remembered from step to step.
 
-May change: how the bound is found, if it is not smaller; `SURFACE`, a tolerance of rounding. Must stay: length,
-gradient and tangent of one formula; columns of ``out``, those of `net.threads.COLUMNS` and then a `base.TOUCH` for each
-segment on a body with the force on it, which `system.contact_forces` adds up; fields of `SEGMENT`, which `half_turns`
-reads by name. Tests: ``tests/effects/test_around.py``, ``tests/test_contract.py``.
+`thread` calls `term`. May change: how the bound is found, if it is not smaller; `SURFACE`, a tolerance of rounding.
+Must stay: length, gradient and tangent of one formula, which `around.winding_length` has in Python for the web as
+built: change both together; the name "thread", which `statics.gradients.KNOWN` and `studies.modes` have; columns of
+``out``, those of `net.threads.COLUMNS` and then a `base.TOUCH` for each segment on a body with the force on it, which
+`system.contact_forces` adds up; fields of `SEGMENT`, which `half_turns` reads by name; `segments_of`, which
+`half_turns` imports. Tests: ``tests/effects/test_around.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -13,11 +13,12 @@ thread with one ring: δ; Y over EA; 0, as no ring rubs; the time until which it
 EA. They are no unknowns: each step ends with those that follow from positions there. Of a winch of constant power the
 first and the last are unknowns, see `refweb.effects.winch_power`.
 
-May change: private functions and messages. Must stay: the columns from `FIRST` on (`KIND`, `NUMBERS`, `POWERED`) and
-the order of an element's numbers in its row (`SLIP`, `UNTIL`, `TAKEN`, …), which kernels, `numbers_in` and `wound_mass`
-read; ``wound`` of the net, where `winch` notes the lines; `with_wound`, which `system.system` calls, `rewind` and
-`standing`, which `dynamics.initial_state` and `results.observables` call; methods of `WoundLines`, which
-`integrators.yielding` calls as the ``follower``. Tests: ``tests/effects/test_wound_lines.py``.
+May change: private functions and messages. Must stay: the name "winch" of the terms, which `studies.modes` has; the
+columns from `FIRST` on (`KIND`, `NUMBERS`, `POWERED`) and the order of an element's numbers in its row (`SLIP`,
+`UNTIL`, `TAKEN`, …), which kernels, `numbers_in` and `wound_mass` read; ``wound`` of the net, where `winch` notes the
+lines; `with_wound`, which `system.system` calls, `rewind` and `standing`, which `dynamics.initial_state` and
+`results.observables` call; methods of `WoundLines`, which `integrators.yielding` calls as the ``follower``; `settled`
+and `write_numbers`, which `winch` imports. Tests: ``tests/effects/test_wound_lines.py``.
 """
 
 from __future__ import annotations

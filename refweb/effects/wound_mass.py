@@ -18,7 +18,7 @@ node.
 May change: how the kernels are written. Must stay: fields of `FIELD` and `NODE`, which kernels read by name; the
 equations, which are those of `mass_flow`; fields of `Passages`, by which the explicit loop and `system.material_flow`
 exchange mass; `write_numbers` and `WoundFlow`, which `winch` uses, and ``of_field``, by which `dynamics.commands`
-writes columns. Tests: ``tests/effects/test_winch_mass.py``.
+writes columns; public names of `WoundFlow`, which other files use. Tests: ``tests/effects/test_winch_mass.py``.
 """
 
 from __future__ import annotations

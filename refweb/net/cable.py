@@ -4,7 +4,8 @@ May change: private functions, texts of errors, and `DEEPEST`, a limit of what i
 of scenes with default numbers of that law. Must stay: keys, defaults and docstrings of `Cable`, `Group` and `Viscous`
 (scene format and help; after a change write ``validation/REFERENCE.md`` anew); fields of `Group`, which repeat those of
 `Cable`, as `_values` reads both by name; names of the properties that `Cable.properties` returns, which
-`discretisation`, laws and `studies.form` read. Tests: ``tests/net/test_laws_by_group.py``, ``tests/test_scene.py``.
+`discretisation`, laws and `studies.form` read; public names of `Viscous`, which other files use. Tests:
+``tests/net/test_laws_by_group.py``, ``tests/test_scene.py``.
 """
 
 from __future__ import annotations

@@ -21,8 +21,9 @@ where a slack part is pulled taut, and no order exceeds 1.
 
 May change: how arrays are filled. Must stay: rows of the web's nodes first, then those inside lines, line by line,
 since files, checkpoints and observables count so; elements of a line one after another; the order of `line_data.FIELDS`
-in `_line_data`; fields of `Net`; no import of scikit-fem for explicit steps (``tests/test_pay_for_what_you_call.py``).
-Tests: ``tests/net/test_elements.py``, ``tests/system/test_orders.py``.
+in `_line_data`; fields of `Net`; no import of scikit-fem for explicit steps (``tests/test_pay_for_what_you_call.py``);
+`build`, which `build` and `threads` import; `basis`, which `system.weak_form` imports. Tests:
+``tests/net/test_elements.py``, ``tests/system/test_orders.py``.
 """
 
 from __future__ import annotations

@@ -7,7 +7,9 @@ order are in `refweb.net.curved`.
 May change: how values are computed. Must stay: nodes in the order of columns of `Net.cells`, both ends first; the
 number of Gauss points that `gauss` is asked for, on which orders of convergence rest; no import of scikit-fem at the
 head (``tests/test_pay_for_what_you_call.py``). `discretisation`, `effects.reel`, `statics.adjoint` and
-`system.weak_form` call this file. Tests: ``tests/net/test_elements.py``.
+`system.weak_form` call this file. Must stay as well: `line_element`, which `effects.reel`, `discretisation` and other
+files import; `lumped_shares`, which `effects.reel`, `discretisation` and `statics.adjoint` import. Tests:
+``tests/net/test_elements.py``.
 """
 
 from __future__ import annotations

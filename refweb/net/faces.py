@@ -2,7 +2,8 @@
 
 May change: private functions, texts of findings and errors. Must stay: the edges as the last block of the mesh, where
 `mesh_file` finds them; each edge once; kinds of cells in `CORNERS`, which `mesh_file` takes for faces; the order of
-lines, by which scenes number them. Tests: ``tests/net/test_faces.py``.
+lines, by which scenes number them; `decided` and `group_names`, which `mesh_file` imports. Tests:
+``tests/net/test_faces.py``.
 """
 
 from __future__ import annotations

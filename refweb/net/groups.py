@@ -10,9 +10,10 @@ Every web has groups by its own supports, the nodes of its rim, unless the user 
 
 Each line is in one of these three. A group without lines is none.
 
-May change: private functions and texts of errors. Must stay: names in `PLACES`, which are the scene format, in the
-order of the number of ends in the rim; increasing int64 arrays of `members`; −1 of `givers` where no table gives a key,
-which `cable`, `plastic_keys`, `effects.rupture` and `effects.temperature` read. Tests: ``tests/net/test_groups.py``.
+`net.web`, `net.mesh_file` and `net.faces` call `members`. May change: private functions and texts of errors. Must stay:
+names in `PLACES`, which are the scene format, in the order of the number of ends in the rim; increasing int64 arrays of
+`members`; −1 of `givers` where no table gives a key, which `cable`, `plastic_keys`, `effects.rupture` and
+`effects.temperature` read; `by_place`, which `web` imports. Tests: ``tests/net/test_groups.py``.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ its construction; knots and edges take more. So a material fills in what a first
 
 May change: values in `MATERIALS` and new materials, which change results of scenes that name the material. Must stay:
 names of materials, which are the scene format; `FILLED`, which are keys of `Cable` and `Group`; help prints the table
-to ``validation/REFERENCE.md``. Tests: ``tests/net/test_materials.py``.
+to ``validation/REFERENCE.md``; `remarks`, which `runner` imports; `as_markdown`, which `reference.words` imports;
+`as_text`, which `commands.help` imports. Tests: ``tests/net/test_materials.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 May change: private functions; texts of findings and errors, and `HARMLESS`, the kinds of cells that are ignored. Must
 stay: keys and docstring of `File` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); names
 of data, which are those of frames by `results.vtu` (a new one also goes to `BY_VTK` of `mesh_readers`); the order of
-nodes and lines of a file. Tests: ``tests/net/test_mesh_files.py``, ``tests/net/test_webs.py``.
+nodes and lines of a file; `remarks`, which `runner` imports. Tests: ``tests/net/test_mesh_files.py``,
+``tests/net/test_webs.py``.
 """
 
 from __future__ import annotations

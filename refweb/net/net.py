@@ -5,7 +5,8 @@ and numbers of elements.
 
 May change: how properties are computed. Must stay: names of fields and properties, which effects (of users too),
 solvers and observables read; a default for a new field, so that `discretisation` may omit it; that a net is never
-changed in place. Bodies' and internal rows stand behind the nodes. Tests: ``tests/net/test_elements.py``,
+changed in place. Bodies' and internal rows stand behind the nodes. Must stay as well: `Net`, which
+`dynamics.half_turns`, `effects.around` and other files import. Tests: ``tests/net/test_elements.py``,
 ``tests/test_contract.py``.
 """
 

@@ -1,8 +1,9 @@
 """Keys of lines that yield: yield stress, and hardening, a number or a curve of stress over plastic strain.
 
 May change: private functions and texts of errors. Must stay: names in `KEYS`, which are fields of `Cable` and `Group`;
-equally many points in the curves of all lines, which `effects.plastic` needs; `LAW`, a name in `registry.LAWS`. Tests:
-``tests/effects/test_plastic.py``.
+equally many points in the curves of all lines, which `effects.plastic` needs; `LAW`, a name in `registry.LAWS`;
+`yield_curves`, which `effects.plastic` and `cable` import; `check_yield` and `hardening_key`, which `cable` imports;
+`plastic_strain_of`, which `tension_laws` imports. Tests: ``tests/effects/test_plastic.py``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,10 @@
 """Rotations as quaternions (w, x, y, z) of any length but zero, and as rotation vectors [rad], in Python.
 
 May change: how they are computed. Must stay: the order (w, x, y, z) and rotation vectors in rad, which scenes,
-`effects.motion` and `dynamics.controllers` have. `net.rotation` has the same for compiled code. Tests:
-``tests/dynamics/test_attitude.py``, ``tests/effects/test_moved_bodies.py``.
+`effects.motion` and `dynamics.controllers` have. `net.rotation` has the same for compiled code. Must stay as well:
+`of_vector` and `product`, which `dynamics.controllers` and `effects.motion` import; `interpolated` and
+`rotation_between`, which `dynamics.controllers` imports. Tests: ``tests/dynamics/test_attitude.py``,
+``tests/effects/test_moved_bodies.py``.
 """
 
 from __future__ import annotations

@@ -50,7 +50,9 @@ refuses a shape without one. An entry point of your package makes it known to sc
 # tests/how_to/test_body_shape.py runs; names of fields and methods of `Shape` and `Grown`, which shapes of users give
 # and kernels of effects.contact read; names of fields of `RigidBody`, which effects, system and results read; rows of
 # bodies behind the nodes and rows of rotation behind these, which checkpoints name by `row_names`. Other tests:
-# tests/effects/test_contact.py, tests/effects/test_tumbling.py.
+# tests/effects/test_contact.py, tests/effects/test_tumbling.py. Must stay as well: `matrix_of`, which
+# `dynamics.initial_state` and `effects.body` import; `axes_of`, which `effects.orbit`, `shapes.box` and `shapes.filled`
+# import; `Axle`, which `effects.axle` imports; `with_rotations`, which `system.system` imports.
 
 from __future__ import annotations
 

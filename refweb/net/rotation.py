@@ -22,7 +22,8 @@ counts its part of I once. The second component of the second row of rotation is
 May change: private functions, `TURN`, `TERMS` and `SMALL`, as long as the flow stays exact to rounding. Must stay: the
 meaning of both rows of rotation (quaternion, q₀ − 1, angle about an axle), which `effects`, `system`,
 `results.observables` and checkpoints read; names in ``apart``, keys of `dynamics.integrators.features`; the order of
-sums, which decides the last digits of bodies that turn. Tests: ``tests/net/test_rotation.py``,
+sums, which decides the last digits of bodies that turn; all names that `system.attached_nodes`, `integrators.step` and
+other files import; public names of `RigidRotations`, which other files use. Tests: ``tests/net/test_rotation.py``,
 ``tests/effects/test_tumbling.py``, ``tests/effects/test_axles.py``.
 
 References

@@ -4,7 +4,8 @@ See `refweb.net.rotation`.
 
 May change: a bound, if it stays above the exact value. Must stay: names in ``apart``, keys of
 `dynamics.integrators.features`; arguments and results, which `step_bound`, `ccd`, `explicit_loop` and `neighbour_list`
-of `dynamics.integrators` use. Tests: ``tests/net/test_rotation.py``.
+of `dynamics.integrators` use; all names that `integrators.step_bound`, `integrators.explicit_loop` and other files
+import. Tests: ``tests/net/test_rotation.py``.
 """
 
 from __future__ import annotations

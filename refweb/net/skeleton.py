@@ -10,8 +10,9 @@ weights of both rows add up to 1 at the deepest point of the rim, so that a roll
 
 May change: `MOST`, above which a mesh is refused; `FLAT`, which changes contact of meshes with bodies. Must stay:
 fields of `PART`, which `effects.contact` reads by name and width; numbers of `POINT`, `SEGMENT` and `ARC`; `ARCS`, on
-which contact of rims depends; the order of parts, which decides the last digits of contact between bodies. Tests:
-``tests/effects/test_between_bodies.py``.
+which contact of rims depends; the order of parts, which decides the last digits of contact between bodies;
+`of_cylinder`, which `shapes.cylinder` imports; `of_box`, which `shapes.box`, `shapes.capsule` and `shapes.sphere`
+import; `of_surface`, which `shapes.filled` imports. Tests: ``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

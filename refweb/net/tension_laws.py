@@ -2,8 +2,9 @@
 
 Each law is a class of `refweb.net.laws`; `Law` evaluates one of them over arrays, without a net.
 
-May change: texts of errors. Must stay: `Law` with its arguments and methods, which `refweb` exports; `law_of` and
-`names_in`, by which `cable`, `discretisation`, `law_keys` and `effects.thread` find laws. Tests:
+May change: texts of errors. Must stay: `Law` with its arguments and methods, which `refweb` exports and
+`system.weak_form` takes; `law_of` and `names_in`, by which `cable`, `discretisation`, `law_keys`, `effects.thread`,
+`studies.form` and `results.observables.line` find laws; `strains_of`, which `cable` and `studies.form` call. Tests:
 ``tests/net/test_laws.py``.
 """
 

@@ -3,7 +3,8 @@
 May change: `NEAR`, which decides when rings count as together; `TAUT` upwards, by which explicit steps are shorter.
 Must stay: fields and properties of `ThreadLine`, which `effects.thread` makes and effects, `results.observables` and
 `statics` read by name; the order in ``numbers`` (record, 1/A, then four columns for each segment), which
-`effects.thread_segments` reads; `COLUMNS`, the first numbers that a thread observes. Tests:
+`effects.thread_segments` reads; `COLUMNS`, the first numbers that a thread observes; `thread_line`, which
+`effects.thread` imports; `coincident_nodes`, which `dynamics.simulation` and `statics.thread_reasons` import. Tests:
 ``tests/effects/test_thread.py``, ``tests/effects/test_thread_friction.py``.
 """
 

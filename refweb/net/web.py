@@ -2,8 +2,8 @@
 
 May change: private functions and texts of errors; `_TIE` decides which node is the centre. Must stay: fields and
 methods of `Web`, which `refweb` exports, with arrays that are read-only; words in `SELECTIONS`, which are the scene
-format; the order in which `find` and `find_lines` return numbers. Tests: ``tests/net/test_webs.py``,
-``tests/net/test_groups.py``.
+format; the order in which `find` and `find_lines` return numbers; `in_range`, which `inline` imports. Tests:
+``tests/net/test_webs.py``, ``tests/net/test_groups.py``.
 """
 
 from __future__ import annotations

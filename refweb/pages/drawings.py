@@ -2,8 +2,8 @@
 
 May change: sentences, `PEAK`, `HEAVIEST`, `LIKE_STRESS`, and the number of plots (`FIRST_PLOTS`, `LAST_PLOTS`). Must
 stay: ids of elements in `_view`, which ``view.js`` and ``hand.js`` find; keys that `space` adds to the head, which
-these scripts read; classes, which ``page.css`` knows. Tests: ``tests/pages/test_page.py``,
-``tests/pages/test_browser.py``.
+these scripts read; classes, which ``page.css`` knows; `frames_of`, which `page` imports. Tests:
+``tests/pages/test_page.py``, ``tests/pages/test_browser.py``.
 """
 
 from __future__ import annotations

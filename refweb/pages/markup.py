@@ -4,7 +4,8 @@ A template engine, jinja2, would need 24 lines for the same elements in place of
 
 May change: private functions and attributes that no style or script reads. Must stay: that each text that is no `Html`
 is escaped here (notebooks do so in `results.notebook`); ``wide``, ``last`` and ``data-label``, which ``page.css``
-reads; the form of `section`, by which `page` finds contents. Tests: ``tests/pages/test_page.py``.
+reads; the form of `section`, by which `page` finds contents; all names that `study`, `sections` and other files import.
+Tests: ``tests/pages/test_page.py``.
 """
 
 from __future__ import annotations

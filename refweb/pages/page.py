@@ -2,8 +2,9 @@
 
 May change: private functions, the order of sections and sentences. Must stay: names that `filled` gives, which
 ``page.html`` has; the order of `SCRIPTS`, in which they run; the hash of a script, which is that of its text between
-the tags of ``page.html``, line breaks included: browsers run no other; `NAME`, the file, and `ENDINGS`. Tests:
-``tests/pages/test_page.py``, ``tests/pages/test_browser.py``.
+the tags of ``page.html``, line breaks included: browsers run no other; `NAME`, the file, and `ENDINGS`; `report_of`,
+which `solution` imports; `report`, which `commands.report`, `commands.view` and `sizing.size` import; `sheet`, which
+`commands.report` imports. Tests: ``tests/pages/test_page.py``, ``tests/pages/test_browser.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 May change: private functions, headings, `KINDS`, `LONGEST` and the order of rows; sentences belong in
 `results.summary_text`. Must stay: keys that are read, those of ``run.json`` and ``scene.toml``; classes, which
-``page.css`` knows; identities of sections, which are links. Tests: ``tests/pages/test_page.py``.
+``page.css`` knows; identities of sections, which are links; `simulated`, which `page` imports. Tests:
+``tests/pages/test_page.py``.
 """
 
 from __future__ import annotations

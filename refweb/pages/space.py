@@ -10,8 +10,8 @@ colour bar.
 
 May change: private functions, `LARGEST`, `MOST`, `HIDDEN`, `LEFT_OUT` and `FIRST`, which decide how many frames and
 which fields come first. Must stay: keys of `head`, and names and types of arrays, which ``model.js`` and ``view.js``
-read, and to which `drawings.space` adds keys; `places` and `values`, by which tests read them back. Tests:
-``tests/pages/test_page.py``, ``tests/pages/test_browser.py``.
+read, and to which `drawings.space` adds keys; `places` and `values`, by which tests read them back; `space_of`, which
+`drawings` imports. Tests: ``tests/pages/test_page.py``, ``tests/pages/test_browser.py``.
 """
 
 from __future__ import annotations

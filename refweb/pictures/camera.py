@@ -2,8 +2,9 @@
 
 May change: private functions, positions on the page (`ALONE` to `BESIDE`), `TANGENT`, `MANY`, and which view is chosen.
 Must stay: names in `VIEWS`, which are values of ``refweb picture --view``; methods of `View`, which `render`,
-`polygons`, `stage` and `pages.space` call; `choose` and `nearby`, from which `pages.space` takes its first view. Tests:
-``tests/pictures/test_pictures.py``, ``tests/pictures/test_large.py``.
+`polygons`, `stage` and `pages.space` call; `choose`, `outermost` and `MANY`, which `stage` uses; `choose` and `nearby`,
+from which `pages.space` takes its first view; a single oblique view stands at `WHOLE`, on which `gym.images` counts.
+Tests: ``tests/pictures/test_pictures.py``, ``tests/pictures/test_large.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Panel of stress, tension or strain of lines over their distance from the point of impact or load.
 
 May change: all of the drawing, and `MANY`. Must stay: `FIELDS`, which are fields of frames and of which `plots.kinds`
-makes names of plots (values of ``refweb plot --quantity``). Tests: ``tests/pictures/test_plots.py``.
+makes names of plots (values of ``refweb plot --quantity``); `distances`, which `plots` imports. Tests:
+``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

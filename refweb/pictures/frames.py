@@ -4,7 +4,8 @@
 
 May change: private functions and `POINTS_ALONG_A_CURVE`. Must stay: kinds of cells in `CELLS` and names of data that
 are read, which `results.vtu` gives, and keys of the checkpoint, which `results.folder` gives; fields of `Frame`, which
-pictures, pages and `gym.images` read by name. Tests: ``tests/pictures/test_pictures.py``,
+pictures, pages and `gym.images` read by name; `listed`, which `solution`, `paraview` and `record` import; `number_of`,
+which `solution` and `record` import. Tests: ``tests/pictures/test_pictures.py``,
 ``tests/pictures/test_over_frames.py``.
 """
 

@@ -2,8 +2,8 @@
 
 May change: private functions and all of the drawing, `OF_ALL` and `MOST_TICKS` among it. Must stay: the functions that
 `plots` calls, one for each kind of plot, each of which gives panels of `sheet`; `clock_of`, `tick_steps` and
-`bounds_of`, which `balances` and `distances` call. Tests: ``tests/pictures/test_plots.py``,
-``tests/pictures/test_limits.py``.
+`bounds_of`, which `balances` and `distances` call; `across`, `history` and `of_modes`, which `plots` imports. Tests:
+``tests/pictures/test_plots.py``, ``tests/pictures/test_limits.py``.
 """
 
 from __future__ import annotations

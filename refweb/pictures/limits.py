@@ -1,8 +1,8 @@
 """Limits of axes, from values without ±; a bar of ± beyond a limit is cut and marked by an arrow and its ±.
 
 May change: private functions, `MARGIN`, `MOST_NUMBERS`, `NEAR` and marks. Must stay: `limit`, `limit_along` and
-`bar_of`, by which plots of runs and studies set most of their axes; limits that follow from values and not from ±.
-Tests: ``tests/pictures/test_limits.py``.
+`bar_of`, by which plots of runs and studies set most of their axes; limits that follow from values and not from ±;
+`Bar`, which `histories` and `studies` import. Tests: ``tests/pictures/test_limits.py``.
 """
 
 from __future__ import annotations

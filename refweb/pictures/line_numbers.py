@@ -1,7 +1,7 @@
 """Numbers of lines on a picture: lines with the largest values first, without overlaps.
 
-May change: all but `number_lines`, its arguments and its result, the text that `pictures` writes below the picture.
-Tests: ``tests/pictures/test_over_frames.py``.
+May change: all else. Must stay: `number_lines`, its arguments and its result, the text that `pictures` writes below the
+picture; `_apart`, which a test calls. Tests: ``tests/pictures/test_over_frames.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The largest value of a quantity over a run, in particular of tension, from ``run.json`` and ``scene.toml``.
 
 May change: words of `when`. Must stay: keys that are read, those of ``run.json`` and ``scene.toml``; fields of
-`Largest`, which `pages.sheet_text` and `over_frames` read. Tests: ``tests/pages/test_sheet.py``,
+`Largest`, which `pages.sheet_text` and `over_frames` read; `observed`, which `pages.sheet_text` and `over_frames`
+import; `largest_tension`, which `pages.sheet` imports. Tests: ``tests/pages/test_sheet.py``,
 ``tests/pictures/test_over_frames.py``.
 """
 

@@ -7,8 +7,9 @@ of it can be compared. Slack lines are grey if the field is a tension, stress or
 
 May change: private functions, `SIZE`, and `MOST_SCALED`, a limit of what is accepted. Must stay: names in `LABELS`,
 values of ``--labels``; names of the arguments of `picture`, which `refweb` exports and to which `commands.picture`
-gives its options as keywords; `target`, `drawn`, `png` and `record_of`, which pages, `film`, `plots` and
-`commands.gradient` call. Tests: ``tests/pictures/test_pictures.py``.
+gives its options as keywords; `target`, `drawn`, `png` and `record_of`, which pages, `film`, `plots`, `paraview`,
+`solution` and `commands.gradient` call; all names that `film`, `plots` and other files import. Tests:
+``tests/pictures/test_pictures.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
 """Data of a record for plots: history with units, results with ±, and the style among several records.
 
 May change: private functions and texts. Must stay: properties of `Shown`, which panels read by name; names and units
-from heads of tables, ``NAME [unit]``, a file format. Tests: ``tests/pictures/test_plots.py``.
+from heads of tables, ``NAME [unit]``, a file format; `refuse_spoilt`, which `plots` imports; `unit_of`, which
+`balances`, `distances` and other files import; `bar` and `text_of`, which `histories` imports. Tests:
+``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

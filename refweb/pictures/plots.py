@@ -4,8 +4,9 @@
 
 May change: private functions, titles, and which plots are usual. Must stay: names of plots, with `SPECTRUM` and
 `DISTANCE`, which are values of ``refweb plot --quantity``; arguments of `plot`, to which `commands.plot` gives its
-options; `draw`, `kinds` and `as_svg`, which pages call; `LETTERS_STAY` and `BESIDE`, which make equal plots equal
-files. Tests: ``tests/pictures/test_plots.py``.
+options; `draw`, `kinds` and `as_svg`, which pages call, and `solution` the first of them; `LETTERS_STAY` and `BESIDE`,
+which make equal plots equal files; `ENDINGS`, which `solution` imports; `write`, which `solution`, `sizing` and
+`studies` import; public names of `Plotted`, which other files use. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

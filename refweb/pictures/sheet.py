@@ -2,7 +2,8 @@
 
 May change: all constants: sizes, fonts, marks, and colours that colour-blind people can tell apart. Must stay: at least
 as many `COLOURS` as `results.error_budget.PARTS`; names here, from which all plots take styles; extremes in `telling`,
-so that no peak is left out. Tests: ``tests/pictures/test_plots.py``.
+so that no peak is left out; all names that `histories`, `balances` and other files import; public names of `Ink`, which
+other files use. Tests: ``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 May change: private functions, the drawing and its texts, `DECADES` among it; `STANDS_OUT` and `WIDTH_OF_A_LINE`, by
 which peaks are named; `EVEN`, up to which rows count as even. Must stay: `FEWEST`, from which on `plots` offers a
-spectrum; amplitudes and frequencies of `spectrum_of`. Tests: ``tests/pictures/test_plots.py``.
+spectrum; amplitudes and frequencies of `spectrum_of`; `_peak`, which a test calls. Tests:
+``tests/pictures/test_plots.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 May change: private functions, colours and sizes here: `paraview` and `pages.space`, which takes `UNITS` as well, have
 them from this file, so that all show a field alike. Must stay: their names; fields of `Look` and methods of `Stage`,
-which `pictures`, `film` and `gym.images` use; `LARGEST`, which `over_frames` and `line_numbers` know. Tests:
+which `pictures`, `film` and `gym.images` use; `LARGEST`, which `over_frames` and `line_numbers` know; all names that
+`pages.space`, `paraview` and other files import; public names of `Seen`, which other files use. Tests:
 ``tests/pictures/test_pictures.py``, ``tests/pictures/test_over_frames.py``.
 """
 

@@ -1,8 +1,8 @@
 """Parts of a docstring in the style of numpydoc.
 
 May change: how sections are found. Must stay: titles of sections of numpydoc, which docstrings of tables have; what the
-functions return, of which `pages` and `schema` make help, ``validation/REFERENCE.md`` and the schema. Tests:
-``tests/reference/test_help.py``, ``tests/reference/test_schema.py``.
+functions return, of which `pages` and `schema` make help, ``validation/REFERENCE.md`` and the schema; all names that
+`pages` and `schema` import. Tests: ``tests/reference/test_help.py``, ``tests/reference/test_schema.py``.
 """
 
 from __future__ import annotations

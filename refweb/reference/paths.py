@@ -8,7 +8,8 @@ whose lines do not touch each other.
 
 May change: private functions, texts of errors and `LONGEST`. Must stay: the form of paths, which users write in
 ``--set``, in study files and in requirements; `with_value`, which gives a new dict and changes none, for `scene`,
-`sweeps`, `sizing`, `gym`, `statics.gradients` and `dynamics.parameters`. Tests: ``tests/reference/test_paths.py``.
+`sweeps`, `sizing`, `gym`, `statics.gradients` and `dynamics.parameters`; `read_settings`, which `commands.arguments`
+imports. Tests: ``tests/reference/test_paths.py``.
 """
 
 from __future__ import annotations

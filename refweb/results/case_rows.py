@@ -11,7 +11,7 @@ Rows are in the order in which cases end while a study runs, and in the order of
 May change: private functions; how rows are buffered and read. Must stay: names of files (`NAME`, `ASIDE`), names and
 endings of columns above and in `FIRST` and `LAST`, a file format that `sweeps`, `sizing.runs`, `pages.study` and
 `pictures.studies` read (a new column may be added); a row that is appended as a whole; numbers that read back to the
-same floats. Tests: ``tests/sweeps/test_sweep.py``.
+same floats; all names that `sweeps.sweep`, `sizing.runs` and other files import. Tests: ``tests/sweeps/test_sweep.py``.
 """
 
 from __future__ import annotations

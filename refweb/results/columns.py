@@ -4,8 +4,9 @@ Statics and dynamics write these columns. No observable, event, body or group ma
 
 May change: only with the file format of ``history.csv``. Must stay: names of columns, `FIRST`, `VECTORS` and `AXES`
 among them, some of which `dynamics.history`, `results.state` and `pictures.balances` repeat; vectors as the last;
-`taken`, by which `build` refuses the same name of an observable. Tests: ``tests/test_build.py``,
-``tests/results/test_results.py``.
+`taken`, by which `build` refuses the same name of an observable; `components`, which `dynamics.history` and
+`integrators.integrator` import; `dynamic_energies`, which `dynamics.history` imports; `static_energies`, which `state`
+and `statics.simulation` import. Tests: ``tests/test_build.py``, ``tests/results/test_results.py``.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ May change: private functions and texts. `ALLOWED`, `FAR_WITHIN`, `ZERO`, `MOST_
 between verdicts. Must stay: names of parts and verdicts (`PARTS`, `NONE`, `OPEN`, `VERDICTS`), which stand in
 ``run.json`` and ``results.csv`` (a new part needs `WORDS` and a colour of `pictures.sheet.COLOURS`); `SMOOTHED`, which
 follows from `SMOOTHING_SHARE`, the smoothing of the runs in `studies.further_runs` and `statics.smoothing_error`; ± as
-the sum of the known parts; an effect is in `EXACT` only if more elements change nothing. Tests:
-``tests/results/test_error_budget.py``.
+the sum of the known parts; an effect is in `EXACT` only if more elements change nothing; all names that
+`studies.further_runs`, `runner` and other files import. Tests: ``tests/results/test_error_budget.py``.
 """
 
 from __future__ import annotations

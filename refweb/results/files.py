@@ -3,7 +3,8 @@
 May change: private functions; names of files while they are written, which begin with ``.refweb-``
 (`results.folder.RESULT_FILES`). Must stay: that a file is whole or not there; `number`, which reads back to the same
 float; the order of tables in `as_toml`, by which forces are added up: another order changes the last digits of a run
-from that file. Tests: ``tests/test_scene.py``, ``tests/test_faults.py``.
+from that file; `write_atomically`, which `commands.gradient`, `commands.new` and other files import; `write_text`,
+which `commands.new`, `pages.page` and other files import. Tests: ``tests/test_scene.py``, ``tests/test_faults.py``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ is written first, then the frame and the checkpoint of its state, and then its e
 
 May change: private functions and texts of errors. Must stay: names of files and `TABLES`, each of which `RESULT_FILES`
 lists (``--force`` removes these alone; a new one goes there); keys of the checkpoint, which `dynamics` and
-`pictures.frames` read; the order in which a frame is written; ``run.json`` as last of a copy. Tests:
+`pictures.frames` read; the order in which a frame is written; ``run.json`` as last of a copy; all names that `runner`,
+`sweeps.sweep` and other files import; public names of `Folder`, which other files use. Tests:
 ``tests/results/test_results.py``, ``tests/test_faults.py``.
 """
 

@@ -2,7 +2,7 @@
 
 May change: `DELAY`, `APART`, `EVERY`, `BEGUN`, private functions and texts. Must stay: `followed` and the call
 ``tell(text, share)`` that it yields, which `runner` and verbs pass on; a phase is known by its text without numbers,
-before the first comma. Tests: ``tests/results/test_loaded.py``.
+before the first comma; `duration`, which `sweeps.sweep` imports. Tests: ``tests/results/test_loaded.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 May change: private functions and how time is measured. Must stay: words of status ("solved", "failed", "interrupted")
 and keys of ``cost`` (``cpu_s``, ``wall_s``, ``compile_s``), which stand in ``run.json`` and which pictures, pages and
-studies read. Tests: ``tests/results/test_run_status.py``.
+studies read; `Clock`, which `runner`, `sizing.size` and other files import; `recorded`, which `runner`, `sizing.size`
+and other files import. Tests: ``tests/results/test_run_status.py``.
 """
 
 from __future__ import annotations

@@ -2,8 +2,11 @@
 
 May change: the text that `Names` shows, and words in `OTHER_ERRORS`, not its keys. Must stay: keys of `summary` and
 `plain`, the format of ``run.json``, which `read_results`, pictures, pages and users read; names of fields, which
-statics, dynamics, `studies.modes` and users fill or read (a new one needs a default, so that older files can be read).
-Tests: ``tests/results/test_results.py``, ``tests/results/test_loaded.py``.
+statics, dynamics, `studies.modes` and users fill or read (a new one needs a default, so that older files can be read);
+`SolutionData` with its public names, which `solution` and `pictures.pictures` import; `as_history`, which `runner`,
+`dynamics.stepped_run` and other files import; `Result` with its public names, which `dynamics.history`,
+`dynamics.simulation` and other files import; `SOLVER`, which `dynamics.simulation`, `statics.simulation` and
+`studies.modes` import. Tests: ``tests/results/test_results.py``, ``tests/results/test_loaded.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,9 @@
 
 May change: `STIFF`, `MUCH` and texts of findings. Must stay: names of properties, which observables (of users too),
 frames and remarks read; keys of `margin_of`, which stand in ``run.json``; codes of findings, which stand in
-`refweb.findings.CODES`. Tests: ``tests/results/test_results.py``, ``tests/results/test_observable_contract.py``.
+`refweb.findings.CODES`; `curve_remark` and `strain_remark`, which `dynamics.simulation` and `statics.remarks` import;
+`floor_remark`, which `dynamics.simulation`, `statics.remarks` and `studies.mode_remarks` import; public names of
+`State`, which other files use. Tests: ``tests/results/test_results.py``, ``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

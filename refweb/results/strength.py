@@ -2,7 +2,8 @@
 
 May change: texts of findings, and `ALIKE`, a tolerance. Must stay: keys of ``plain``, which stand in ``run.json`` and
 which `read_utilisation` reads; `UTILISATION`, a tuple, so that no name of a result is equal to it; `Utilisation`, which
-statics and dynamics fill. Tests: ``tests/results/test_strength.py``.
+statics and dynamics fill; `strength_remark`, which `dynamics.simulation`, `statics.remarks` and `statics.simulation`
+import; `of_observable`, which `error_budget` imports. Tests: ``tests/results/test_strength.py``.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ A summary is the content of ``run.json``. The console and the page of a run show
 
 May change: private functions, `FEW_BREAKS` and texts, which are for readers, but for "t = " and "at " in cells of
 `rows_of_results`, which `pages.sections` takes off. Must stay: keys that are read, those of ``run.json``; the
-functions, which `commands.console` and `pages` call. Tests: ``tests/results/test_results.py``,
-``tests/results/test_strength.py``.
+functions, which `commands.console` and `pages` call; all names that `commands.console`, `pages.sections` and other
+files import. Tests: ``tests/results/test_results.py``, ``tests/results/test_strength.py``.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 May change: private functions; `PREFIXES`, `FIXED` and `MOST_DIGITS` with the tests that pin the notation alone: no
 program reads these texts, ``run.json`` has plain numbers. Must stay: `prefixed`, `scale_of`, `with_error`, `readable`
-and their arguments, which the console, pages and pictures call, so that all show a number alike. Tests:
-``tests/results/test_loaded.py``.
+and their arguments, which the console, pages and pictures call, so that all show a number alike; `other_errors`, which
+`pictures.plot_data`, `notebook` and `summary_text` import; `larger`, which `commands.console` and `summary_text`
+import; `position_text`, which `notebook` and `summary_text` import. Tests: ``tests/results/test_loaded.py``.
 """
 
 import math

@@ -3,8 +3,8 @@
 meshio 5.3 takes 13 ms and 418 kB for a frame of the web of hexagon-impact, of 3 554 nodes and 5 165 elements.
 
 May change: private functions; `SHAPE_SIZE`, the drawn size of a mode. Must stay: names of data, a file format that
-`net.mesh_file`, `pictures.frames` and ParaView read (a new one may be added); points in the order of the net's nodes.
-Tests: ``tests/results/test_frames.py``.
+`net.mesh_file`, `pictures.frames` and ParaView read (a new one may be added); points in the order of the net's nodes;
+`write_mesh`, which `folder` imports. Tests: ``tests/results/test_frames.py``.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 May change: private functions, `NEAR` and `MOST`, how many lines and nodes have derivatives of their own, and `STEP`.
 Must stay: names in `QUANTITIES` (`SIZES`, `STRENGTH`, `FREQUENCY`), which formulas of users have; fields of `Task`,
-which travels by pickle; names of columns by `slope_of` and `part_of`, which `smooth` reads in ``results.csv``. Tests:
-``tests/sizing/test_size.py``.
+which travels by pickle; names of columns by `slope_of` and `part_of`, which `smooth` reads in ``results.csv``;
+`sizes_of`, which `problem` imports. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ where all parts of one of its sides do, each without ``or``: its disjunctive nor
 
 May change: private functions and how trees are walked; `FALSE` and `TRUE`, of which only the sign counts. Must stay:
 the sign and scale of a reserve, on which `problem`, `runs` and `smooth` rest; value and gradient of one formula;
-intervals that are never narrower than the exact ones. Tests: ``tests/sizing/test_size.py``.
+intervals that are never narrower than the exact ones; `MOST_SIDES`, which `problem` and `size` import; `Criterion` with
+its public names, which `problem` imports. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

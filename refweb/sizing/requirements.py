@@ -2,8 +2,11 @@
 
 May change: private functions, texts of errors, `MOST_RUNS` and `MOST_WHOLE`. Must stay: keys, defaults and docstring of
 `Sizing` (format of requirements files and help; after a change write ``validation/REFERENCE.md`` anew); names in
-`METHODS` and `KEYS`; `SCENE_FILE`, a file of the folder; `Free`, `Listed` and `Catalogue`, which `space` reads. Tests:
-``tests/sizing/test_size.py``, ``tests/sizing/test_shipped_sizings.py``.
+`METHODS` and `KEYS`; `SCENE_FILE`, a file of the folder; `Free`, `Listed` and `Catalogue`, which `space` reads, and
+`problem` the first of them; `load`, which `commands.info`, `commands.size` and `size` import; `is_sizing`, which
+`commands.check` and `commands.info` import; `shipped`, which `commands.list` imports; public names of `Sizing`,
+`Requirement` and `Free`, which other files use. Tests: ``tests/sizing/test_size.py``,
+``tests/sizing/test_shipped_sizings.py``.
 """
 
 from __future__ import annotations

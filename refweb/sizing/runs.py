@@ -5,7 +5,8 @@ killed loses only the runs that its workers had begun.
 
 May change: private functions and texts of progress; `FAILED`, which is below 0. Must stay: the key of a run (digest of
 its scene and of its `Task`), as with another one all runs of stored sizings are made again; rows that are appended as a
-whole; fields of `Judged`, which `size`, `search` and `smooth` read. Tests: ``tests/sizing/test_size.py``.
+whole; fields of `Judged`, which `size`, `search` and `smooth` read; `Spent`, which `search` imports; `middle`, which
+`smooth` imports; public names of `Runs`, which other files use. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 May change: private functions and notes for readers; `GOVERNS` and `SHOWN`, which decide what these say. Must stay:
 `size`, its arguments and result, and attributes of `Sized`, which `refweb` exports; keys of `Sized.summary`, which are
-those of ``run.json`` and which `results.sizing_text` and `pictures.sizing` read; names of files in the folder. Tests:
-``tests/sizing/test_size.py``.
+those of ``run.json`` and which `results.sizing_text` and `pictures.sizing` read; names of files in the folder;
+`prepared`, which `commands.arguments` imports. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ t, which is least, with t ≥ f of each that is close.
 May change: `INSIDE`, `STEP`, `PRECISE`, `BY_DIFFERENCES`, `NEAR`, `ACTIVE`, `ROUNDED` and `FARTHEST`, by which an
 optimum is found within other tolerances and takes more or fewer runs. Must stay: `Smooth` and what it returns, an
 `Optimum`, which `search` takes; columns that are read, by `case.slope_of` and `case.part_of`; conditions of an optimum,
-which tests check. Tests: ``tests/sizing/test_size.py``.
+which tests check; public names of `Smooth`, which other files use. Tests: ``tests/sizing/test_size.py``.
 """
 
 from __future__ import annotations

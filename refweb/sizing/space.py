@@ -5,7 +5,8 @@ listed values, whole numbers, rows of a catalogue and scenes.
 
 May change: private functions and texts of errors. Must stay: the order of free numbers and options in a `Design`, which
 `problem`, `runs`, `search` and `smooth` count by; `SCENE`, a name in conditions, and the paths of `DIAMETER`; the
-starts for a seed, by which a sizing that continues finds its runs again. Tests: ``tests/sizing/test_size.py``,
+starts for a seed, by which a sizing that continues finds its runs again; `setting`, which `problem` imports; public
+names of `Space` and `Option`, which other files use. Tests: ``tests/sizing/test_size.py``,
 ``tests/sizing/test_shipped_sizings.py``.
 """
 

@@ -9,10 +9,12 @@ has the derivative
 dλ/dξ, so that its derivatives are those of the tension: by EA, T/EA; by natural length, −(1 + ε) T'/L. Of masses they
 are the accelerations of gravity and of rotating axes, of loads λ itself, and of positions of supports −Kᵀ λ there.
 
-May change: private functions and the two constants of corrections. Must stay: fields of `Sensitivity` and properties of
-`LineState`, which `gradients`, `responses` and `studies.frequency_gradients` read; signs of λ and ∂J/∂p as above. A
-term that depends on numbers of lines in a way that is not here must not be in `gradients.KNOWN`, or its gradients are
-wrong. Tests: ``tests/statics/test_gradients.py``.
+May change: private functions and the two constants of corrections. Must stay: public names of `Adjoint`, which
+`gradients`, `responses` and `studies.frequency_gradients` use, and `multipliers` also `dynamics.parameters`; `MASSES`,
+which `studies.frequency_gradients` imports; fields of `Sensitivity` and properties of `LineState`, which `gradients`,
+`responses` and `studies.frequency_gradients` read; signs of λ and ∂J/∂p as above. A term that depends on numbers of
+lines in a way that is not here must not be in `gradients.KNOWN`, or its gradients are wrong. Tests:
+``tests/statics/test_gradients.py``.
 """
 
 from __future__ import annotations

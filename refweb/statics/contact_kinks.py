@@ -4,7 +4,9 @@ See `refweb.statics.shared_push` for the equilibria in which they share it.
 
 May change: `ALIKE`, `APART` and words of texts. Must stay: arguments of the functions that `equilibrium`, `remarks`,
 `dynamics.simulation` and `studies.modes` call; keys (body, line) of `shared_by`. No number of a result depends on this
-file. Tests: ``tests/statics/test_contact_kinks.py``.
+file. Must stay as well: `jumps`, which `dynamics.simulation` imports; `no_modes`, which `studies.modes` imports;
+`kink_remark`, which `equilibrium` imports; `sharing_remark`, which `remarks` imports. Tests:
+``tests/statics/test_contact_kinks.py``.
 """
 
 from __future__ import annotations

@@ -32,7 +32,8 @@ precision where the platform has it, because the remaining unbalanced force ente
 May change: the three constants, and how forces are corrected: any correction proves a bound, a better one a smaller
 bound. Must stay: each term of the gap is at least 0 and holds its rounding, else nothing is proven; names of the fields
 of `DualityBound`, which `simulation`, `floating` and `results.observables` read. `thread_bars` brings the same arrays
-for threads. Tests: ``tests/statics/test_statics.py``, ``tests/net/test_curves.py``.
+for threads. Must stay as well: `duality_bound`, which `dynamic_relaxation`, `load_steps` and `monotone_loading` import.
+Tests: ``tests/statics/test_statics.py``, ``tests/net/test_curves.py``.
 """
 
 from __future__ import annotations

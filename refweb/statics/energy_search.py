@@ -5,8 +5,8 @@ instead.
 
 May change: constants and the rule of the search: they decide how many steps `newton` takes; what counts as an
 equilibrium, the residual decides. Must stay: arguments and answer of `along`, the same as those of
-`residual_search.ResidualSearch.along`, since `newton` calls either; each step goes down in energy. Tests:
-``tests/statics/test_statics.py``.
+`residual_search.ResidualSearch.along`, since `newton` calls either; each step goes down in energy; `EnergySearch`,
+which `newton` imports. Tests: ``tests/statics/test_statics.py``.
 """
 
 from __future__ import annotations

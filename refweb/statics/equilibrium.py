@@ -6,7 +6,8 @@ solved.
 
 May change: words of messages, `UNBALANCED`, `WITH_A_WAY_AROUND`. Must stay: fields of `Equilibrium` and `Stability`,
 which statics, studies and `results.observables` read by name; keys of ``stats``, which `simulation` copies into
-``run.json`` by `results.solution.SOLVER`. `TOLERANCE`, `LIMIT` and `force_scale` change digits of all statics. Tests:
+``run.json`` by `results.solution.SOLVER`. `TOLERANCE`, `LIMIT` and `force_scale` change digits of all statics. Must
+stay as well: all names that `shared_push`, `load_steps` and other files import. Tests:
 ``tests/statics/test_statics.py``.
 """
 

@@ -7,7 +7,9 @@ equilibrium, by systems that are built with other values of the number: no equil
 May change: private functions, sizes of steps. Must stay: fields of `Gradient` and keys of `BY_LINE` and `BY_NODE`,
 which users read and write through `Solution.gradient` and ``refweb gradient``; paths are those of ``--set``.
 `dynamics.gradients`, `studies.frequency_gradients` and `sizing.case` use names of this file. `KNOWN` has only terms
-that `adjoint` knows. Tests: ``tests/statics/test_gradients.py``.
+that `adjoint` knows. Must stay as well: all names that `studies.frequency_gradients`, `sizing.case` and other files
+import; public names of `Gradients`, which other files use; `Gradients._refuse_kinks`, which `frequency_gradients`
+calls. Tests: ``tests/statics/test_gradients.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ this way have passed through each other or have slid around each other. The load
 may.
 
 May change: words of ``why`` and `UNFOLLOWED`. Must stay: `record` takes equilibria in their order, from
-`statics.simulation`, which writes ``why`` and ``deepest`` to ``run.json`` and to a finding. Tests:
-``tests/effects/test_self_contact.py``.
+`statics.simulation`, which writes ``why`` and ``deepest`` to ``run.json`` and to a finding; `LinePassage`, which
+`simulation` imports. Tests: ``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

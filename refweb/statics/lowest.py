@@ -13,7 +13,8 @@ energy of the lines that push.
 
 May change: `NOTHING` and `SURE`, and where the second start begins. Must stay: keys ``above_lowest``, ``starts`` and
 ``unsure`` of ``stats``, which `remarks`, `results.summary_text` and ``run.json`` read; ``above_lowest`` is an upper
-bound, or None. Tests: ``tests/statics/test_lowest.py``, which calls private functions too.
+bound, or None; `_above`, `_forces` and `_without_smoothing`, which a test calls. Tests:
+``tests/statics/test_lowest.py``, which calls private functions too.
 """
 
 from __future__ import annotations

@@ -8,7 +8,8 @@ has no bound where a line yields without hardening, since its tension then tells
 May change: `CLOSE`, `pieces_of` and the insides of functions. Must stay: `turned_back` finds each line that was let go,
 else a bound is wrong; functions that `load_steps`, `dynamic_relaxation` and `gradients` call. `of_curves` drops cached
 properties of `System` by the names in `KEPT_BY_LINES`: a new one that follows from terms or numbers of lines belongs
-there. Tests: ``tests/statics/test_monotone_loading.py``.
+there. Must stay as well: `add_bounds`, which `dynamic_relaxation` and `load_steps` import; `corners_of`, which
+`gradients` imports. Tests: ``tests/statics/test_monotone_loading.py``.
 """
 
 from __future__ import annotations

@@ -38,8 +38,8 @@ each solution. Forces without a potential have an unsymmetric tangent, its LU an
 
 May change: constants and the choice of steps: they change numbers of factorizations, and results within the residual.
 Must stay: `solve` accepts a state by the residual of `equilibrium` alone; public attributes and methods of `Newton`,
-which `load_steps`, `lowest`, `interior_point`, `shared_push` and `adjoint` use; keys of ``stats``. Tests:
-``tests/statics/test_reused_factorization.py``, ``test_statics.py``.
+which `load_steps`, `lowest`, `interior_point`, `shared_push`, `smoothing_error` and `adjoint` use; keys of ``stats``.
+Tests: ``tests/statics/test_reused_factorization.py``, ``test_statics.py``.
 """
 
 from __future__ import annotations

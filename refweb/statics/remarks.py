@@ -2,7 +2,8 @@
 
 May change: words of texts, in so far as no test quotes them. Must stay: codes of findings, which stand in
 `findings.CODES` and ``run.json``; `Remarks`, `open_rows`, `remark_on_open` and `on_stability`, which
-`dynamics.simulation` and `studies` call as well. Tests: ``tests/test_findings.py``, ``tests/results/test_remarks.py``.
+`dynamics.simulation` and `studies` call as well; `remarks_on`, which `simulation` imports. Tests:
+``tests/test_findings.py``, ``tests/results/test_remarks.py``.
 """
 
 from __future__ import annotations

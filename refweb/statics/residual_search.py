@@ -6,8 +6,8 @@ displacement, which depends neither on the scale of forces nor on that of stiffn
 
 May change: how far and how often a step is cut: that decides how many steps `newton` takes; what counts as an
 equilibrium, the residual decides. Must stay: arguments and answer of `along`, the same as those of
-`energy_search.EnergySearch.along`, since `newton` calls either. Tests: ``tests/effects/test_follower_loads.py``,
-``test_winch.py``.
+`energy_search.EnergySearch.along`, since `newton` calls either; `ResidualSearch`, which `newton` imports. Tests:
+``tests/effects/test_follower_loads.py``, ``test_winch.py``.
 
 References
 ----------

@@ -9,8 +9,8 @@ solution of K in each step. Where a vibration may grow, the μ are found again t
 solutions with Kᵀ, show how far rounding changes the μ.
 
 May change: numbers of vectors and tolerances. Must stay: fields of `Slowest`, which `stability` reads; ``grows`` is
-True only beyond rounding; seeds are fixed, so that the same run gives the same answer. Tests:
-``tests/statics/test_stability.py``.
+True only beyond rounding; seeds are fixed, so that the same run gives the same answer; `coupling`, which `stability`
+imports. Tests: ``tests/statics/test_stability.py``.
 """
 
 from __future__ import annotations

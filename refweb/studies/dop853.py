@@ -2,7 +2,8 @@
 
 It shares forces, monitors and starts with the methods of refweb and no formula for a step, so that it stays an
 independent reference. May change: `TOLERANCES`, which moves points of the diagram. Must stay: that independence;
-`NAME`, which `trials`, `cost` and `diagram` read. Tests: ``tests/studies/test_cost.py``.
+`NAME`, which `trials`, `cost` and `diagram` read; `Dop853`, which `trials` imports. Tests:
+``tests/studies/test_cost.py``.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 May change: `MAX_MODES`, and texts. Must stay: `COLUMNS` of ``modes.csv``, whose order `_rows` has; names of
 `_described`, which stand in ``run.json`` and which `results.summary_text` reads; ``frequency_N``, which
-`pictures.record` and `sizing.case` know; `modes` and `Modes`, which `refweb` exports. Tests:
-``tests/studies/test_modes.py``, ``tests/studies/test_modes_with_bodies.py``.
+`pictures.record` and `sizing.case` know; `modes` and `Modes`, which `refweb` exports; public names of `Modes`, which
+other files use. Tests: ``tests/studies/test_modes.py``, ``tests/studies/test_modes_with_bodies.py``.
 """
 
 from __future__ import annotations

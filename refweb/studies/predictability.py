@@ -8,7 +8,8 @@ spread, and no run has more.
 
 May change: private functions and texts. Must stay: keys of `horizon` and `ensemble`, which stand in ``run.json`` and
 which `further_runs` and `sweeps.case` read; `PERTURBATION`, with which the horizon in ``run.json`` changes; equal steps
-of both runs. Tests: ``tests/studies/test_horizon.py``, ``tests/dynamics/test_control.py``.
+of both runs; `lost_digits`, which `further_runs` imports. Tests: ``tests/studies/test_horizon.py``,
+``tests/dynamics/test_control.py``.
 """
 
 from __future__ import annotations

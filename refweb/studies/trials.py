@@ -6,8 +6,8 @@ without peaks, files or step refinement.
 
 May change: private functions, `SETTINGS`, from coarse to fine, and `PIECES`; `UNKNOWN`, `OUTSIDE` and `CALL`, which
 only guess times. Must stay: fields of `Trial` and keys of ``work``, which are columns of ``cost.csv``; `OverBudget`,
-which `budget` catches, and `clock`, its measure; labels of methods, those in `STATIC_LADDERS` among them. Tests:
-``tests/studies/test_cost.py``.
+which `budget` catches, and `clock`, its measure; labels of methods, those in `STATIC_LADDERS` among them; `trials_of`,
+`Dynamics` and `Statics`, which `work_precision` imports. Tests: ``tests/studies/test_cost.py``.
 """
 
 from __future__ import annotations

@@ -16,7 +16,8 @@ most the root δ of μδ² + √(γ² + 4κμ) δ = e. This is an estimate, whic
 
 May change: private functions; `MOST`, up to which all eigenvalues are computed, and `SMALL`. Must stay: the order of
 the fields of `Pairs`, which `spectrum` unpacks; the seed, by which a run gives the same result again; `coriolis`, which
-`frequency_gradients` calls. Tests: ``tests/studies/test_turning.py``.
+`frequency_gradients` and `spectrum` call; `turning_pairs`, which `spectrum` imports. Tests:
+``tests/studies/test_turning.py``.
 
 References
 ----------

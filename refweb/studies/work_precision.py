@@ -4,8 +4,9 @@ Trials of all methods, from coarse to fine, run within a budget, see `refweb.stu
 from one of two references of different kinds, see `refweb.studies.references`. A message says if all runs are of one
 kind.
 
-May change: private functions and texts of messages. Must stay: names of the arguments of `cost`, which `refweb` exports
-and to which `commands.cost` gives its options as keywords. Tests: ``tests/studies/test_cost.py``.
+May change: texts of messages. Must stay: `_observable`, which a test calls; names of the arguments of `cost`, which
+`refweb` exports and to which `commands.cost` gives its options as keywords. Tests: ``tests/studies/test_cost.py``,
+``tests/dynamics/test_averages.py``.
 """
 
 from __future__ import annotations

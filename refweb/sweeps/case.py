@@ -5,7 +5,8 @@ of a row, and on demand ``run.json`` or an archive of the result folder.
 
 May change: private functions; how files are packed, on both sides (`packed`, `unpacked`) at once. Must stay: fields of
 `Job` and `Outcome`, which travel by pickle to other machines as plain values and bytes; columns of `cells_of`, which
-are those of `results.case_rows`; `solve`, which workers call. Tests: ``tests/sweeps/test_sweep.py``,
+are those of `results.case_rows`; `solve`, which `workers` and `sizing.runs` call; `keep_outcome` and `kept_files`,
+which `sweep` imports; `_brought`, which a test calls. Tests: ``tests/sweeps/test_sweep.py``,
 ``tests/sweeps/test_workers.py``.
 """
 

@@ -12,9 +12,10 @@ run, as a trial of Clopper and Pearson does: the difference between runs of one 
 study without samples a condition is evaluated for each case: with an ensemble within `LIKELY` standard deviations,
 without one by the value and its ±, and as undecided if there is no ±.
 
-May change: private functions, `RESAMPLES` and `LIKELY`, which move intervals. Must stay: keys of entries, which stand
-in ``run.json`` and which `results.study_text` reads; spread and ± side by side, never added; `bounds` and
-`clopper_pearson`, which `sizing.runs` calls. Tests: ``tests/sweeps/test_chances.py``.
+May change: private functions, `RESAMPLES` and `LIKELY`, which move intervals. Must stay: `chances`, which
+`sweeps.study_result` calls with the rows of a study; keys of entries, which stand in ``run.json`` and which
+`results.study_text` reads; spread and ± side by side, never added; `bounds` and `clopper_pearson`, which `sizing.runs`
+calls. Tests: ``tests/sweeps/test_chances.py``.
 """
 
 from __future__ import annotations

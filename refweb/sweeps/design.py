@@ -2,7 +2,8 @@
 
 May change: private functions and texts of errors. Must stay: the digest by `key_of`, its length `KEY`, and the order of
 samples and of cases: with others all cases of stored studies run again. `sizing`, `episodes` and `sweep` call this
-file. Tests: ``tests/sweeps/test_sweep.py``, ``tests/sweeps/test_chances.py``.
+file. Must stay as well: all names that `sweep`, `sizing.requirements` and other files import; public names of `Case`,
+which other files use. Tests: ``tests/sweeps/test_sweep.py``, ``tests/sweeps/test_chances.py``.
 """
 
 from __future__ import annotations

@@ -15,8 +15,9 @@ names.
 
 May change: private functions, texts of errors, `LONGEST` and `DEEPEST` upwards. Must stay: operators and `FUNCTIONS`,
 the language of ``skip`` and ``conditions`` in study files and of formulas in requirements files: none is removed;
-intervals that are never narrower than the exact ones; that nothing but what was read here is run. Tests:
-``tests/sweeps/test_expressions.py``.
+intervals that are never narrower than the exact ones; that nothing but what was read here is run; `ANY`, which
+`sizing.formulas` and `sizing.problem` import; `Expression`, which `sizing.formulas`, `chances` and other files import;
+private methods of `Expression`, which `formulas` calls. Tests: ``tests/sweeps/test_expressions.py``.
 """
 
 from __future__ import annotations

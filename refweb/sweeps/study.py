@@ -3,7 +3,8 @@
 May change: private functions, texts of errors and `MOST_CASES`. Must stay: keys, defaults and docstring of `Study`
 (format of study files and help; after a change write ``validation/REFERENCE.md`` anew); names in `DESIGNS`, `SAMPLES`
 and of distributions; `Range`, `Distribution` and `read_parameters`, which `sizing.requirements`, `episodes` and `gym`
-use. Tests: ``tests/sweeps/test_sweep.py``, ``tests/sweeps/test_study_pages.py``.
+use; all names that `sizing.requirements`, `episodes` and other files import; public names of `Study` and
+`Distribution`, which other files use. Tests: ``tests/sweeps/test_sweep.py``, ``tests/sweeps/test_study_pages.py``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Results of a study in memory: its rows, their statistics, and the content of its ``run.json``.
 
 May change: the text that a `Sweep` shows. Must stay: attributes of `Sweep`, which `refweb` exports; keys of `summary`,
-which are those of ``run.json`` and which `results.study_text`, pages and pictures read. Tests:
-``tests/sweeps/test_sweep.py``.
+which are those of ``run.json`` and which `results.study_text`, pages and pictures read; `finite`, which `sizing.size`
+imports; `columns_of` and `row_of`, which `sweep` imports. Tests: ``tests/sweeps/test_sweep.py``.
 """
 
 from __future__ import annotations

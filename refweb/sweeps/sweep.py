@@ -6,8 +6,9 @@ a row is a digest of its scene: another study with the same case finds it.
 
 May change: private functions and texts, `STUDIES` among them. Must stay: `sweep`, its arguments and result, which
 `refweb` exports; files of a case before its row, and rows that are appended as a whole; `holds_rows`, which knows a
-message of `results.folder.check_folder` by its words "is not empty"; `job_of` and `tidy`, which `sizing.runs` calls.
-Tests: ``tests/sweeps/test_sweep.py``.
+message of `results.folder.check_folder` by its words "is not empty"; `job_of` and `tidy`, which `sizing.runs` calls;
+`base_of`, which `sizing.space` imports; `prepared`, which `commands.arguments` imports. Tests:
+``tests/sweeps/test_sweep.py``.
 """
 
 from __future__ import annotations

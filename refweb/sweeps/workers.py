@@ -6,7 +6,8 @@ up.
 
 May change: private functions, `TRIES` and `GLANCE`. Must stay: each outcome once from `through`; of an executor of a
 user only ``submit``, standard futures and, where it exists, ``_max_workers`` are used; `THREADS`, by which rows are the
-same in all processes. Tests: ``tests/sweeps/test_workers.py``.
+same in all processes; `crew_of`, which `sizing.size` and `sweep` import; `Processes`, which `sizing.runs` imports;
+`cluster`, which `commands.arguments` imports. Tests: ``tests/sweeps/test_workers.py``.
 """
 
 from __future__ import annotations

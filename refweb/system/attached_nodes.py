@@ -13,7 +13,9 @@ with W and u of `refweb.net.rotation`. `refweb.net.rotation.to_quaternion` gives
 May change: how blocks are multiplied, and private names that `resting_bodies` does not use. Must stay: names and
 arguments of public methods, which `System`, statics and studies call through `System.carriers`; `cells` couples all
 rows that any block needs, else entries are missing in the pattern. Must follow: `resting_bodies`, which derives from
-`Carried` with a `_state` of its own. Tests: ``tests/effects/test_attach.py``, ``tests/statics/test_free_bodies.py``.
+`Carried` with a `_state` of its own. Must stay as well: `add_to`, `cross_matrix` and `lever_stiffness`, which
+`resting_bodies` imports; `Carried._spun` and `_add_blocks`, which `resting_bodies` uses. Tests:
+``tests/effects/test_attach.py``, ``tests/statics/test_free_bodies.py``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 May change: private functions. Must stay: names and order of the fields of `Breaks`, which `integrators.rupture` writes
 to checkpoints as ``broken_…``; EA = 0 marks a broken element, see `Net.broken`; the loss of energy in `tear`, which
 closes the energy balance. `torn` drops cached properties of `System` by name: a new one that depends on broken lines
-belongs in its list. Tests: ``tests/effects/test_rupture.py``.
+belongs in its list. Must stay as well: `with_broken_lines`, which `build` imports. Tests:
+``tests/effects/test_rupture.py``.
 """
 
 from __future__ import annotations

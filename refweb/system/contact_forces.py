@@ -8,7 +8,8 @@ over all cells in a state.
 
 May change: private names. Must stay: the order of results (rows of the system behind the nodes, then pairs of bodies),
 which observables index; arguments of the kernels `forget` and `add_felt` and names in `CONTACT_TERM`, which
-`dynamics.integrators.contacts` uses: change both files together. Tests: ``tests/results/test_contact_force.py``,
+`dynamics.integrators.contacts` uses: change both files together; `ContactTermArray`, which `integrators.contacts`
+imports; `ContactForces` with its public names, which `system` imports. Tests: ``tests/results/test_contact_force.py``,
 ``test_every_number.py``.
 """
 

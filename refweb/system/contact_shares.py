@@ -4,10 +4,12 @@ Contact with a sphere acts once a line, at the element that comes deepest, so th
 the elements, max e_c. With shares α_c ≥ 0 that add up to 1 the energy is Σ α_c e_c and the force Σ α_c f_c, as of
 elements that each have a contact of stiffness α_c k.
 
-May change: how `shareable` finds terms. Must stay: `STIFFNESS` is a column of `effects.contact.pair.SPHERE`; the order
-of shares, cell by cell of the terms in the order of `System.terms`: `statics.shared_push` makes them, `results.folder`
-writes them to checkpoints as ``contact_shares``, and `solution` and `dynamics.initial_state` read them back. Tests:
-``tests/statics/test_contact_kinks.py``.
+May change: how `shareable` finds terms (`law_between` marks the effect `effects.contact.table.Contact`). Must stay:
+`STIFFNESS` is a column of `effects.contact.pair.SPHERE`; the order of shares, cell by cell of the terms in the order of
+`System.terms`: `statics.shared_push` makes them, `results.folder` writes them to checkpoints as ``contact_shares``,
+`solution` and `dynamics.initial_state` read them back, and `statics.contact_kinks` cuts them by the order of
+`sharing_terms`; `with_shares`, which `solution`, `statics.equilibrium` and `statics.contact_kinks` call; `shareable`
+and `shared`, which `statics.shared_push` calls. Tests: ``tests/statics/test_contact_kinks.py``.
 """
 
 from __future__ import annotations

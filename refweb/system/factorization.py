@@ -13,7 +13,9 @@ May change: `LARGE`, `LARGEST` and `NEMIN`, which are measured: they change time
 of the classes. `FINE` and `ROUGH` decide when a solution is refined or refused. Must stay: keys of `LIBRARIES`, the
 same as `registry.FACTORIZATIONS` and values of scenes; `Lu` and `Factor` have ``update``, ``solve``, ``shift`` and
 ``solutions`` alike, since `statics.newton` holds either. Signs of pivots decide stability in statics and counts of
-modes. Tests: ``tests/system/test_factorization.py``.
+modes. Must stay as well: `weak_pivot`, which `links` and `integrators.massless_nodes` import; `negative_pivots`, which
+`statics.stability` and `studies.turning` import; `Library`, which `system` imports; public names of `Lu`, which other
+files use; `_Rslab`, which a test calls. Tests: ``tests/system/test_factorization.py``.
 """
 
 from __future__ import annotations

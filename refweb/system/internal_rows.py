@@ -2,7 +2,8 @@
 
 May change: private functions. Must stay: keys and contents of `kept`, with the title `WOUND`, which `results.folder`
 writes to ``checkpoint.npz`` and `dynamics.internal_start` compares with a scene: other titles or words refuse folders
-of users. Tests: ``tests/dynamics/test_internal_start.py``.
+of users; `of_lines` and `of_threads`, which `dynamics.internal_start` imports. Tests:
+``tests/dynamics/test_internal_start.py``.
 """
 
 from __future__ import annotations

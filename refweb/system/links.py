@@ -5,7 +5,7 @@ the nearest velocities with G v = 0 and to the nearest positions with G δx = �
 
 May change: constants and private functions. Must stay: `places` and `values` list the same entries in the same order,
 for the unknowns (x, v, λ, μ) of `dynamics.integrators.ida`: change all three together. Messages and lengths are tested
-by ``tests/dynamics/integrators/test_ida.py``.
+by ``tests/dynamics/integrators/test_ida.py``. Must stay as well: `Links` with its public names, which `system` imports.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ therefore move a rigid net in the same way.
 
 May change: how values are computed. Must stay: public names; `values` stand in the pattern of the tangent, and `heavy`
 numbers components as 3 row + axis: `cvode`, `ida`, `links` and modes index both. Plug-ins use ``matrix`` and
-``factor``. Tests: ``tests/effects/test_damping.py``, ``tests/dynamics/integrators/test_cvode.py``.
+``factor``. Must stay as well: `refuse_massless`, which `studies.dop853` and `integrators.step_observer` import. Tests:
+``tests/effects/test_damping.py``, ``tests/dynamics/integrators/test_cvode.py``.
 """
 
 from __future__ import annotations

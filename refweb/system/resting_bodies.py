@@ -14,10 +14,11 @@ A node at the arm a of a body moves by δ + p × a, so that a block K of lines b
 the arm turns f·a 1 − a⊗f of the force f on the node is added, as in `refweb.system.attached_nodes`. Kernels of contact
 have columns for the quaternion q = (w, u); those of p follow by δw = −½ u·p and δu = ½ (w p + p × u).
 
-May change: `ACROSS`, which moves no body, private methods but `_state`, which `attached_nodes.Carried` calls. Must
-stay: of the two rows of rotation the first has the rotation vector, the second no unknown; names of public methods,
-which `System`, `statics` and `studies` call through `System.carriers`. Must follow a change of `attached_nodes`. Tests:
-``tests/statics/test_free_bodies.py``, ``tests/effects/test_axles.py``.
+`System.carriers` makes it of the terms in the tangent, whose numbers are those of ``blocks``. May change: `ACROSS`,
+which moves no body, private methods but `_state`, which `attached_nodes.Carried` calls. Must stay: of the two rows of
+rotation the first has the rotation vector, the second no unknown; names of public methods, which `System`, `statics`
+and `studies` call through `System.carriers`. Must follow a change of `attached_nodes`. Must stay as well:
+`RestingBodies`, which `system` imports. Tests: ``tests/statics/test_free_bodies.py``, ``tests/effects/test_axles.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 May change: how `Pattern` finds its entries. Must stay: rows increase within a column, which `attached_nodes` and
 factorizations count on; names of attributes, which `cvode`, `ida` and modes read; the order of sums in `_scatter`,
-which decides the last bits of K. Tests: ``tests/system/test_factorization.py``, ``test_system.py``.
+which decides the last bits of K; public names of `Pattern`, which other files use. Tests:
+``tests/system/test_factorization.py``, ``test_system.py``.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 May change: `NEAR`, private functions, the text of the refusal. Must stay: `at_rest` changes a copy, never the given
 system, and returns the system itself where nothing differs. It drops cached properties of `System` by name: a new one
-that depends on supports or terms belongs in its list. Tests: ``tests/dynamics/test_starts.py``,
-``test_bodies_come_to_rest.py``.
+that depends on supports or terms belongs in its list. Must stay as well: `refuse_broken`, which `build` imports;
+`waiting`, which `dynamics.simulation`, `statics.body_penetration` and `studies.mode_remarks` import. Tests:
+``tests/dynamics/test_starts.py``, ``test_bodies_come_to_rest.py``.
 """
 
 from __future__ import annotations

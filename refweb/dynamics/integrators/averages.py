@@ -16,7 +16,8 @@ many steps in a cell.
 May change: `SETTLED`, `HALVINGS` and `PAYS`, which trade cost for ±, and `NEAR`, above rounding. Must stay: fields of
 `Averages` and `CELLS`, which checkpoints keep; `measurements` and `dense_output` give values at `PARTS` + 1 places of a
 step, and follow a change of it; ± holds the error of each mean. Kernels with ``apart`` are called with these arguments
-by `explicit_loop`, `dense_output`, `rows` and `measurements`. Tests: ``tests/dynamics/test_averages.py``.
+by `explicit_loop`, `dense_output`, `rows` and `measurements`. Must stay as well: all names that `measurements`,
+`monitors` and other files import. Tests: ``tests/dynamics/test_averages.py``.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ May change: words of messages and private methods for them (``_name_…``, `_way
 names, those of `integrator.Integrator`; class attributes ``kicks``, ``drifts``, ``stretch`` and `_keys`, which
 `splitting` sets. `Scheme` and `Running` get fields by position, so that `records` and this file change together;
 `SHARED` is the first part of `CLOCK`. `budget.steps_with_twin` repeats `TWIN_STEPS` as √2. A run that goes on from a
-checkpoint has the bits of one that does not. Tests: ``tests/dynamics/test_dynamics.py``.
+checkpoint has the bits of one that does not. Must stay as well: `CentralDifference`, which `splitting` imports. Tests:
+``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

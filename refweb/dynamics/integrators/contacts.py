@@ -2,8 +2,8 @@
 
 May change: nothing but names inside of kernels. Must stay: ``chosen`` is a place in ``cells`` of `records.ForceTerms`,
 counted as `neighbour_list.near_of` lists terms; sums are those of `system.contact_forces`, whose dtype and kernels it
-uses, so that a row of the loop equals that of a state. `step`, `dense_output` and `explicit_loop` call `feel`. Tests:
-``tests/results/test_contact_force.py``.
+uses, so that a row of the loop equals that of a state. `step`, `dense_output` and `explicit_loop` call `feel`. Must
+stay as well: `Contacts`, which `records` imports. Tests: ``tests/results/test_contact_force.py``.
 """
 
 from __future__ import annotations

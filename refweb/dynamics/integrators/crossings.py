@@ -3,9 +3,11 @@
 Rows move in straight lines: in a drift of an explicit step, see `refweb.dynamics.integrators.ccd`, or between times at
 which the dense output of a step is known, see `refweb.dynamics.integrators.passages`.
 
-May change: the order of checks within `checks_of`. Must stay: numbers of kinds, which are rows of ``crossings`` in
-checkpoints and index it in `simulation`, `history`, `passages` and `ccd`; the columns time and four rows. A new kind
-needs a number at the end and a row in `none_met`. Tests: ``tests/effects/test_passage.py``, ``test_between_bodies.py``.
+`ccd` and `passages` call `checks_of` and `note_met`. May change: the order of checks within `checks_of`. Must stay:
+numbers of kinds, which are rows of ``crossings`` in checkpoints and index it in `simulation`, `history`, `passages` and
+`ccd`; the columns time and four rows. A new kind needs a number at the end and a row in `none_met`. Must stay as well:
+all names that `ccd`, `dynamics.simulation` and other files import. Tests: ``tests/effects/test_passage.py``,
+``test_between_bodies.py``.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ of each step. The last factors are kept where CVODE asks for them anew and nothi
 May change: `SHORT`, `STILL` and `RENEWED`, which change cost and digits within the tolerance. Must stay: arguments of
 `set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which sksundae calls them; `precondition`
 uses the factors of the last `set_up` with another γ or tangent; the Jacobian is the derivative of `right_side`. Keys of
-``[solve]`` are those of `registry.INTEGRATORS`. Tests: ``tests/dynamics/integrators/test_cvode.py``.
+``[solve]`` are those of `registry.INTEGRATORS`. Must stay as well: public names of `Cvode`, which other files use.
+Tests: ``tests/dynamics/integrators/test_cvode.py``.
 """
 
 from __future__ import annotations

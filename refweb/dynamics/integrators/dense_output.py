@@ -7,7 +7,8 @@ forces: nothing is kept for it in all the steps that have no peak.
 May change: `SAME_PEAK` and `BEHIND`, which decide how often is looked, and how a state within is found, of the order of
 the method. Must stay: `LOOKS` equals `averages.PARTS`; a look inside of a step overwrites natural lengths and what
 terms show, so that it ends with `show_again`: without it bits of the run change. Must follow: names in ``apart`` are
-those of `features`; `explicit_loop` calls the kernels, `workspace` has `Inside`. Tests:
+those of `features`; `explicit_loop` calls the kernels, `workspace` has `Inside`. Must stay as well: `look_again`,
+`look_at_books`, `look_behind` and `look_inside`, which `explicit_loop` imports. Tests:
 ``tests/dynamics/test_peaks.py``, ``test_averages.py``.
 """
 

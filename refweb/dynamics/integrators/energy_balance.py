@@ -6,7 +6,8 @@ May change: `CLOSING` and words of messages. Must stay: ``total`` is (energy of 
 size) and ``work`` ends with that of motion: `rows`, `simpson_balance` and `History` count on both. With `DRIFT` changes
 its value in words in ``validation/how_it_works.py``, which ``tests/test_readme.py`` compares. Kernels are called by
 `explicit_loop`, `step`, `dense_output`, `rows` and `simpson_balance`, which follow their arguments; another order of
-sums changes last bits of work. Tests: ``tests/dynamics/test_impact.py``.
+sums changes last bits of work. Must stay as well: all names that `explicit_loop`, `simpson_balance` and other files
+import. Tests: ``tests/dynamics/test_impact.py``.
 """
 
 from __future__ import annotations

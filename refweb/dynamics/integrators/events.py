@@ -5,7 +5,9 @@ values are known anywhere within a step. An event of rest: a value has stayed be
 
 May change: how `search` comes to a moment, within rounding. Must stay: fields of `EVENT`, which checkpoints keep and
 `rupture` reads and sets by name; fields of `Event`, which `history` fills, have the same names there. `note_events` is
-called by `explicit_loop` with these arguments. Tests: ``tests/dynamics/test_events.py``,
+called by `explicit_loop` with these arguments. Must stay as well: `EventArray`, which `records` imports; `event_rows`,
+which `central_difference` and `step_observer` import; `ended_by`, which `explicit_loop`, `integrator` and `rupture`
+import; `starts_above`, which `monitors` imports. Tests: ``tests/dynamics/test_events.py``,
 ``tests/dynamics/integrators/test_step_observer.py``.
 """
 

@@ -9,7 +9,8 @@ May change: `BREATH`. Must stay: the order of calls in `run_steps`, which is the
 returns (`HELD`, −1, rows), which `CentralDifference.advance` reads; a kernel with ``apart`` is called only where
 `features` has its names, else the run ends. Another order of sums changes last bits of results: then a run that goes
 on, one with lists of near lines and the undisturbed one must still be equal bit for bit
-(``tests/dynamics/integrators/test_nearby.py``). Tests: ``tests/dynamics/test_dynamics.py``.
+(``tests/dynamics/integrators/test_nearby.py``). Must stay as well: `begin`, which `central_difference` imports. Tests:
+``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 May change: nothing. Must stay: names of fields, which are keys of checkpoints unless their metadata says
 ``saved=False``. A further field that must survive a step, or a stop, belongs here, with a default for older folders;
-`CentralDifference` hands its array to `Running` by position. Tests: ``tests/dynamics/integrators/test_records.py``,
+`CentralDifference` hands its array to `Running` by position. Must stay as well: `ExplicitState`, which
+`central_difference` imports. Tests: ``tests/dynamics/integrators/test_records.py``,
 ``tests/dynamics/test_dynamics.py``.
 """
 

@@ -15,7 +15,8 @@ exceeds a kink by an eighth of a second difference, so that it gives negative te
 May change: nothing without the tests of peaks, since each rule here, and `EDGE`, decides values of results. Must stay:
 fields of `Extremes`, which checkpoints keep; ``looked`` and ``recent`` have the last three looks, the oldest first.
 Kernels are called by `explicit_loop`, `dense_output`, `measurements`, `averages` and `events`, which follow their
-arguments. Tests: ``tests/dynamics/test_peaks.py``.
+arguments. Must stay as well: all names that `dense_output`, `measurements` and other files import. Tests:
+``tests/dynamics/test_peaks.py``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ Losses act only where the push acts, which is evaluated before: only lines with 
 May change: how space for contacts grows. Must stay: parts of contact n begin at ``parts`` × n, of which an attached
 node takes `CARRIED`; `detect` kernels count contacts for which there is no space as well; numbers of near cells stand
 as `neighbour_list.near_of` lists terms. Must follow: the kernels of `effects.contact_solver`, and `step`, which calls
-`detect_all`. Tests: ``tests/effects/test_contact_losses.py``.
+`detect_all`. Must stay as well: `ImplicitContacts` with its public names, which `records` imports. Tests:
+``tests/effects/test_contact_losses.py``.
 """
 
 from __future__ import annotations

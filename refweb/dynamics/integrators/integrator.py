@@ -13,8 +13,9 @@ made of a system and of what is to be looked at:
 May change: words, `MAX_STEPS_PER_ROW`, a limit of what is accepted, and `SAME`, above rounding. Must stay: names in
 `Integrator`, which plug-ins bring; fields of `IntegratorState` and keys of `GROUPS`, which are keys of checkpoints; the
 order of columns of `History`, which `rows` and `step_observer` write by position and `history` reads. An optional
-attribute of integrators belongs in the notes of `Integrator`. Tests: ``tests/how_to/test_integrator.py``,
-``tests/dynamics/test_dynamics.py``.
+attribute of integrators belongs in the notes of `Integrator`. Must stay as well: `Variant`, which `studies.trials`,
+`central_difference` and other files import; public names of `History`, which other files use. Tests:
+``tests/how_to/test_integrator.py``, ``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

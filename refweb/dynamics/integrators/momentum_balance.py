@@ -25,7 +25,9 @@ and temperature change, pressure inside of a closed line. Nor does it see [[moti
 May change: private functions. Must stay: fields of `MomentumBalance`, which checkpoints keep; the paragraph above on
 what the book does not see, which a test reads; `CLOSURE`, `ROUNDINGS` and `allowed`, by which runs are refused. An
 effect from outside brings `Balance.impulse`, or is integrated along the steps. Kernels are called by `explicit_loop`,
-`rows` and `simpson_balance`, which follow their arguments. Tests: ``tests/dynamics/test_momentum_balance.py``.
+`rows` and `simpson_balance`, which follow their arguments. Must stay as well: all names that `simpson_balance`,
+`explicit_loop` and other files import; public names of `Outside`, which other files use. Tests:
+``tests/dynamics/test_momentum_balance.py``.
 """
 
 from __future__ import annotations

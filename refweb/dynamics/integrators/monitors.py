@@ -2,8 +2,8 @@
 
 May change: how `Observed.of` fills the record. Must stay: names of the fields of `Observed`, which kernels of
 `extremes`, `averages`, `events` and `rows` read; the order of probes, then sums, in ``signs`` and ``sums``;
-`measurements` puts other arrays into ``data`` for probes that read a term. Tests: ``tests/dynamics/test_averages.py``,
-``tests/results/test_observable_contract.py``.
+`measurements` puts other arrays into ``data`` for probes that read a term; `begin_monitors`, which `central_difference`
+and `measurements` import. Tests: ``tests/dynamics/test_averages.py``, ``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ middle to its surface, or if the approach is less than the distance of the spher
 
 May change: `HALVINGS`, upwards, and how pieces are halved. Must stay: bounds of motion may be too large, never too
 small; checks are those of `crossings.checks_of`, and rows of ``crossings`` its kinds; `step_limits` calls `soon`, and
-`step_observer` calls `inspect`. `TRAVEL` bounds the steps of all methods with tolerances. Tests:
-``tests/effects/test_passage.py``, ``test_between_bodies.py``.
+`step_observer` calls `inspect`. `TRAVEL` bounds the steps of all methods with tolerances. Must stay as well:
+`Passages`, which `step_limits` imports. Tests: ``tests/effects/test_passage.py``, ``test_between_bodies.py``.
 """
 
 from __future__ import annotations

@@ -7,7 +7,9 @@ effects. Features that a scene does not have are empty tables or arrays, and the
 May change: how ``of`` fills a record, and `LINE`, which changes the speed alone. Must stay: names of fields, which
 kernels of the loop read; their order in `Scheme` and `Running`, which `central_difference` fills by position; names of
 `CLOCK` up to ``share``, which are those of `IntegratorState`; places behind the terms in `ForceTerms`, which
-`neighbour_list` fills. A further field compiles all kernels that take the record again. Tests:
+`neighbour_list` fills. A further field compiles all kernels that take the record again. Must stay as well: `Model` with
+its public names, which `ccd`, `central_difference` and other files import; `aligned`, which `explicit_state` imports;
+`Inertia`, which `step_bound` imports; public names of `ForceTerms` and `Scheme`, which other files use. Tests:
 ``tests/dynamics/integrators/test_records.py``, ``tests/test_pay_for_what_you_call.py``.
 """
 

@@ -13,8 +13,9 @@ Positions follow x' = g(x, v): of a quaternion q with the velocity u = L/I of it
 so that with P = (1 − γX)⁻¹ eliminating displacements leaves (M + γC + γ²KPV) z_v = M r_v − γKP r_x.
 
 May change: private methods. Must stay: public names, which `cvode`, `ida`, `step_observer` and `studies.dop853` call:
-first `linearize` at a state, then `begin` with γ, then products; ``places`` has the scalar part of a quaternion first.
-Tests: ``tests/effects/test_tumbling.py``, ``tests/dynamics/integrators/test_cvode.py``.
+first `linearize` at a state, then `begin` with γ, then products; ``places`` has the scalar part of a quaternion first;
+`followed`, which `step_observer` imports; `Rotations`, which `studies.dop853` imports. Tests:
+``tests/effects/test_tumbling.py``, ``tests/dynamics/integrators/test_cvode.py``.
 """
 
 from __future__ import annotations

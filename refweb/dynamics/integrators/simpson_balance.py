@@ -3,13 +3,17 @@
 A piece of a step is known at its start, in its middle and at its end, and by the method at any time within. The
 parabolas through the powers there, through what supports give and what pulls on lines that change their length, are
 integrated to any time within. Where Simpson's rule and the trapezoidal one differ too much, as where damped lines go
-slack in a long step, a piece is to be halved. Explicit steps book what each kick and drift gives instead, which closes
-to rounding, see `refweb.dynamics.integrators.energy_balance`.
+slack in a long step, a piece is to be halved: `SimpsonBalance.uneven` tells so, and `step_observer` halves it.
+`SimpsonBalance.close` refuses a balance that does not close, `refuse_endless` forces that are not finite. Explicit
+steps book what each kick and drift gives instead, which closes to rounding, see
+`refweb.dynamics.integrators.energy_balance`.
 
-May change: `UNEVEN`, which trades cost for the error of the balance. Must stay: the last seven entries of ``flow`` and
-``before`` are work of motion, impulse of supports and impulse from outside: `step_observer` splits integrals by these
-places, and `rates` adds there what `system.material_flow` brings; fields of `Sample` and `Piece`, which `measurements`,
-`events` and `passages` read. Tests: ``tests/dynamics/integrators/test_step_observer.py``, ``test_cvode.py``.
+`step_observer` makes the book, and hands its own state over as ``course``. May change: `UNEVEN`, which trades cost for
+the error of the balance. Must stay: the last seven entries of ``flow`` and ``before`` are work of motion, impulse of
+supports and impulse from outside: `step_observer` splits integrals by these places, and `rates` adds there what
+`system.material_flow` brings; fields of `Sample` and `Piece`, which `measurements`, `events` and `passages` read;
+public names of `SimpsonBalance`, which other files use. Tests: ``tests/dynamics/integrators/test_step_observer.py``,
+``test_cvode.py``.
 """
 
 from __future__ import annotations

@@ -14,6 +14,10 @@ to 0 before, and that of a contact, with its losses, begins at 0.
 
 A law whose slope changes over a strain that is short against that of a step is one with a jump; the curvature at both
 ends of the step gives the part of Δσ' that is in the steps.
+
+May change: private functions, and constants, which decide what counts as a jump. Must stay: public names of `Snaps`,
+which `tangent` and `linear_run` use, and `gaps_of`, which `dynamics.parameters` calls. Tests:
+``tests/dynamics/test_dynamic_gradients.py``, ``tests/dynamics/test_gradient_jumps.py``.
 """
 
 from __future__ import annotations

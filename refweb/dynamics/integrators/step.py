@@ -3,8 +3,8 @@
 May change: `ROUNDS`, `SWEEPS` and limits of iterations, which trade cost for the error of the kick. Must stay: kernels
 are called by `explicit_loop` and `dense_output` with these arguments; names in ``apart`` are keys of `features`; fields
 of `Model` and `Running` stand in `records`. Another order of sums changes last bits of results.
-`dynamics.responses.between` repeats `interpolate_kicks`. Tests: ``tests/dynamics/test_dynamics.py``,
-``tests/effects/test_contact_losses.py``.
+`dynamics.responses.between` repeats `interpolate_kicks`. Must stay as well: all names that `explicit_loop` and
+`dense_output` import. Tests: ``tests/dynamics/test_dynamics.py``, ``tests/effects/test_contact_losses.py``.
 """
 
 from __future__ import annotations

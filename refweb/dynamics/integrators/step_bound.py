@@ -1,9 +1,12 @@
 """The largest stable step, by Gershgorin's bound on the largest frequency of what can act before the next row.
 
-May change: a sharper bound, as long as it is one: a step may come out too short and never too long. Must stay:
-arguments of the kernels, which `explicit_loop` and `central_difference` call; kernels of effects have the signature
-`kernels.BOUND`. `dynamics.expected_cost` finds the same bound in Python: change both together. Tests:
-``tests/dynamics/test_expected_cost.py``, ``tests/dynamics/integrators/test_nearby.py``.
+Arrays of terms are described in `records.ForceTerms`. May change: a sharper bound, as long as it is one: a step may
+come out too short and never too long. Must stay: arguments of the kernels, which `explicit_loop` and
+`central_difference` call; `no_bound`, which `records` gives to terms without a bound; kernels of effects have the
+signature `kernels.BOUND`. Rates of contact also limit the path of a step, from which `effects.contact.pair_overlap`
+proves that none passes. `dynamics.expected_cost` finds the same bound in Python: change both together. Must stay as
+well: `EARLY` and `step_by_pairs`, which `explicit_loop` imports; `SPAN` and `safe_step`, which `central_difference` and
+`explicit_loop` import. Tests: ``tests/dynamics/test_expected_cost.py``, ``tests/dynamics/integrators/test_nearby.py``.
 """
 
 from __future__ import annotations

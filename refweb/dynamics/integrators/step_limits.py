@@ -1,7 +1,9 @@
 """Limits of a step: the next corner of a table, and the distance to a passage through bodies or lines.
 
-May change: how distances are bounded. Must stay: a limit may be too near and never too far, else a step passes over a
-corner of a table or through a body; `stop` and `at_corner`, which `step_observer` calls before each step. Tests:
+`step_observer` makes them; ``position`` is that of `passages`. May change: how distances are bounded. Must stay: a
+limit may be too near and never too far, else a step passes over a corner of a table or through a body; `stop` and
+`at_corner`, which `step_observer` calls before each step; `passages`, which `step_observer` takes as a monitor;
+`TRAVEL`, which `studies.dop853` imports from here; `StepLimits`, which `step_observer` imports. Tests:
 ``tests/dynamics/integrators/test_step_observer.py``.
 """
 

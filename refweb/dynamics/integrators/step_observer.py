@@ -7,8 +7,9 @@ supports' forces by Simpson's rule. A flag of success is not believed: the book 
 May change: `PATIENCE`, `BREATH`, `HALVINGS`, `HALVINGS_BY_PATH`, private methods. `TWIN_TOLERANCES` sets the tolerances
 of the step-refinement run: its cost and ± follow. Must stay: public names and arguments, since plug-ins derive from
 `StepObserver`; fields of `ObservedState` and the order of ``stats``, which checkpoints keep; a row as in
-`integrator.History`. Simpson's weights stand in `simpson_balance`. Tests: ``tests/how_to/test_integrator.py``,
-``tests/dynamics/integrators/test_step_observer.py``, ``test_cvode.py``.
+`integrator.History`. Simpson's weights stand in `simpson_balance`. Must stay as well: `Stopped`, which `ida` and
+`sundials` import. Tests: ``tests/how_to/test_integrator.py``, ``tests/dynamics/integrators/test_step_observer.py``,
+``test_cvode.py``.
 """
 
 from __future__ import annotations

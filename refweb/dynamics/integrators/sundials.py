@@ -6,7 +6,8 @@ iteration does, and nothing is multiplied: what is to be inverted is the Jacobia
 
 May change: `DENSE`, texts in `LINEAR_SOLVERS`. Must stay: keys of `LINEAR_SOLVERS`, which scenes name and
 `settings.Dynamic` lists; `_made`, `_initial` and `linear_options`, which `cvode` and `ida` bring, and private methods
-that they call; what SUNDIALS prints becomes the reason in a message. Tests:
+that they call; what SUNDIALS prints becomes the reason in a message; `Sundials` and `Symmetric`, which `cvode` and
+`ida` import; private methods of `Sundials`, which `ida` and `cvode` call. Tests:
 ``tests/dynamics/integrators/test_cvode.py``, ``test_ida.py``.
 """
 

@@ -22,7 +22,8 @@ with δv⁻ before the kick. It is that of the steps to order 2, not to rounding
 
 May change: constants, down to rounding, and how products are computed. Must stay: steps are those of the run itself,
 bit for bit, and δa is the derivative of `step` and of `effects.contact_solver`: a change of their kick has to follow
-here; names of `Steps` and `Tangent`, which `linear_run` uses. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
+here; the name "drag", by which losses of drag are told from those of contact; names of `Steps` and `Tangent`, which
+`linear_run` uses; `BESIDE`, which `dynamics.linear_run` imports. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

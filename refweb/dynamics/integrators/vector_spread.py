@@ -1,7 +1,8 @@
 """Spread of rows of vectors: no two differ by more.
 
 May change: how the bound is computed. Must stay: it may be too large and never too small, since `ccd`, `neighbour_list`
-and `explicit_loop` bound motion by it; arguments of both kernels. Tests: ``tests/dynamics/integrators/test_nearby.py``.
+and `explicit_loop` bound motion by it; arguments of both kernels; `spread_of`, which `ccd`, `explicit_loop` and other
+files import; `spread_since`, which `neighbour_list` imports. Tests: ``tests/dynamics/integrators/test_nearby.py``.
 """
 
 from __future__ import annotations

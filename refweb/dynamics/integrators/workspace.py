@@ -1,9 +1,10 @@
 """Space that the compiled loop works in: nothing in it stays from step to step.
 
-May change: further fields, for which `Workspace.of` makes an array. Must stay: names and shapes of fields, which
-kernels of `explicit_loop` and `dense_output` use; nothing here is needed behind a step: numbers that must stay belong
-in `explicit_state` and `records.Running`. Tests: ``tests/dynamics/integrators/test_records.py``,
-``tests/dynamics/test_dynamics.py``.
+`central_difference` makes it, with its `records.Model` and `records.Running`. May change: further fields, for which
+`Workspace.of` makes an array. Must stay: names and shapes of fields, which kernels of `explicit_loop` and
+`dense_output` use; nothing here is needed behind a step: numbers that must stay belong in `explicit_state` and
+`records.Running`; public names of `Workspace`, which other files use. Tests:
+``tests/dynamics/integrators/test_records.py``, ``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

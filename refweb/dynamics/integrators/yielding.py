@@ -7,7 +7,8 @@ piece of a step.
 
 May change: `SAMPLES`, `ROUNDS` and `SMALL`, which trade cost for the error of the moment. Must stay: public methods,
 which `step_observer` calls; ``method`` has `state` and `interpolated` of `step_observer`; followers have the functions
-``grown`` and ``drive`` of `effects.base.InternalVariables`. Tests: ``tests/effects/test_plastic.py``.
+``grown`` and ``drive`` of `effects.base.InternalVariables`; `Yielding`, which `step_observer` imports. Tests:
+``tests/effects/test_plastic.py``.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ determines the contact with another body, whose skeleton is then left out.
 May change: `MORE`, the space for further contacts, upwards, and messages. Must stay: `force_terms`, which `table`
 calls; the order in which `_pair` and `_side` write numbers, which is that of `BODIES`, `SIDE` and `pair`, read by
 `body_body_detection`; the six rows of a cell and `FELT_BY_BOTH`, which counts them; `PER_PART`, the limit of contacts
-in `contact_points`; the names "contact" and "body_contact_energy". Tests: ``tests/effects/test_between_bodies.py``.
+in `contact_points`; the names "contact", as in `table`, and "body_contact_energy". Tests:
+``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

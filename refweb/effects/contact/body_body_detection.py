@@ -11,7 +11,8 @@ May change: `SAMPLES`, and how an extreme is searched. Must stay: the order of t
 `bodies` writes by position; the fields of `BODY_CONTACT`, which `body_body_penalty` and `body_body_friction` read by
 name; columns that are counted from these (`BEHIND`, `PAIR_WIDTH`, `TOUCHED`, …); the three values of ``slot`` of a
 part, by which friction finds its force of the step before; the order of contacts, which decides the last digits of
-results. Tests: ``tests/effects/test_between_bodies.py``.
+results; all names that `body_body_friction` and `body_body_penalty` import. Tests:
+``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

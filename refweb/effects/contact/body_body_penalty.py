@@ -8,7 +8,8 @@ depend on them. With steps of `STEP` of the size of the bodies their errors are 
 May change: `STEP` and `FARTHEST`; `INWARD` and `CURVED` upwards alone, since the bound may be too large and never too
 small. Must stay: one energy from which force and bound follow; that the bound covers damping and friction, whose term
 has none; `force_of` and `slopes_of`, which `body_body_friction` calls, and the order of what `kernels` returns, which
-`bodies` unpacks. Tests: ``tests/effects/test_between_bodies.py``.
+`bodies` unpacks; `push`, which `body_body_friction` imports; `near`, which `bodies` imports. Tests:
+``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

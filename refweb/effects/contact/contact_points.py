@@ -11,7 +11,8 @@ and the force jumps.
 May change: how ξ is searched, and limits of the iterations. Must stay: the four entries of `Places` in their order,
 which `penalty`, `friction`, `line_body_friction` and `body_body_detection` unpack; three contacts of an element on a
 convex body, which is `SLOTS` of `line_body_friction`; the fields of `ContactPoint` and the mark `NOWHERE`; that
-`in_reach` and `reaching` miss no contact. Tests: ``tests/effects/test_contact.py``,
+`in_reach` and `reaching` miss no contact; all names that `line_body_friction`, `body_body_detection` and other files
+import; public names of `PointContact`, which other files use. Tests: ``tests/effects/test_contact.py``,
 ``tests/dynamics/integrators/test_nearby.py``, ``tests/test_contract.py``.
 """
 

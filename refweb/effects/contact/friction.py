@@ -15,8 +15,9 @@ of ξ. `refweb.effects.contact_solver` solves for F in explicit kicks.
 May change: numbers of the bound upwards alone, which makes steps shorter; how tangents are written. Must stay: the law,
 which `contact_solver.friction_law` has once more for explicit kicks, so that both change together; the layout of
 ``data``, which is that of `pair`; ``out`` with the power [W] and the force on the body [N]; the order force, stiffness,
-bound, damping, which `table` unpacks. `facing` gives −n: the law has only products of two n. Tests:
-``tests/test_contract.py``, ``tests/effects/test_contact_losses.py``.
+bound, damping, which `table` unpacks. `facing` gives −n: the law has only products of two n. Must stay as well:
+`friction_force` and `turned_by`, which `body_body_friction` imports. Tests: ``tests/test_contract.py``,
+``tests/effects/test_contact_losses.py``.
 
 References
 ----------

@@ -13,8 +13,8 @@ largest gradient of depth gives a bound.
 
 May change: `PARTS`. Must stay: the four entries of ``met`` (two nodes, the row of the body, 1 where the line is in the
 core), which `integrators.ccd` and `penetration` read by position; `MIDDLE` and `SHOWN`, which follow from geometry: the
-first may only fall, the second only rise; that no line which may pass is left out. Tests:
-``tests/effects/test_passage.py``.
+first may only fall, the second only rise; that no line which may pass is left out; `passing`, which `table` imports;
+`limits_of`, which `integrators.crossings` imports. Tests: ``tests/effects/test_passage.py``.
 """
 
 from __future__ import annotations

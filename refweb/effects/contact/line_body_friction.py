@@ -8,7 +8,8 @@ sum of their forces, so that sweeps need not distribute the force among them.
 May change: how the kernel is written. Must stay: tags 0 between the ends of an element, 1 and 2 at them, by which
 `contact_solver` finds the force of the step before; the body as the second part of a contact at an end, which `detect`
 compares; `SLOTS`, the limit in `contact_points`; `levers`, which `body_body_friction` calls; the order of contacts,
-which decides the last digits of results. Tests: ``tests/effects/test_contact_losses.py``.
+which decides the last digits of results; `kernels`, which `table` imports. Tests:
+``tests/effects/test_contact_losses.py``.
 """
 
 from __future__ import annotations

@@ -6,8 +6,9 @@ A sphere has one contact with a line, at the line's point nearest its centre, fo
 
 May change: `SAMPLES` upwards. Must stay: shape functions as a flat tuple, by power of ξ and then by node, as `table`
 makes it; that `far` and `near` say no only where nothing can touch; what each function returns, as most files of this
-folder call them. Another order of sums changes the last digits of all results with contact. Tests:
-``tests/effects/test_contact.py``, ``tests/test_contract.py``.
+folder call them. Another order of sums changes the last digits of all results with contact. Must stay as well: all
+names that `sphere`, `friction` and other files import. Tests: ``tests/effects/test_contact.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -14,10 +14,11 @@ Friction and damping have no energy. Each maximum counts with a share of its pus
 average, over F. Minima do not count. The sum of these shares equals the total rise, no share is negative, and friction
 always dissipates.
 
-May change: `SAMPLES`, `LEAST` and `LOOKS` upwards, and `FURTHER` up to 2: they weigh time against extremes that are
-missed. Must stay: the two kernels that `several` returns and `PLACES`, of which `contact_points` makes its `Places`;
-`STEEPEST`, a bound on gradients of depths that `body_body_detection` and `line_body_ccd` rely on: it may be larger
-only. Tests: ``tests/effects/test_mesh_bodies.py``.
+`contact_points.places` hands its kernels over; `pair` describes cells and data. May change: `SAMPLES`, `LEAST` and
+`LOOKS` upwards, and `FURTHER` up to 2: they weigh time against extremes that are missed. Must stay: the two kernels
+that `several` returns and `PLACES`, of which `contact_points` makes its `Places`; `STEEPEST`, a bound on gradients of
+depths that `body_body_detection` and `line_body_ccd` rely on: it may be larger only. Tests:
+``tests/effects/test_mesh_bodies.py``.
 """
 
 from __future__ import annotations

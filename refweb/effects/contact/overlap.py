@@ -33,7 +33,9 @@ May change: private functions and messages. Of the constants `SHARE`, `AIM`, `ST
 which stiffness is chosen or refused, so that results of scenes without one move; `ROUGH`, `NOTED` and `TOLD` only when
 a finding comes; `ALONG` is measured. Must stay: keys of `Deepest.plain`, which stand in ``run.json``; the stiffness in
 the `PenetrationError` of `too_soft`, with which `runner` runs again; `CORE`, which `line_body_ccd`, `pair_overlap` and
-`statics.body_penetration` use; rows of `kept_edges`, which checkpoints keep. Tests: ``tests/effects/test_overlap.py``.
+`statics.body_penetration` use; rows of `kept_edges`, which checkpoints keep; all names that `pair_overlap`, `scene` and
+other files import; public names of `Deepest` and `Overlaps`, which other files use. Tests:
+``tests/effects/test_overlap.py``.
 """
 
 from __future__ import annotations

@@ -5,8 +5,9 @@ these stands a `SURFACE`, which spheres alone do not need, and at the end a `TUR
 
 May change: how the kernels are written. Must stay: names and order of the fields of `SPHERE`, `SURFACE` and `TURNING`:
 `pair_data` here and `bodies` write them by position, all kernels of this folder and `system.contact_shares` read them.
-A new field goes to all three; `AWAY` and `WIDTH` count them. Fields of `LINE_CONTACT` are read by name. Tests:
-``tests/effects/test_tumbling.py``, ``tests/test_contract.py``.
+A new field goes to all three; `AWAY` and `WIDTH` count them. Fields of `LINE_CONTACT` are read by name. Must stay as
+well: all names that `contact_points`, `penalty` and other files import. Tests: ``tests/effects/test_tumbling.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -10,7 +10,10 @@ see `refweb.dynamics.integrators.passages`.
 
 May change: messages of findings. Must stay: "certified" and "not certified" of `passage` and the keys of ``plain``,
 which stand in ``run.json``; `WAY`, which follows from the bound of `body_body_penalty` (10 × speed over thickness);
-`record`, `note_way` and `note_met`, which `dynamics.simulation` and `statics.body_penetration` call. Tests:
+`record`, `note_way` and `note_met`, which `dynamics.history` calls (`statics.body_penetration` `record` alone);
+`refuse`, `touched` and `remarks`, which `overlap.Overlaps` calls; `plain` and `passage`, which the simulations read,
+and `deepest`, which `dynamics.history` and `statics.body_penetration` read; texts of `DeepestPair` for which
+`overlap.Deepest` asks; `PairOverlaps`, which `dynamics.simulation` and `statics.body_penetration` import. Tests:
 ``tests/effects/test_between_bodies.py``.
 """
 

@@ -10,7 +10,8 @@ the surface are not checked.
 
 May change: other words of messages. Must stay: texts of `status`, which stand in ``run.json``; the entries of a row of
 ``crossings``, which `record` reads, and the same without its time for `would_pass`, which
-`integrators.central_difference` calls. Tests: ``tests/effects/test_passage.py``.
+`integrators.central_difference` calls; `BodyPassage`, which `dynamics.simulation` imports. Tests:
+``tests/effects/test_passage.py``.
 """
 
 from __future__ import annotations

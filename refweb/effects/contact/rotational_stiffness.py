@@ -11,7 +11,8 @@ rotates the body by δθ = 2 (q₀ δq − δq₀ q + q × δq)/|q|². All but t
 
 May change: how the sums are written. Must stay: blocks with nodes, body and rotation in this order, along the axes of
 the body, which `penalty` and `friction` turn to space afterwards; what the functions add, as tangents of both rely on
-it. Tests: ``tests/effects/test_tumbling.py``, ``tests/test_contract.py``.
+it; all names that `penalty` and `friction` import. Tests: ``tests/effects/test_tumbling.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -4,10 +4,12 @@ The kernels for spheres are in `refweb.effects.contact.sphere`, those for other 
 `refweb.effects.contact.penalty`, and those of damping and friction in `refweb.effects.contact.friction`. Explicit steps
 use the solver in `refweb.effects.contact_solver`. Bodies with the same kernels make one term.
 
-May change: private functions, `OUT_OF_REACH` and messages. Must stay: keys and docstring of `Contact` (scene format and
-help; after a change write ``validation/REFERENCE.md`` anew); the order of `KEYS`, which is that of `pair.pair_data` and
-of contact between bodies; names in `Balance`, columns of ``history.csv``; `law_of`, `left_out`, `with_stiffness` and
-`friction_of`, which `scene`, `overlap` and `pair_overlap` call. Tests: ``tests/effects/test_contact.py``,
+May change: private functions, `OUT_OF_REACH` and messages. Must stay: the name "contact" of all terms, by which
+`system.unsupported_parts`, `dynamics.kinks` and `integrators.splitting` know them, and which `statics.gradients.KNOWN`
+has; keys and docstring of `Contact` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); the
+order of `KEYS`, which is that of `pair.pair_data` and of contact between bodies; names in `Balance`, columns of
+``history.csv``; `law_of`, `left_out`, `with_stiffness` and `friction_of`, which `scene`, `overlap` and `pair_overlap`
+call; public names of `Contact`, which other files use. Tests: ``tests/effects/test_contact.py``,
 ``tests/test_contract.py``.
 """
 

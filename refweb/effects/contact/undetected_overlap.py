@@ -5,8 +5,9 @@ the spheres around two bodies meet, points of the skeleton of each are compared 
 very little, and it may miss a short overlap.
 
 May change: private functions, `PLACES`, `LEAST` and `MOST`, which decide when a finding comes, and not results. Must
-stay: rows of `kept`, which checkpoints keep and `restore` reads: the number of a pair counts them in their order here;
-`silent_of`, which `dynamics.simulation` calls. Tests: ``tests/effects/test_between_bodies.py``.
+stay: the choice and order of the pairs of `Silent`, since checkpoints keep a pair by its number, and the three columns
+of `kept`, which `restore` reads; `silent_of`, `inspect`, `kept`, `restore` and `remarks`, which `dynamics.simulation`
+calls. Tests: ``tests/effects/test_between_bodies.py``.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ solves all of them. Nodes that are attached to one body are an exception: M⁻¹
 `refweb.effects.contact_solver`, and their equations are coupled, which takes a few sweeps.
 
 May change: `MOST_STEPS` and `CLOSE`. Must stay: the force, which is that of `force`; that contacts of a row stand
-together and the first has their number as ``group``, which `contact_solver` reads; signatures `DETECT` and `LAW`.
-Tests: ``tests/effects/test_drag.py``.
+together and the first has their number as ``group``, which `contact_solver` reads; signatures `DETECT` and `LAW`;
+`implicit_drag`, which `table` imports. Tests: ``tests/effects/test_drag.py``.
 """
 
 from __future__ import annotations

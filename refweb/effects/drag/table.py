@@ -2,10 +2,12 @@
 
 The force is in `refweb.effects.drag.force`, and its solver for explicit steps in `refweb.effects.drag.implicit_drag`.
 
-May change: private functions, messages, and the coefficient of spheres `SPHERE`, which moves results. Must stay: keys
-and docstring of `Drag` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); cells of a node
-one after another, which `implicit_drag` takes as one group; the order of numbers of a cell, read by `force.end_of`, of
-which `without` sets the first two to 0. Tests: ``tests/effects/test_drag.py``, ``tests/test_contract.py``.
+May change: private functions, messages, and the coefficient of spheres `SPHERE`, which moves results. Must stay: the
+name "drag", by which `integrators.tangent` tells the term from contacts that rub; keys and docstring of `Drag` (scene
+format and help; after a change write ``validation/REFERENCE.md`` anew); cells of a node one after another, which
+`implicit_drag` takes as one group; the order of numbers of a cell, read by `force.end_of`, of which `without` sets the
+first two to 0; public names of `Drag`, which other files use. Tests: ``tests/effects/test_drag.py``,
+``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -13,7 +13,8 @@ reported, not prevented. A pair with a distance d needs no new check before rows
 May change: `AHEAD`, which decides time alone; `LOOKS` upwards, by which fewer pairs count as meeting in doubt; `TRAVEL`
 downwards, which makes steps of implicit methods shorter. Must stay: signatures `MEETS` and `TIME_TO_CONTACT` of `meets`
 and `soon`; cells that are pairs or single elements; the last three entries of ``due``, which `integrators.ccd` uses;
-that no meeting is missed, which `MEETING` defines. Tests: ``tests/effects/test_self_contact.py``.
+that no meeting is missed, which `MEETING` defines; `neighbours`, which `table` imports. Tests:
+``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

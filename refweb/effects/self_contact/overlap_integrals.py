@@ -25,7 +25,8 @@ An element without length has no direction; then I is 0, which is its limit.
 
 May change: `SHORT`, and how pieces are found; `PLACES` and `WEIGHTS` are exact for the degree above. Must stay: the
 integral I and its derivatives, as the closed form of `line_line_penalty` has the same energy; the order of the slopes
-of `first`, which that file reads by position. Tests: ``tests/effects/test_self_contact.py``.
+of `first`, which that file reads by position; `add_second`, which `line_line_penalty` imports. Tests:
+``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

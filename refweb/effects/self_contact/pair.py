@@ -6,7 +6,8 @@ Cells of a term are pairs, of the nodes of one element and of another, or elemen
 May change: how the kernels are written. Must stay: fields of `ELEMENT` and `PAIR` by name: `table` writes elements,
 `search.paired` pairs, and `line_line_ccd.neighbours` of pairs ``touch``, ``scale`` and ``vectors`` alone; `APART`, the
 column behind `ELEMENT`; the ``scale`` 0 of a broken element; that `apart` says so only of pairs that do not touch, for
-which `ROUNDING` may only rise. Tests: ``tests/effects/test_self_contact.py``.
+which `ROUNDING` may only rise; all names that `line_line_penalty`, `line_line_ccd` and other files import; public names
+of `Place`, which other files use. Tests: ``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ An overlap above r is refused: from there on the push falls.
 May change: `AIM`, `STIFFER` (which stiffness is chosen) and messages. Must stay: `HELD` and `POWER`, which follow from
 the energy of `line_line_penalty`; texts of `status`, `PRESCRIBED` among them, and keys of ``plain``, which stand in
 ``run.json``; the stiffness in the `PenetrationError`, with which `runner` runs again; `would_pass`, `lines_of`,
-`pressed` and `first_stiffness`, which `integrators`, `statics` and `scene` call. Tests:
-``tests/effects/test_self_contact.py``.
+`pressed` and `first_stiffness`, which `integrators`, `statics` and `scene` call; `Passage`, which `commands.console`,
+`dynamics.simulation` and `statics.line_penetration` import. Tests: ``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ elements. Elements that share a node make no pair, nor do those that are listed 
 
 May change: `BOXES`, the size of the grid. Must stay: that no pair within reach is missed, `REACH` included; what
 `near_pairs` and `paired` return, for all kernels of this folder; the order of pairs, which decides the last digits of
-results. Tests: ``tests/effects/test_self_contact.py`` compares with all pairs.
+results; `axes_apart`, which `line_line_penalty` imports; `distances` and `foresee`, which `table` imports; `FASTER`,
+which `integrators.step_bound` imports. Tests: ``tests/effects/test_self_contact.py`` compares with all pairs.
 """
 
 from __future__ import annotations

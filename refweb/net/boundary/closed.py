@@ -7,8 +7,9 @@ inertia of a box at a distance of 1 km then has an error of 1e-5; here it is 3e-
 
 May change: private functions, texts of errors, and how triangles are turned outward. Must stay: `NotClosedError` for
 what `shapes.mesh` may repair (any other `InputError` refuses the file); fields of `Closed` and `Moments`, which
-`repair`, `shapes.mesh` and `shapes.terrain` read by name. `SAME`, `THIN` and `DENT` decide which files are taken.
-Tests: ``tests/net/test_boundary.py``.
+`repair`, `shapes.mesh` and `shapes.terrain` read by name. `SAME`, `THIN` and `DENT` decide which files are taken. Must
+stay as well: all names that `shapes.mesh`, `shapes.terrain` and other files import. Tests:
+``tests/net/test_boundary.py``.
 
 References
 ----------

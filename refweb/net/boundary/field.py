@@ -14,8 +14,9 @@ not 1.19.
 May change: private functions; `BYTES`, and how thickness is found (`LOOKS`, `OPPOSITE`, `BEYOND`, `THINNER`), which the
 penetration check compares with. Must stay: the numbers of a field in the order of `ORIGIN` to `HEAD`, since kernels
 read them at their address; the `Field`, which shapes keep as long as kernels may read it; `GAP`, which `repair` uses.
-`AROUND` and the formula of c change depth, so contact of all meshes and terrains. Tests:
-``tests/net/test_boundary.py``, ``tests/effects/test_mesh_bodies.py``.
+`AROUND` and the formula of c change depth, so contact of all meshes and terrains. Must stay as well: `places_on`, which
+`shapes.terrain` imports; `field_of`, which `shapes.filled` imports. Tests: ``tests/net/test_boundary.py``,
+``tests/effects/test_mesh_bodies.py``.
 
 References
 ----------

@@ -15,8 +15,8 @@ is that of one solid.
 
 May change: private functions, `EMPTY` and other texts; those in ``remarks`` become warnings of a run. Must stay: fields
 of `Repaired`, which `shapes.mesh` reads by name; surfaces without a fault, which keep their bits. `COARSE`, `SMALL`,
-`LOOKS`, `GAP`, `FLAT`, `LOOP` and `SUMMED` change depth and mass of faulty solids. Tests: ``tests/net/test_repair.py``
-compares with volumes in closed form.
+`LOOKS`, `GAP`, `FLAT`, `LOOP` and `SUMMED` change depth and mass of faulty solids. Must stay as well: `touches_itself`
+and `repaired`, which `shapes.mesh` imports. Tests: ``tests/net/test_repair.py`` compares with volumes in closed form.
 """
 
 from __future__ import annotations

@@ -10,8 +10,9 @@ these arrays, `refweb.net.net.Net.kept`.
 
 May change: private functions and how pieces are found. Must stay: numbers of a piece in the order of `WIDTH`, which
 kernels here and `statics.monotone_loading` read by position; the arrays, which `Net.kept` keeps alive; ``last_strain``,
-which `Net` and `results.state` read by name; stress, tangent, curvature and energy of one curve. Tests:
-``tests/net/test_curves.py``.
+which `Net` and `results.state` read by name; stress, tangent, curvature and energy of one curve; `curve_of` and
+`beside`, which `net.law_keys` imports; `Table`, which `statics.monotone_loading` imports; public names of `Curve`,
+which other files use. Tests: ``tests/net/test_curves.py``.
 """
 
 from __future__ import annotations

@@ -7,8 +7,9 @@ and EA of the line, ``line.ea``.
 May change: private functions; how `Mixed` chooses, and `DOUBLED` and `HALVED`, limits of the search of a strain. Must
 stay: names of kernels and attributes of `TensionLaw`, which laws of users give (a new one needs a default here, and an
 entry in `Mixed`), and which `Net.law_is`, `cable` and `statics` read by name; the signature ``(strain, line)``; `LINE`,
-the dtype of `line_data.FIELDS`. Tests: ``tests/net/test_laws.py``, ``tests/net/test_laws_by_group.py``,
-``tests/how_to/test_law.py``.
+the dtype of `line_data.FIELDS`; `evaluate`, which `net.tension_laws`, `statics.adjoint` and other files import;
+`record_of`, which `net.net` imports; `zero`, which `straight` imports. Tests: ``tests/net/test_laws.py``,
+``tests/net/test_laws_by_group.py``, ``tests/how_to/test_law.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Numbers of the elements of lines, by name, over the matrix that kernels read.
 
 May change: how the matrix is kept. Must stay: names and order of `FIELDS`, which `discretisation` fills and all kernels
-over lines read; new columns behind them, as effects add theirs by name. Tests: ``tests/net/test_elements.py``,
+over lines read; new columns behind them, as effects add theirs by name; `LineData`, which `net.discretisation`,
+`net.net` and other files import; `offsets`, which `net.discretisation` imports. Tests: ``tests/net/test_elements.py``,
 ``tests/test_contract.py``.
 """
 

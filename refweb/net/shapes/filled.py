@@ -2,8 +2,9 @@
 
 May change: texts of errors, and `MOST`, a limit of what is accepted. Must stay: fields of `Solid`, which `mesh` and
 `terrain` fill; ``solid`` and ``axes`` as what a subclass gives, and the life of ``solid``, since kernels read its field
-by address. `GRID`, `WIDE` and `WALL` change depth, so contact of all meshes and terrains. Tests:
-``tests/effects/test_mesh_bodies.py``, ``tests/net/test_boundary.py``.
+by address. `GRID`, `WIDE` and `WALL` change depth, so contact of all meshes and terrains. Must stay as well: `Filled`
+and `field_in`, which `mesh` and `terrain` import. Tests: ``tests/effects/test_mesh_bodies.py``,
+``tests/net/test_boundary.py``.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 May change: private functions, texts of errors, and `SIZES`, limits of what is accepted. Must stay: keys and docstring
 of `Mesh` (scene format and help; after a change write ``validation/REFERENCE.md`` anew); ``file``, which
-`registry.FILES` names so that paths count from the scene's folder. Tests: ``tests/effects/test_mesh_bodies.py``,
-``tests/net/test_repair.py``.
+`registry.FILES` names so that paths count from the scene's folder; `_solid`, which a test calls. Tests:
+``tests/effects/test_mesh_bodies.py``, ``tests/net/test_repair.py``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Rounded edges of boxes and cylinders.
 
 May change: texts of errors. Must stay: what `edge_radius` and `shrunk` return, which `box` and `cylinder` call.
-`ROUNDING` stands in docstrings of both, and changes results of all scenes without the key ``rounding``. Tests:
-``tests/effects/test_contact.py``.
+`ROUNDING` stands in docstrings of both, and changes results of all scenes without the key ``rounding``. Must stay as
+well: `check_rounding`, which `box` and `cylinder` import. Tests: ``tests/effects/test_contact.py``.
 """
 
 from __future__ import annotations

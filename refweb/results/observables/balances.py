@@ -2,8 +2,8 @@
 
 May change: only docstrings, which are help: then write ``validation/REFERENCE.md`` anew. Must stay: names of energies,
 which are columns of `results.columns` and of `Balance` of effects; `weights` and `lost_by_path`, which
-`dynamics.history`, `dynamics.responses` and `statics.remarks` call; class names in `registry.OBSERVABLES`. Tests:
-``tests/results/test_observable_contract.py``.
+`dynamics.history`, `dynamics.responses` and `statics.remarks` call; class names in `registry.OBSERVABLES`; `Booked`,
+which `dynamics.responses` and `statics.responses` import. Tests: ``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 May change: how values are found, in `values` and in the probe together. Must stay: class docstrings (help; after a
 change write ``validation/REFERENCE.md`` anew) and names in `registry.OBSERVABLES`; classes that `statics.simulation`,
-`statics.responses`, `dynamics.responses` and `sizing.case` know. Tests: ``tests/results/test_observable_contract.py``,
-``tests/results/test_selections.py``.
+`statics.responses`, `dynamics.responses` and `sizing.case` know; `Strain` and `Stress`, which `sizing.case` and
+`statics.responses` import; `Line`, which `dynamics.responses` imports; `StressShare`, which `statics.simulation`
+imports. Tests: ``tests/results/test_observable_contract.py``, ``tests/results/test_selections.py``.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 May change: how values are found, in `of` and in the probe together. Must stay: ``numbers`` in the form that the
 compiled `probes.largest_of` and `probes.selected_row` read; `Nodal`, on which `reaction` and `angular_momentum` build;
-class docstrings (help; after a change write ``validation/REFERENCE.md`` anew) and names in `registry.OBSERVABLES`.
-Tests: ``tests/results/test_observable_contract.py``, ``tests/results/test_selections.py``.
+class docstrings (help; after a change write ``validation/REFERENCE.md`` anew) and names in `registry.OBSERVABLES`;
+`Place`, which `sizing.case` and `statics.responses` import. Tests: ``tests/results/test_observable_contract.py``,
+``tests/results/test_selections.py``.
 """
 
 from __future__ import annotations

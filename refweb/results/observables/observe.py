@@ -2,8 +2,9 @@
 
 May change: private functions and texts of errors. Must stay: keys, defaults and docstring of `Observe` (scene format
 and help; after a change write ``validation/REFERENCE.md`` anew); `SIGN` and `PARTS`, which follow from keys; `default`,
-the observables of a scene without any; `observes_of` and `bounds_by_name`, which read ``scene.toml`` for pictures and
-studies. Tests: ``tests/test_scene.py``, ``tests/results/test_selections.py``.
+the observables of a scene without any; `observes_of` and `bounds_by_name`, which read ``scene.toml`` for pictures,
+studies and `sizing.problem`; public names of `Observe`, which other files use. Tests: ``tests/test_scene.py``,
+``tests/results/test_selections.py``.
 """
 
 from __future__ import annotations

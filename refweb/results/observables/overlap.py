@@ -1,9 +1,9 @@
-"""Depth of lines in bodies.
+"""Depth of lines in bodies, and the probe of the largest speed of a point of a body.
 
 May change: private functions; the class docstring, which is help: then write ``validation/REFERENCE.md`` anew. Must
 stay: rows of the probes, which are those of `system.contact_forces`; `probe_of…` and `probes_between`, by which
-`dynamics.history` follows contact. Tests: ``tests/results/test_contact_force.py``,
-``tests/results/test_every_number.py``.
+`dynamics.history` follows contact; `probe_of_speed` and `probe_of_touch`, which `dynamics.history` imports. Tests:
+``tests/results/test_contact_force.py``, ``tests/results/test_every_number.py``.
 """
 
 from __future__ import annotations

@@ -6,8 +6,9 @@ else acts.
 
 May change: how forces are added up, in `of` and in the kernels `reaction` and `contact_force` of `probes` together.
 Must stay: the sign (what holds, not what acts); the class docstring (help; after a change write
-``validation/REFERENCE.md`` anew) and name in `registry.OBSERVABLES`. Tests:
-``tests/results/test_observable_contract.py``, ``tests/results/test_contact_force.py``.
+``validation/REFERENCE.md`` anew) and name in `registry.OBSERVABLES`; `Reaction`, which `dynamics.responses` and
+`statics.responses` import. Tests: ``tests/results/test_observable_contract.py``,
+``tests/results/test_contact_force.py``.
 """
 
 from __future__ import annotations

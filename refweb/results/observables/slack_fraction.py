@@ -1,8 +1,8 @@
 """The share of elements that are slack.
 
 May change: the class docstring, which is help: then write ``validation/REFERENCE.md`` anew. Must stay: one value with
-`probes.slack_fraction`, the kernel of dynamics; the class name in `registry.OBSERVABLES`. Tests:
-``tests/results/test_observable_contract.py``.
+`probes.slack_fraction`, the kernel of dynamics; the class name in `registry.OBSERVABLES`; `SlackFraction`, which
+`dynamics.gradients` imports. Tests: ``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations

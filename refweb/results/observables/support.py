@@ -8,10 +8,11 @@ negative, and what the centre of mass takes to go round an axle:
 with the arm r from the axle to the centre of mass, the moment M of all that acts and I about the axle. An axle bears
 the moment across it, J α n + ω² n × J n − M with the tensor of inertia J about the same point.
 
-May change: private functions and how the formulas are written: the kernels serve `of` as well. Must stay: signs; rows
-and data of a probe in the order that its kernel reads; class docstrings (help; after a change write
-``validation/REFERENCE.md`` anew) and names in `registry.OBSERVABLES`. Tests: ``tests/effects/test_axles.py``,
-``tests/effects/test_moved_bodies.py``.
+Keys, and rows of a body by `rows`, are those of `rotation.Turning`. May change: private functions and how the formulas
+are written: the kernels serve `of` as well. Must stay: signs; rows and data of a probe in the order that its kernel
+reads; class docstrings (help; after a change write ``validation/REFERENCE.md`` anew) and names in
+`registry.OBSERVABLES`; `AxleAngle`, which `statics.responses` knows by its class. Tests:
+``tests/effects/test_axles.py``, ``tests/effects/test_moved_bodies.py``.
 """
 
 from __future__ import annotations

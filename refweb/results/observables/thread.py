@@ -2,8 +2,9 @@
 
 May change: class docstrings, which are help: then write ``validation/REFERENCE.md`` anew. Must stay: columns of ``out``
 that `column` counts, as `effects.thread`, `effects.thread_friction` and `effects.winding` write them; class names,
-which are the capitalised names of quantities: `Observe` finds them so; `of_cell`, which `dynamics.history` calls.
-Tests: ``tests/effects/test_thread.py``, ``tests/effects/test_thread_friction.py``.
+which are the capitalised names of quantities: `Observe` finds them so; `of_cell`, which `dynamics.history` calls;
+`OfThread`, which `statics.responses` imports. Tests: ``tests/effects/test_thread.py``,
+``tests/effects/test_thread_friction.py``.
 """
 
 from __future__ import annotations
