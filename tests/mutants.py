@@ -438,7 +438,9 @@ MUTANTS = [
         "dynamics/integrators/snaps", "change += (high - low) / (2.0 * number.step)", "change += 0.0 * (high - low)"
     ),
     Mutant("dynamics/integrators/snaps", "jump -= 0.5 * (bend", "jump -= 0.0 * (bend"),
-    Mutant("dynamics/integrators/snaps", "self.kinks[n] = f", "_ = f"),
+    Mutant("dynamics/integrators/snaps", "self.kinks.setdefault(n, (since,", "_ = (n, (since,"),
+    Mutant("dynamics/integrators/snaps", "        if corner:\n", "        if False:\n"),
+    Mutant("dynamics/integrators/snaps", "<= MOVED * np.abs(rates)", "<= 1.0 * np.abs(rates)"),
     Mutant("dynamics/integrators/tangent", "            self._drive(t, t)\n", "            pass\n"),
     Mutant("dynamics/linear_run", "value + move, left + move", "value, left"),
     Mutant("dynamics/linear_run", "if before is now or not SIGN[o.reduce]:", "if True:"),

@@ -305,8 +305,8 @@ def _with_errors(observe, first, finer, factor, result, sizes):
             )
         if n in first.kinks and first.kinks[n][0] < end:
             stays = (
-                f"at {first.kinks[n][0]:.4g} s {first.kinks[n][1]}; a number that rises changes the "
-                "motion otherwise than one that falls: change the start or the number a little, or use refweb sweep"
+                f"{first.kinks[n][1]}; a number that rises changes the motion otherwise than one that falls: change "
+                "the start or the number a little, or use refweb sweep"
             )
         known.append(Known(value, left if left != value else None, total, before, errors[n], rivals, stays))
     return known

@@ -44,7 +44,7 @@ class LinearRun:
     peaks, samples : dict of str to list of refweb.dynamics.peaks.Peak
         Peaks of each result, and values of those that are reduced over time at the times of the rows.
     kinks : dict of int to (float, str)
-        Time [s] and text of the first kink at which the motion has no derivative, by the index of a number.
+        Time [s] from which on the motion has no derivative, and text of this kink, by the index of a number.
     snapped : float
         Time of the first line that snaps taut with a jump of its damping force [s], infinite if none does.
     """
@@ -62,8 +62,7 @@ class LinearRun:
         }
         self.times, self.rows = [], {o.name: [] for o in observed}
         self.peaks, self.samples = {o.name: [] for o in observed}, {o.name: [] for o in self._reduced}
-        snaps = self._tangent.snaps
-        self.kinks = {n: (0.0, text) for n, text in snaps.kinks.items()} if snaps else {}
+        self.kinks = self._tangent.snaps.kinks if self._tangent.snaps else {}
         self.snapped, self._delays = np.inf, np.zeros((len(numbers), 0))
 
     def follow(self, times, sampled):
@@ -118,7 +117,8 @@ class LinearRun:
         now = kinks_of(system, self._numbers, *self._trail[-1][1])
         for n, kinks in enumerate(now if before else ()):
             for kink in sorted(kinks & before[n])[:1]:
-                self.kinks.setdefault(n, (self._trail[-2][1][0], f"{text_of(system, kink)}, and stays so"))
+                since = self._trail[-2][1][0]
+                self.kinks.setdefault(n, (since, f"at {since:.4g} s {text_of(system, kink)}, and stays so"))
         self._kinked = now if due and any(now) else []
 
     def _instant(self):

@@ -178,6 +178,42 @@ def test_a_line_at_its_natural_length_that_snaps_taut_at_the_start():
             solution.gradient("x", PATHS[key])
 
 
+def at_rest(effect):
+    """A mass at rest at 0.9 m on a damped line of 1 m that a table makes just taut in 50 ms."""
+    scene = flight(2e-4, (effect,))
+    return scene.replace(effects=[scene.effects[0], *scene.effects[2:]])
+
+
+PULLED = [(0.0, 0.0, 0.0, 0.0), (0.05, -0.1, 0.0, 0.0)]
+JUST_TAUT = {
+    "pulled": refweb.Motion(node=[0], displacement=[*PULLED, (0.2, -0.1, 0.0, 0.0)]),
+    "reeled": refweb.Reel(lines=[0], factor=[(0.0, 1.0), (0.05, 0.9), (0.2, 0.9)]),
+}
+
+
+@pytest.mark.parametrize("effect", JUST_TAUT.values(), ids=JUST_TAUT)
+def test_a_line_that_is_just_taut_from_a_corner_on(effect):
+    """A shorter line pulls the mass before the corner, and a longer one never does: refused; EA changes no time."""
+    scene = at_rest(effect)
+    solution = refweb.run(scene.replace(solve=replace(scene.solve, duration=0.06)), progress=False)
+    solution.gradients.follow(PATHS[key] for key in ("start", "length", "modulus"))
+    for name, key in (("x", "start"), ("top", "start"), ("x", "length")):
+        with pytest.raises(InputError, match="at 0.05 s line 0 is neither slack nor taut, and its damping force jumps"):
+            solution.gradient(name, PATHS[key])
+    gradient = solution.gradient("x", PATHS["modulus"])
+    assert abs(float(gradient)) <= gradient.error[0] < 1e-3 / MODULUS
+
+
+def test_a_line_that_snaps_taut_at_a_corner():
+    """Its end is pulled on at half the speed: beside its end, which moves on evenly, the mass is on a dashpot."""
+    effect = refweb.Motion(node=[0], displacement=[*PULLED, (0.15, -0.2, 0.0, 0.0)])
+    solution = refweb.run(at_rest(effect), progress=False)
+    exact = by_complex_step(oscillation, TAUT | dict(speed=1.0, start=START + 0.05))  # 50 ms of flight at 1 m/s
+    for key in ("start", "length"):
+        gradient = solution.gradient("x", PATHS[key])
+        assert abs(float(gradient) - exact[key]["x"]) <= gradient.error[0] < 0.1, key
+
+
 def test_a_contact_with_losses_begins_without_a_jump():
     """A ball that meets what is fixed at v: m z'' = k δ max(1 + d δ', 0), whose force begins at 0, beside scipy."""
     numbers = {"body.0.position.2": 0.11, "body.0.velocity.2": -2.0, "contact.damping": 0.3}

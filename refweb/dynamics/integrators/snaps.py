@@ -12,6 +12,9 @@ This is the limit of refined steps. The derivative of the steps themselves does 
 moves t* into no other step. At a line that goes slack and at a contact nothing jumps: the force of the line has come
 to 0 before, and that of a contact, with its losses, begins at 0.
 
+At a corner of a table of a motion or reel a line may come to its slackness and be no tauter behind it. It is damped for
+numbers of one side alone, so that the motion has no derivative.
+
 A law whose slope changes over a strain that is short against that of a step is one with a jump; the curvature at both
 ends of the step gives the part of Δσ' that is in the steps.
 
@@ -34,6 +37,8 @@ BESIDE = 1e-9
 """Distance from the slackness, in strain, at which slopes of a law are those on either side of it."""
 MOVED = 1e-6
 """Change of this distance over that of a number, over its size, from which on it counts; below it is rounding."""
+SOON = 1e-3
+"""Time behind a corner of a table, over a step, at which a line is taut that passes its slackness there."""
 
 
 def strains_of(system, t, x):
@@ -66,8 +71,9 @@ class Snaps:
 
     Attributes
     ----------
-    kinks : dict of int to str
-        Text of a line that snaps taut at the start for numbers of one side alone, by the index of the number.
+    kinks : dict of int to (float, str)
+        Time [s] from which on there is no derivative, and text, of the first line that snaps taut for numbers of one
+        side alone, by the index of the number.
     delays : ndarray, shape (p, snaps)
         δt* of lines that snapped taut in the last step [s per unit of the number].
     """
@@ -75,15 +81,35 @@ class Snaps:
     def __init__(self, system, numbers, x, v, dx):
         self._system, self._numbers, self._cells, self._law = system, numbers, system.net.cells, system.net.law
         self.kinks, self.delays, self._known = {}, np.zeros((len(numbers), 0)), self._of(0.0, x)
-        lines = system.line_data(0.0)
+        at = self._at_slackness(0.0)
+        changes, (rates,) = self._changes(0.0, x, dx, at, True)[0], self._changes(0.0, x, v[None], at, False)[0]
+        self._add_kinks(0.0, 0.0, at[rates > 0.0], changes[:, rates > 0.0])
+
+    def _at_slackness(self, t):
+        """Indices of elements between slack and taut, with a free node, of which the slope of the law jumps."""
+        lines, supported = self._system.line_data(t), self._system.supported
+        at = np.flatnonzero(np.abs(self._known[0] - lines.slackness) <= AT_CORNER)
+        if not at.size:
+            return at
         below, above = (
             evaluate(self._law.tangent, lines.slackness + s * BESIDE, lines, self._law.columns) for s in (-1.0, 1.0)
         )
-        at = np.flatnonzero((np.abs(gaps_of(system, 0.0, x)) <= AT_CORNER) & (above - below > JUMP * lines.ea))
-        changes, (rates,) = self._changes(0.0, x, dx, at, True)[0], self._changes(0.0, x, v[None], at, False)[0]
-        for n, number in enumerate(numbers):
-            for e in at[(rates > 0.0) & (np.abs(changes[n]) * number.size > MOVED)][:1]:
-                self.kinks[n] = f"line {system.net.line[e]} is neither slack nor taut, and its damping force jumps"
+        free = ~supported[self._cells[at]].reshape(len(at), -1).all(axis=1)
+        return at[free & ((above - below)[at] > JUMP * lines.ea[at])]
+
+    def _add_kinks(self, since, t, at, changes):
+        """Add for each number the kink of the first of some elements whose gap at a time t it changes."""
+        for n, number in enumerate(self._numbers):
+            for e in at[np.abs(changes[n]) * number.size > MOVED][:1]:
+                text = f"at {t:.4g} s line {self._system.net.line[e]} is neither slack nor taut"
+                self.kinks.setdefault(n, (since, f"{text}, and its damping force jumps"))
+
+    def _find_kinks(self, t, h, x, v, dx, grown):
+        """Note lines that are at their slackness at a corner of a table, and taut on one side of it alone."""
+        at, soon = self._at_slackness(t), SOON * h
+        rates = np.array([grown[at] / h, gaps_of(self._system, t + soon, x + soon * v)[at] / soon])
+        at = at[(rates.max(axis=0) > 0.0) & (rates.min(axis=0) <= MOVED * np.abs(rates).max(axis=0))]
+        self._add_kinks(t - h, t, at, self._changes(t, x, dx, at, True)[0])
 
     def _of(self, t, x):
         """Strain, and slope and curvature of the law [N], of each element."""
@@ -102,12 +128,17 @@ class Snaps:
             change += (high - low) / (2.0 * number.step)
         return changes, to
 
-    def add(self, t, h, x, dx, dv, inverse):
-        """Add what a step h to the time t, which ends at the displacement x, jumps to its derivatives ``dv``."""
+    def add(self, t, h, x, v, dx, dv, inverse, corner):
+        """Add what a step h to the time t, which ends at x and v, jumps to its derivatives ``dv``.
+
+        At a ``corner`` of a table v is behind it.
+        """
         (before, slope, bend), lines = self._known, self._system.line_data(t)
         self._known = self._of(t, x)
         strain, jump = self._known[0], self._known[1] - slope
         grown = strain - before
+        if corner:
+            self._find_kinks(t, h, x, v, dx, grown)
         jump -= 0.5 * (bend + self._known[2]) * grown
         at = np.flatnonzero((grown > 0.0) & (np.abs(jump) > JUMP * lines.ea))
         left = h * np.clip((strain[at] - lines.slackness[at]) / grown[at], 0.0, 1.0)

@@ -232,7 +232,7 @@ class Tangent:
         self.x += h * self.v
         self._drive(t, t - 0.5 * h)
         if self.snaps:
-            self.snaps.add(t, h, x, self.x, self.v, self.inverse)
+            self.snaps.add(t, h, x, v, self.x, self.v, self.inverse, corner)
         now, behind = t, (v, f)
         if corner:
             now, v = t - BESIDE * h, v.copy()
