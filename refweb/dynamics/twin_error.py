@@ -228,7 +228,7 @@ def with_errors(results, floors, twin, kept_rows, rows_refined, order=2.0, drift
         Results of both runs.
     floors : dict of str to float
         Lower limits of ±.
-    rows_run, rows_refined : ndarray, shape (rows, columns)
+    kept_rows, rows_refined : ndarray, shape (rows, columns)
         Rows of both histories, see `refweb.dynamics.history.Watch.compared`. Rows of equal times are compared; the last
         times differ if an event ends a run.
     order : float
