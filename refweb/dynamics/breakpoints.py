@@ -1,8 +1,8 @@
 """Cost of the breakpoints of tables: steps end at each, and more breakpoints than steps set the step.
 
 May change: `TOLD` and the words of the finding. Must stay: `remarks_on_corners`, which `simulation` and ``refweb
-check`` call; integrators whose steps have a bound bring `steps_in`; of others the finding says the number of breakpoints
-alone. No number of a result depends on this file. Tests: ``tests/dynamics/test_corners.py``.
+check`` call; integrators whose steps have a bound bring `steps_in`; of others the finding says the number of
+breakpoints alone. No number of a result depends on this file. Tests: ``tests/dynamics/test_corners.py``.
 """
 
 from __future__ import annotations
