@@ -206,6 +206,7 @@ def test_an_error_above_the_target_is_told(measured, monkeypatch):
     assert "| `jax_fdm` | 2e-02 m off |" in (folder / "peers.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_an_index_that_is_not_reached_is_told(monkeypatch):
     environment = {"PIP_CONFIG_FILE": os.devnull, "PIP_INDEX_URL": "http://127.0.0.1:9", "PIP_FIND_LINKS": ""}
     for key, value in (environment | {"PIP_RETRIES": "1", "PIP_TIMEOUT": "2"}).items():

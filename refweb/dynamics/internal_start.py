@@ -2,7 +2,8 @@
 
 May change: words of refusals. Must stay: `known_variables`, which `initial_state` calls; what it compares are the keys
 ``internal``, ``internal_lines`` and ``threads`` of `system.internal_rows.kept`, and folders without the last two are
-still read. Tests: ``tests/dynamics/test_internal_start.py``.
+still read; names of rows in ``bodies`` of a checkpoint, read here by pattern, as `Net.internal_names` makes them: with
+others every variable begins as new, and nothing is refused. Tests: ``tests/dynamics/test_internal_start.py``.
 """
 
 from __future__ import annotations

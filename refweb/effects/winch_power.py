@@ -23,8 +23,10 @@ positive to haul in, and v [m/s]. Lines on such winches are in `refweb.effects.w
 May change: `ROUNDS` and `ROUNDING`. Must stay: the name "thread" of the terms, which `statics.gradients.KNOWN` and
 `studies.modes` have; `BEHIND`, the column of the power, which follows from the numbers of `Winch.numbers`;
 `rate_kernel`, which `wound_mass` calls, and fields of `PowerKernels`, which `wound_lines` uses; slip and energy as
-unknowns behind the nodes of a cell, in this order; `with_power`, which `thread` imports; `power_kernels`, which
-`wound_lines` imports. Tests: ``tests/effects/test_winch.py``, ``tests/test_contract.py``.
+unknowns behind the nodes of a cell, in this order; their places in the rows of a thread, which
+`net.threads.ThreadLine.unknowns` repeats, and those of pull and time, all in the order of `thread_friction`;
+`with_power`, which `thread` imports; `power_kernels`, which `wound_lines` imports. Tests:
+``tests/effects/test_winch.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations

@@ -89,7 +89,6 @@ CASES = [  # law, effects, paths
     "tension-only-cable.modulus",
     "linear-damping.time",
     "table-load.0.force.2",
-    "smooth-body.0.mass",
     "tension-only-drag.normal",
     "linear-motion.0.displacement.1.3",
     "linear-reel.0.factor.1.1",
@@ -631,6 +630,7 @@ def test_beyond_the_horizon():
     )
 
 
+@pytest.mark.slow
 def test_slack_lines_are_chaotic():
     """A ball on slack lines has a height with digits, and a gradient without: it is refused from its horizon on."""
 

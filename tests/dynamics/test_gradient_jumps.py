@@ -149,6 +149,7 @@ def between_slack_lines(mass, speed, time, length):
     return {"x": y[0], "v": y[1]}
 
 
+@pytest.mark.slow
 def test_one_line_after_the_other():
     """A mass snaps one line taut, is thrown back and snaps the other: beside scipy with events, within ±."""
     numbers = dict(mass=1.0, speed=SPEED, time=2e-3, length=1.05)

@@ -40,6 +40,7 @@ def velocity(solution, angle):
     return v @ [-np.cos(angle), 0.0, -np.sin(angle)], v @ normal
 
 
+@pytest.mark.ordinary("0.3-0.1", "0.4-0.0")
 @pytest.mark.parametrize("angle, friction", [(0.5, 0.3), (0.3, 0.1), (0.4, 0.0)])
 def test_a_mass_slides_down_a_slope(angle, friction):
     """a = g (sin α − μ cos α); with the push N, m v along is m g t sin α − μ ∫N dt, ∫N dt = m g t cos α + m v away."""
@@ -298,6 +299,7 @@ def test_the_error_of_terrain_is_that_of_the_ground(tmp_path):
     assert np.abs(found).max() < errors[-1] + sagitta
 
 
+@pytest.mark.ordinary("shape1")
 @pytest.mark.parametrize("shape", [{"radius": 0.1}, {"shape": "box", "size": [0.2, 0.3, 0.1]}])
 def test_bodies_move_on_a_terrain_as_on_the_plane(shape, tmp_path):
     """A ball and a box that fall on a slope, skid and turn."""

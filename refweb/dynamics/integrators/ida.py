@@ -21,8 +21,10 @@ for every node alike, with r_x = 0 for one without mass.
 
 May change: private methods, and `UNTESTED`, upwards. Must stay: unknowns stand in the order x, v, λ, μ, also for
 `system.links`; arguments of `residual`, `set_up`, `precondition`, `jacobian_times` and `jacobian`, by which sksundae
-calls them; the Jacobian is the derivative of `residual`. Keys of ``[solve]`` are those of `registry.INTEGRATORS`.
-Tests: ``tests/dynamics/integrators/test_ida.py``.
+calls them; the Jacobian is the derivative of `residual`; ``kind`` "bdf" of its `Variant`, which "cvode-bdf" has as
+well: `studies.references` takes methods of other kinds as independent; `constraint_drift`, which stands in checkpoints
+by name and in ``run.json``. Keys of ``[solve]`` are those of `registry.INTEGRATORS`. Tests:
+``tests/dynamics/integrators/test_ida.py``.
 
 References
 ----------

@@ -17,8 +17,9 @@ wide list alone.
 May change: `LASTS`, `LONGEST`, `WIDEST`, `MANY`, `FEWEST`, `PRICE` and `INNER`, which trade searches for evaluations.
 Must stay: no change may miss a contact, so that `WAY`, `SHARE` and `COVERED`, parts of the bound, stay; results are
 those with all lines, bit for bit. Places behind the terms in `records.ForceTerms` are in the order of `near_of`, also
-for `contacts`, `step_bound` and `implicit_contacts`. `ccd` leaves out cells and checks by ``depth``, ``used``, ``last``
-and ``steps`` of `SKIN`: their meaning stays, or a passage is missed. Must stay as well: all names that `explicit_loop`,
+for `contacts`, `step_bound` and `implicit_contacts`. `ccd` leaves out cells and checks by ``depth``, ``used``,
+``last`` and ``steps`` of `SKIN`: their meaning stays, or a passage is missed; `ccd` writes `fastest`, in one word with
+`top`, and `central_difference` reads and sets back `longest`. Must stay as well: all names that `explicit_loop`,
 `central_difference` and other files import; public names of `NeighbourList`, which other files use. Tests:
 ``tests/dynamics/integrators/test_nearby.py``.
 """

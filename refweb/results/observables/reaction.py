@@ -4,8 +4,9 @@ A kernel gets the total force f on each row; the force of a support is −f. The
 its contacts and the threads that run over it, see `refweb.system.contact_forces`: it is zero without these, whatever
 else acts.
 
-May change: how forces are added up, in `of` and in the kernels `reaction` and `contact_force` of `probes` together.
-Must stay: the sign (what holds, not what acts); the class docstring (help; after a change write
+May change: how forces are added up, in `of` and in the kernels `reaction` and `contact_force` of `probes` together;
+`dynamics.responses.parts_of` and `statics.responses` repeat the sum for gradients, so that it changes in all four
+places. Must stay: the sign (what holds, not what acts); the class docstring (help; after a change write
 ``validation/REFERENCE.md`` anew) and name in `registry.OBSERVABLES`; `Reaction`, which `dynamics.responses` and
 `statics.responses` import. Tests: ``tests/results/test_observable_contract.py``,
 ``tests/results/test_contact_force.py``.

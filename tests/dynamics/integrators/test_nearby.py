@@ -50,6 +50,7 @@ def solver_of(scene, everything):
     return CentralDifference(system, *solver.observed)
 
 
+@pytest.mark.ordinary("ball", "bodies", "exponent", "shaken", "rubbing", "tumbling", "crate")
 @pytest.mark.parametrize(
     "scene",
     [
