@@ -229,19 +229,21 @@ def steps_until(end, changing, scheme, model, running):
         speed = max(speed, v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
         a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
         push = max(push, a0 * a0 + a1 * a1 + a2 * a2)
-    turns = model.inertia.turns
+    turns, hardest, spread = model.inertia.turns, math.sqrt(push), 0.0
     if turns.moment.size:
         speed = max(speed, fastest_point(running.x, v, turns) ** 2)
         push = max(push, hardest_push(running.x, f, inverse, turns) ** 2)
     fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
     if model.nearby.at.shape[0]:
-        fastest = min(fastest, spread_of(v[: model.inertia.linear]) + interval * math.sqrt(push))
+        spread = spread_of(v[: model.inertia.linear])
+        fastest = min(fastest, spread + interval * math.sqrt(push))
     reach = 2.0 * interval * fastest
     reach_all(reach, running.x, model.nearby, model.terms)
     if not model.nearby.at.shape[0]:
         return interval / (scheme.safety * safe_step(time, end, changing, reach, fastest, running.x, f, model))
     early = EARLY / SPAN * scheme.span
-    return interval / (scheme.safety * step_by_pairs(time, end, early, changing, reach, fastest, model, running))
+    bound = step_by_pairs(time, end, early, changing, reach, fastest, spread, hardest, model, running)
+    return interval / (scheme.safety * bound)
 
 
 @kernel(leaf=True, apart=())

@@ -18,7 +18,6 @@ from ...effects.natural_lengths import set_lengths
 from ...effects.self_contact.search import FASTER
 from ...kernels import BOUND, Matrix, kernel
 from ...net.rotation_bounds import carry_rates, pull_rates
-from .vector_spread import spread_of
 
 if TYPE_CHECKING:
     from .records import ForceTerms, Inertia, Model, Running
@@ -90,23 +89,22 @@ def step_by_pairs(
     changing: bool,
     reach: float,
     speed: float,
+    spread: float,
+    hardest: float,
     model: Model,
     running: Running,
 ) -> float:
     """Bound the step as `safe_step` does, for lines that touch lines, by the speed of each pair.
 
     Pairs are found anew, so that steps do not depend on which pairs happen to be listed, as they would where a run is
-    taken row by row. Forces add to speeds for a time ``early`` [s], see
-    `refweb.effects.self_contact.search.foresee`.
+    taken row by row. Speeds differ by ``spread`` [m/s] at most, and forces add to them for a time ``early`` [s], by the
+    acceleration ``hardest`` [m/s²] at most, see `refweb.effects.self_contact.search.foresee`.
     """
-    nearby, terms, linear, inverse = model.nearby, model.terms, model.inertia.linear, model.inertia.inverse
-    x, v, f, hardest = running.x, running.v, running.f, 0.0
-    for r in range(linear):
-        a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
-        hardest = max(hardest, a0 * a0 + a1 * a1 + a2 * a2)
+    nearby, terms, inverse = model.nearby, model.terms, model.inertia.inverse
+    x, v, f = running.x, running.v, running.f
     first, span = 2 * len(terms.data) - len(terms.cells), end - start  # see `records.ForceTerms`
     early = min(early, span)
-    within = FASTER * span * (spread_of(v[:linear]) + 2.0 * early * math.sqrt(hardest))
+    within = FASTER * span * (spread + 2.0 * early * hardest)
     if not within < FAR * nearby.skin[0].widest:
         within = math.inf
     for m in range(nearby.terms.size):

@@ -196,7 +196,7 @@ class Contact(Table):
             ball, spins = body.shape.once and not body.offset.any(), rotations(body)  # whose push is no moment
             depth = None if ball and self._of(body, "exponent") == 1.0 else body.shape.depth()
             pressed.setdefault((depth, 2 if spins == 2 and not ball else 0), []).append(body)
-            if self._of(body, "damping") > 0.0 or self._of(body, "friction") > 0.0:
+            if self._loses(body):
                 losing.setdefault((body.shape.depth(), spins), []).append(body)
         terms = [self._penalty(net, element, depth, spins, bodies) for (depth, spins), bodies in pressed.items()]
         lost = [self._friction(net, element, depth, spins, bodies) for (depth, spins), bodies in losing.items()]
@@ -268,7 +268,11 @@ class Contact(Table):
     def _rubs(self, bodies):
         """True if friction of lines may read where they touch bodies: any has losses, and all are convex."""
         convex = all(getattr(body.shape.depth(), "convex", True) and not body.shape.once for body in bodies)
-        return convex and any(self._of(body, key) > 0.0 for body in bodies for key in ("damping", "friction"))
+        return convex and any(map(self._loses, bodies))
+
+    def _loses(self, body):
+        """True if contact with a body has damping or friction."""
+        return self._of(body, "damping") > 0.0 or self._of(body, "friction") > 0.0
 
     def _friction(self, net, element, depth, spins, bodies):
         from .friction import kernels

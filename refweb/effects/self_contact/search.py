@@ -276,13 +276,13 @@ def near(skin, x, cells, data, chosen):
     count = 0
     for c in range(cells.shape[0]):
         p, u, w = place_of(x, cells, data, c)
-        reach = REACH * record_at(PAIR, data, c, 0).touch + skin
+        touch = record_at(PAIR, data, c, 0).touch
+        reach = REACH * touch + skin
         m = p[0] + 0.5 * (u[0] - w[0]), p[1] + 0.5 * (u[1] - w[1]), p[2] + 0.5 * (u[2] - w[2])
         square = m[0] * m[0] + m[1] * m[1] + m[2] * m[2]
         span = u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
         if square > 0.75 * span + 3.0 * reach * reach or nearest(p, u, w)[2] >= reach * reach:
             continue  # what is not a number is near
-        touch = record_at(PAIR, data, c, 0).touch
         if axes_apart(p, u, w, touch, skin) > touch:
             continue
         chosen[count] = c
