@@ -343,10 +343,7 @@ def depth_ahead(reach, speed, x, mass, cells, data, c):
         if min(first_mass, second_mass) > 0.0
         else max(first_mass, second_mass)
     )
-    if pair.speed < math.inf:
-        speed = min(speed, pair.speed)
-    elif speed == 0.0:
-        speed = math.inf
+    speed = min(speed if speed > 0.0 else math.inf, pair.speed)
     moving = 0.5 * reduced * speed * speed
     p, u, w = geometry
     left, axes = max(math.sqrt(square) - reach, 0.0), axes_apart(p, u, w, touch, reach)
