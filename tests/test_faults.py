@@ -169,7 +169,7 @@ def test_a_long_row_is_interrupted(tmp_path, monkeypatch):
     assert summary_of(tmp_path / "out")["message"] == f"interrupted after t = {0.02 * (len(rows) - 1):g} s"
 
 
-@pytest.mark.ordinary("ida")
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["cvode", "ida"])
 def test_an_interrupted_run_goes_on_within_tolerance(tmp_path, monkeypatch, method):
     """The solver begins anew at the checkpoint, so that rounding and step sizes differ, but neither books nor peaks.

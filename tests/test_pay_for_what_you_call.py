@@ -311,6 +311,8 @@ ALIKE = (
     "four-satellites",
     "net-capture",
     "corner-control",
+    "catenary",
+    "ring-on-thread",
 )
 """Scenes that call for what others call for, on another web, or each part of which others call for."""
 

@@ -51,6 +51,7 @@ MOTIONS = {
 has another law of lines, or of their contact, in a net that is 0.7 m wide."""
 
 
+@pytest.mark.ordinary("[!d]*")
 @pytest.mark.parametrize("name", MODULES)
 def test_a_program_solves_a_small_problem(name):
     if importlib.util.find_spec(MODULES[name]) is None:
@@ -85,6 +86,7 @@ def right():
     }
 
 
+@pytest.mark.ordinary("refweb-throw", "refweb-capture", "[!rd]*")
 @pytest.mark.parametrize("work", MOTIONS)
 @pytest.mark.parametrize("name", MODULES)
 def test_a_program_follows_a_throw_a_capture_and_draws(name, work, right):

@@ -80,6 +80,7 @@ def test_gmsh_net(tmp_path):
     assert is_drawn(tmp_path / "gmsh-net" / "web.png")
 
 
+@pytest.mark.slow
 def test_sweep(tmp_path):
     sweep.main(tmp_path, duration=0.03)
     with open(tmp_path / "sweep.csv", encoding="utf-8") as file:

@@ -42,8 +42,11 @@ LONG = (
     "drawstrings",
     "free_net",
     "price_of_modelling",
+    "falling_chain",
+    "figures_with_a_limit",
+    "spinning_arm",
 )
-"""Cases that take more than two seconds with ``--quick``; what they show has tests of its own beside them."""
+"""Cases that take more than a second with ``--quick``; what they show has tests of its own beside them."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in cases.names()])

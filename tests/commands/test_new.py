@@ -134,6 +134,7 @@ def test_a_copy_of_a_scene_with_bodies_from_files_leads_to_them(here):
 # Studies
 
 
+@pytest.mark.ordinary("price-of-safety", "safest-mesh")
 @pytest.mark.parametrize("name", sorted(studies()))
 def test_info_check_and_new_know_studies(here, capsys, name):
     """Number of cases, by the lists and counts of the file; a copy is a study of the same cases."""

@@ -69,6 +69,7 @@ def run(tmp_path):
     return start
 
 
+@pytest.mark.slow
 def test_machine_code_is_found_again_whatever_the_words_around_it(run):
     run.write("linked", 3.0)
     assert run()[:1] == ["6.0"] and run() == ["6.0"]
@@ -90,6 +91,7 @@ def test_a_caller_stays_where_what_it_calls_by_address_changes(run):
     assert run() == ["8.0", "inner"]
 
 
+@pytest.mark.slow
 def test_the_public_parts_of_numba_alone_give_the_same(run):
     """Without the cache, the options and the calls of our own."""
     for kind in INNER:
@@ -252,6 +254,7 @@ print(json.dumps([name for name in heavy if name in sys.modules]))
 """
 
 
+@pytest.mark.slow
 def test_a_warm_process_imports_nothing_that_only_compiling_needs():
     """Reading machine code takes no declarations of functions, and none that it names lies in a module with a BLAS."""
     for _ in ("first", "warm"):
@@ -274,6 +277,7 @@ print(found.solver["angular_momentum_drift"])
 """
 
 
+@pytest.mark.slow
 def test_a_run_has_the_kernels_that_an_earlier_one_left_out():
     """Of a line that is held no angular momentum is kept; of a free one it is, which both methods look at."""
     said = subprocess.run([sys.executable, "-c", TWO_RUNS], capture_output=True, text=True)
@@ -301,6 +305,7 @@ print(len([1 for _, e in seen.buffer if e.is_start]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no such locks there")
 def test_of_processes_that_want_a_kernel_at_once_one_compiles_it(tmp_path):
     (tmp_path / "wanted.py").write_text(WANTED)
@@ -347,7 +352,7 @@ print(len([1 for _, e in seen.buffer if e.is_start]), *(one(2.0) for one in many
 """
 
 
-@pytest.mark.ordinary("end-words1-10")
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="no second process there")
 @pytest.mark.skipif(len(getattr(os, "sched_getaffinity", lambda _: [0])(0)) < 2, reason="one core")
 @pytest.mark.parametrize("what, words, most", [("wait", ["alone"], 0), ("end", ["ended", "alone"], 10)])

@@ -116,7 +116,7 @@ def test_order_is_kept_across_periods(slews):
     assert np.abs(orders - 2.0).max() < 0.15 and errors[-1] < 1e-3
 
 
-@pytest.mark.ordinary("space-central-difference", "body-central-difference", "body-ida")
+@pytest.mark.ordinary("space-central-difference", "body-central-difference")
 @pytest.mark.parametrize("method", ["central-difference", "cvode", "ida"])
 def test_methods_agree_within_their_errors(slews, method):
     axes, exact = slews

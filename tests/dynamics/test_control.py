@@ -139,6 +139,7 @@ def test_bang_bang_needs_the_least_time():
     np.testing.assert_allclose(run.controls[0]["spent"], size * least, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_sliding_mode_reaches_its_surface_in_the_time_of_its_strength():
     """s = e' + λ e falls from s₀ by U/m − λ v; with λ v small beside it, in |s₀| m/U; then e falls by exp(−λ t)."""
     strength, slope, begin = 20.0, 2.0, 0.1

@@ -147,6 +147,7 @@ def moved_and_loaded(method, **changes):
     return flight(method, effects, **changes).solver["energy_drift"]
 
 
+@pytest.mark.slow
 def test_work_on_a_loaded_node_that_is_moved():
     """Work is force times displacement, whatever the velocity does at a corner: the book closes to the order, 2."""
     coarse, fine = (moved_and_loaded("central-difference", step_size=step) for step in (2e-4, 1e-4))

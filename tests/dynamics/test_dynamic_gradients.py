@@ -86,12 +86,7 @@ CASES = [  # law, effects, paths
 
 
 @pytest.mark.ordinary(
-    "tension-only-cable.modulus",
-    "linear-damping.time",
-    "table-load.0.force.2",
-    "tension-only-drag.normal",
-    "linear-motion.0.displacement.1.3",
-    "linear-reel.0.factor.1.1",
+    "tension-only-cable.modulus", "table-load.0.force.2", "tension-only-drag.normal", "linear-motion.0.displacement.1.3"
 )
 @pytest.mark.parametrize(("law", "effects", "paths"), CASES, ids=[f"{law}-{paths[0]}" for law, _, paths in CASES])
 def test_taylor_remainders(law, effects, paths):
@@ -214,6 +209,7 @@ def test_a_ball_that_falls_on_one_spring():
         assert gradient.error[0] < 0.05 * abs(exact)
 
 
+@pytest.mark.slow
 def test_a_stiffness_that_refweb_chose():
     """It goes as the energy of the ball, m v²/2, and does not know the tension of the line: a note says so.
 
@@ -340,6 +336,7 @@ def test_damping_of_contact():
     assert 3.0 < off[0] / off[1] < 5.0
 
 
+@pytest.mark.slow
 def test_variational_equations():
     """Two masses in space on damped lines under gravity, beside their variational equations in scipy: order 2."""
     points, lines = np.array([[0.0, 0, 0], [1, 0, 0], [1.6, 0.5, 0]]), [(0, 1), (1, 2)]
@@ -421,6 +418,7 @@ def test_one_sided_where_lines_share_the_largest_value():
     assert gained == pytest.approx(1e-4 * float(aside), rel=0.02)  # the second order of a large sag
 
 
+@pytest.mark.slow
 def test_a_ring_that_slides_on_a_thread():
     """On an ellipse with the half axes 1 and b = 0.8 m from φ = 0.5 on, v²/2 = b g (1 − cos φ) − p sin φ at its lowest.
 
@@ -495,6 +493,7 @@ def between_two_lines(velocity, duration=1.0):
     )
 
 
+@pytest.mark.slow
 def test_sizes_that_are_0():
     """At rest |x| and |v| have the derivatives ± sin(ωt)/ω and ± cos(ωt); a largest value of 0 all along is refused."""
     solution = refweb.run(between_two_lines((0.0, 0.0, 0.0)), progress=False)
@@ -562,6 +561,7 @@ def test_sizes_that_pass_0():
     assert float(gradient) == pytest.approx(exact, rel=0.15) and gradient.left[0] == pytest.approx(-float(gradient))
 
 
+@pytest.mark.slow
 def test_a_motion_that_stays_at_a_kink():
     """Lines at rest without strain, and a ball that just touches: a push and a pull move them otherwise, with no sign.
 

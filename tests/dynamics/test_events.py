@@ -152,7 +152,7 @@ def test_first_touch_in_a_turning_frame(solve):
 # A line that snaps taut
 
 
-@pytest.mark.ordinary("*-central-difference", "smooth-adams", "tension-only-bdf")
+@pytest.mark.ordinary("tension-only-central-difference", "smooth-central-difference", "smooth-adams")
 @pytest.mark.parametrize("solve", METHODS, ids=NAMES)
 @pytest.mark.parametrize("law", ["tension-only", "smooth"])
 def test_masses_that_fly_apart(solve, law):
@@ -421,6 +421,7 @@ def test_an_event_at_the_end_of_a_row(solve):
     assert solution.state.time == solution.frames[-1][1].time == end
 
 
+@pytest.mark.slow
 def test_the_first_of_two_that_stop():
     """In whichever order they are asked for; the other has not happened, though it would have within the same step."""
     both = [
@@ -433,6 +434,7 @@ def test_the_first_of_two_that_stop():
             assert found["second"] is None and abs(found["first"] - np.arcsin(0.5) / RATE) < 1e-2 / RATE
 
 
+@pytest.mark.ordinary("central-difference", "bdf", "adams")
 @pytest.mark.parametrize("solve", ROUGH, ids=NAMES)
 def test_errors_come_from_the_twin(solve):
     """Without one there are none; with one the time of the run itself is the same."""

@@ -67,6 +67,7 @@ def by_complex_step(function, numbers):
     return {key: {name: part.imag / 1e-30 for name, part in parts.items()} for key, parts in moved.items()}
 
 
+@pytest.mark.ordinary("in a step")
 @pytest.mark.parametrize("start", [START, START + 3.7e-5], ids=["at a step", "in a step"])
 def test_a_damped_line_that_snaps_taut(start):
     """The damping force jumps at a time that changes with the number, and with it the derivatives of velocities."""
@@ -83,6 +84,7 @@ def test_a_damped_line_that_snaps_taut(start):
         assert solution.gradient("x", path).error[0] < 0.3 * abs(exact[key]["x"]), path
 
 
+@pytest.mark.ordinary("table")
 @pytest.mark.parametrize(
     "cable",
     [
@@ -113,6 +115,7 @@ def test_a_passage_that_steps_resolve():
     assert float(gradient) == pytest.approx(wanted, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_largest_tension_is_that_of_the_snap():
     """With much damping it is EA/L τ v at the instant at which the line is taut, v² = v0² + 2 F (L − x0)/m."""
     load, numbers = refweb.Load(node=[1], force=(3.0, 0.0, 0.0)), TAUT | dict(time=0.08, force=3.0)
@@ -169,6 +172,7 @@ def test_one_line_after_the_other():
                 assert gradient.error[0] < 0.1 * max(abs(exact), solution.results["x"].value / value), key
 
 
+@pytest.mark.slow
 def test_a_line_at_its_natural_length_that_snaps_taut_at_the_start():
     """It is damped from the start, or later, as a length rises or falls: refused; the speed changes no time."""
     solution = refweb.run(flight(2e-4, start=1.0), progress=False)
@@ -192,6 +196,7 @@ JUST_TAUT = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", JUST_TAUT.values(), ids=JUST_TAUT)
 def test_a_line_that_is_just_taut_from_a_corner_on(effect):
     """A shorter line pulls the mass before the corner, and a longer one never does: refused; EA changes no time."""
@@ -205,6 +210,7 @@ def test_a_line_that_is_just_taut_from_a_corner_on(effect):
     assert abs(float(gradient)) <= gradient.error[0] < 1e-3 / MODULUS
 
 
+@pytest.mark.slow
 def test_a_line_that_snaps_taut_at_a_corner():
     """Its end is pulled on at half the speed: beside its end, which moves on evenly, the mass is on a dashpot."""
     effect = refweb.Motion(node=[0], displacement=[*PULLED, (0.15, -0.2, 0.0, 0.0)])
@@ -215,6 +221,7 @@ def test_a_line_that_snaps_taut_at_a_corner():
         assert abs(float(gradient) - exact[key]["x"]) <= gradient.error[0] < 0.1, key
 
 
+@pytest.mark.slow
 def test_a_contact_with_losses_begins_without_a_jump():
     """A ball that meets what is fixed at v: m z'' = k δ max(1 + d δ', 0), whose force begins at 0, beside scipy."""
     numbers = {"body.0.position.2": 0.11, "body.0.velocity.2": -2.0, "contact.damping": 0.3}
@@ -291,6 +298,7 @@ def test_corners_of_prescribed_motion(rows, duration, keys):
     assert solution.results["end"].value == 0.0 == float(solution.gradient("end", path))  # it is held behind it
 
 
+@pytest.mark.slow
 def test_a_corner_of_a_natural_length():
     """A bar that is reeled in until 20 ms is damped until then: largest tension and derivative are before it."""
     scene = moved([(0.0, 0.0, 0.0, 0.0)], 0.05, reduce="max")

@@ -74,7 +74,7 @@ def test_a_run_without_commands_has_the_bits_of_a_whole_one(name):
     np.testing.assert_array_equal(run.state.x, whole.state.x)
 
 
-@pytest.mark.ordinary("central-difference", "order 4", "cvode")
+@pytest.mark.ordinary("central-difference", "order 4")
 @pytest.mark.parametrize("name", STEPS)
 def test_balances_close_and_the_whole_solution_has_the_same_bits(name):
     """Errors of the balances are those of steps: a load and gravity that jump bring no energy and no momentum."""
@@ -89,6 +89,7 @@ def test_balances_close_and_the_whole_solution_has_the_same_bits(name):
     assert all(result.error is not None for result in solution.results.values())
 
 
+@pytest.mark.slow
 def test_methods_agree_under_commands():
     """Open loop, so that all have the same commands; each ± is small and covers the difference."""
     commands = [(0.02 * n, "load.0.force", [3.0 + np.sin(n), np.cos(n), 0.0]) for n in range(10)]

@@ -321,6 +321,7 @@ def test_another_program_finds_the_same(exact):
     np.testing.assert_allclose(body.turning(found.x, found.v), turn @ end[10:13], rtol=0, atol=1e-7)
 
 
+@pytest.mark.ordinary("1e-06-1e-06-0.0001")
 @pytest.mark.parametrize("rtol, place, speed", [(1e-6, 1e-6, 1e-4), (1e-9, 2e-9, 5e-8)])
 def test_constraints_in_place_of_elimination_find_the_same(rtol, place, speed):
     """IDA on nodes with masses of their own and multipliers, `validation.methods.as_constraint`: errors go with its

@@ -119,7 +119,7 @@ def cloud(shape, count=300):
     return p[clear][:count]
 
 
-@pytest.mark.ordinary("box", "ring", "capsule")
+@pytest.mark.ordinary("ring", "box")
 @pytest.mark.parametrize("shape", SHAPES)
 def test_depth_is_the_distance_from_the_surface(shape):
     """Against the least distance of tangent planes, inside and outside; the search is slow along creases of h."""
@@ -219,6 +219,7 @@ def hit(shape="sphere", exponent=1.0, damping=0.0, speed=SPEED, duration=0.1, st
     ).results
 
 
+@pytest.mark.ordinary("sphere-1", "ring-1", "ring-1.5")
 @pytest.mark.parametrize("shape, exponent", [("sphere", 1), ("sphere", 1.5), ("ring", 1), ("ring", 1.5)])
 def test_hit_without_losses(shape, exponent):
     """Energy gives depth and force; the body leaves after √π Γ(1 + 1/q)/Γ(1/2 + 1/q) depths over speeds, q = p + 1."""
@@ -535,7 +536,7 @@ def wound(turns, share, friction=0.2, parts=16, pull=1.0):
     return solution.state.v[count - 1] @ ends[1]
 
 
-@pytest.mark.ordinary("1")
+@pytest.mark.slow
 @pytest.mark.parametrize("turns", [1, 2])
 def test_a_cable_holds_by_its_turns(turns):
     """It holds if and only if 2π n μ > ln(T₂/T₁): below, it creeps, within ten slip velocities; above it slides.
@@ -668,6 +669,7 @@ def test_integrators_agree_on_a_hit_with_losses():
 # Shapes in statics, and the scene that is shipped
 
 
+@pytest.mark.ordinary("sphere", "ring", "box", "cylinder")
 @pytest.mark.parametrize("shape", SHAPES)
 def test_shape_under_a_heavy_cable(shape):
     """A cable that hangs over a fixed body: supports and body carry its weight, and it is hardly inside of the body."""

@@ -270,7 +270,7 @@ def test_decay_of_a_longitudinal_mode(law, kind):
     assert abs(slope(error, 1.0 / nsteps) - 2.0) < 0.05 and abs(slope(drift, 1.0 / nsteps) - 2.0) < 0.05
 
 
-@pytest.mark.ordinary("3-False-Ida")
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [Cvode, Ida])
 @pytest.mark.parametrize("order, consistent", nets.some([(2, True), (1, False), (3, False), (2, False)], 2))
 def test_decay_at_every_order(method, order, consistent):

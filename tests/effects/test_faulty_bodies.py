@@ -52,7 +52,7 @@ def exact(tmp_path_factory):
     return refweb.run(caught(shape="box", size=SIZE.tolist())), refweb.run(caught(shape="mesh", file=file))
 
 
-@pytest.mark.ordinary("hole", "doubled", "flipped")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_faulty_box_hits_a_net_as_the_box_does(name, exact, tmp_path):
     """Within ± of both runs and the error of the surface, and as the file without faults by six digits."""

@@ -336,6 +336,7 @@ def test_order_two_and_the_book(exact):
         assert abs(slope(errors, 1.0 / counts) - 2.0) < 0.1
 
 
+@pytest.mark.ordinary("Cvode-block", "Cvode-sparse")
 @pytest.mark.parametrize("solver, choice", [(Cvode, "block"), (Cvode, "sparse"), (Ida, "block"), (Ida, "dense")])
 def test_implicit_solvers(solver, choice, exact):
     """Within 1000 times the tolerance after some hundred steps, the work booked by power with it."""

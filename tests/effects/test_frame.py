@@ -81,6 +81,7 @@ def nodal_errors(order, consistent):
     return np.array(counts), np.array(errors)
 
 
+@pytest.mark.ordinary("1-False", "1-True", "2-False", "2-True")
 @pytest.mark.parametrize("consistent", [False, True])
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_heavy_arm_converges_with_twice_the_order(order, consistent):

@@ -299,7 +299,7 @@ def test_the_error_of_terrain_is_that_of_the_ground(tmp_path):
     assert np.abs(found).max() < errors[-1] + sagitta
 
 
-@pytest.mark.ordinary("shape1")
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [{"radius": 0.1}, {"shape": "box", "size": [0.2, 0.3, 0.1]}])
 def test_bodies_move_on_a_terrain_as_on_the_plane(shape, tmp_path):
     """A ball and a box that fall on a slope, skid and turn."""

@@ -130,6 +130,7 @@ def test_a_net_over_a_mesh_keeps_its_energy(files, name, place):
         assert np.polyfit(np.log(1.0 / counts[: len(errors)]), np.log(errors), 1)[0] > 1.6
 
 
+@pytest.mark.ordinary("box-exact0")
 @pytest.mark.parametrize(
     "name, exact",
     [("box", dict(size=SIZE, rounding=ROUND)), ("ball", dict(size=(0.3, 0.3, 0.3), rounding=0.15))],
@@ -160,6 +161,7 @@ def caught(**body):
     })  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_free_mesh_tumbles_as_its_shape_does(files):
     """Mass and inertia by density; books close, and the motion is that of the box within its field's error."""
     solutions = [
@@ -343,6 +345,7 @@ def test_implicit_methods_follow_a_free_mesh(files):
         np.testing.assert_allclose(other.x, one.x, rtol=0, atol=1e-4, err_msg=str(keys))
 
 
+@pytest.mark.slow
 def test_a_resumed_run_of_a_free_mesh_is_the_same(files, tmp_path):
     scene = caught(shape="mesh", file=files["ell"])
     whole, resumed = nets.whole_and_resumed(scene, tmp_path)
@@ -351,6 +354,7 @@ def test_a_resumed_run_of_a_free_mesh_is_the_same(files, tmp_path):
     np.testing.assert_array_equal(resumed.state.v, whole.state.v)
 
 
+@pytest.mark.ordinary("12-30000.0-True")
 @pytest.mark.parametrize("grid, stiffness, so", [(12, 3e4, True), (64, 30.0, False)])
 def test_an_error_of_the_surface_beside_the_overlap_is_told(files, grid, stiffness, so):
     """With its share, in statics; ± of what is pushed by it is that of residual and rounding."""

@@ -230,6 +230,7 @@ def test_a_net_catches_a_mass(method, tmp_path):
     np.testing.assert_allclose(meshio.read(last).cell_data["plastic_strain"][0], whole.state.plastic_strain)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["cvode", pytest.param("ida", marks=pytest.mark.slow)])
 def test_a_ring_net_absorbs_what_an_elastic_one_gives_back(method):
     """A mass that is thrown into rings that are hexagons: methods agree within ±, and the energy is kinetic or lost."""
@@ -419,6 +420,14 @@ def test_a_reel_brings_material_that_has_lost_nothing():
     assert errors[1] < 1e-5 and errors[0] > 3.0**2 * errors[1]
 
 
+@pytest.mark.ordinary(
+    "cvode-1e-06-reel",
+    "cvode-1e-06-temperature",
+    "cvode-1e-06-motion",
+    "cvode-0.001-reel",
+    "cvode-0.001-temperature",
+    "cvode-0.001-motion",
+)
 @pytest.mark.parametrize("effect", ["reel", "temperature", "motion"])
 @pytest.mark.parametrize("method, rtol", [("cvode", 1e-6), ("cvode", 1e-3), ("ida", 1e-6)])
 def test_energy_by_the_path_has_an_error_although_run_and_refinement_take_the_same_steps(method, rtol, effect):

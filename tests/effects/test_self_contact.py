@@ -414,6 +414,7 @@ def test_pairs_that_are_found_give_the_same_run(monkeypatch):
         np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_more_pairs_than_elements_are_remembered(monkeypatch):
     """Twelve lines slide over twelve others, which make 144 pairs of 24 elements, as CVODE says they do.
 

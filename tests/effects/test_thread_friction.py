@@ -306,7 +306,7 @@ def test_order_of_explicit_steps(thrown):
     assert thrown["dissipated_energy"][-1] > 0.02 and len(set(np.sign(np.diff(thrown["s2"])))) >= 2
 
 
-@pytest.mark.ordinary("bdf")
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["bdf", "ida"])
 def test_methods_agree(thrown, method):
     """By steps that end where a ring turns back; the balance closes."""

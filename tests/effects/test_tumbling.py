@@ -55,6 +55,7 @@ def state(net, seed, near=0.05):
 FRAME = refweb.Frame(angular_velocity=(1.0, -2.0, 3.0))
 
 
+@pytest.mark.ordinary("0-effect1", "0-effect2", "1-effect1", "1-effect2", "2-effect1", "2-effect2")
 @pytest.mark.parametrize("effect", [*(refweb.Contact(**contact) for contact in CONTACTS), FRAME])
 @pytest.mark.parametrize("seed", range(3))
 def test_contract(effect, seed):

@@ -138,7 +138,7 @@ def test_a_vibration_is_of_order_two():
     assert max(error[-1] for error in errors) < 1e-4
 
 
-@pytest.mark.ordinary("adams-1", "cvode-1", "ida-1", "block-1")
+@pytest.mark.ordinary("adams-1", "block-1")
 @pytest.mark.parametrize(
     "method, order",
     [*((method, 1) for method in ("cvode", "adams", "ida", "block", "sparse"))]
@@ -290,7 +290,7 @@ SOFT = ((0.004, 0.0), (0.01, 2e3), (0.03, 2e4), (0.1, 4e4))
 """Strain and stress [Pa] of a measured rope that is slack at first."""
 
 
-@pytest.mark.ordinary("tension")
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["stress", "tension"])
 def test_short_arms_beside_a_curve(key):
     """They bear what lines of their moduli bear that stand beside those of the curve; a run starts from there."""

@@ -119,6 +119,7 @@ def test_brake(method):
 SPEEDS = [[0.0, 0.0], [0.1, 0.6], [0.3, -0.4]]
 
 
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("method", ["central-difference", "adams"])
 def test_speed_is_a_reel(method):
     """The same as a line whose natural length a reel changes by the integral of these speeds."""

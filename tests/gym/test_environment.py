@@ -305,6 +305,7 @@ def test_an_id_imports_what_it_needs_and_any_scene_is_an_environment():
         check_env(env.unwrapped, skip_render_check=True, skip_close_check=True)
 
 
+@pytest.mark.slow
 def test_images():
     """Of its size, of different states, by one camera; the child that draws ends with the environment."""
     env = SceneEnv(scene(duration=50.0), render_mode="rgb_array", size=(120, 80))

@@ -150,6 +150,7 @@ def exact(given):
     return free, y[:n]
 
 
+@pytest.mark.ordinary("heun")
 def test_order_and_books(method):
     """Errors fall with the square of the number of steps, where nothing goes slack, and the books close as well."""
     free, x = exact(scene(method))
@@ -210,6 +211,7 @@ def test_extremes_and_events(method):
     assert back == solution.history["time"][-1] == pytest.approx(7.0 * np.pi / (6.0 * rate), rel=3e-5)
 
 
+@pytest.mark.ordinary("heun")
 def test_a_body_and_friction(method):
     """What depends on velocity, and a contact that no step passes over: the books close."""
     ball = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0.01, 0.02, -0.105], "velocity": [0.0, 0.5, 3.0]}

@@ -313,6 +313,7 @@ def test_walls_are_measured():
     assert field_of(*solids.tetrahedron(edge), 64).thickness == pytest.approx(inner, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_thin_wall_asks_for_a_finer_grid(tmp_path):
     plate = solids.box([0.5, 0.5, 0.02])
     body = mesh(tmp_path / "plate.obj", plate)

@@ -153,6 +153,7 @@ def test_vtk(tmp_path, name, polylines):
     assert web.find_lines("long").tolist() == [0, 1] and web.find_lines("short").tolist() == [2]
 
 
+@pytest.mark.slow
 def test_solids_and_damaged_files_of_vtk(tmp_path, capfd):
     pyvista = pytest.importorskip("pyvista")
     pyvista.Box().triangulate().delaunay_3d().save(tmp_path / "ball.vtu")

@@ -222,6 +222,7 @@ def test_verdicts_are_shown_where_a_run_has_them():
     assert rows[1] == ["b", "1.00 ± 0.10 N", "wide", "The contact is too stiff for the step."]
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path, capsys):
     """One page that needs nothing else; the same section is the first of the report."""
     folder = run(tmp_path / "out", {**CABLE, "strength": 1e9})

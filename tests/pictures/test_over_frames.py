@@ -94,6 +94,7 @@ def test_what_is_no_such_field(solution):
         solution.picture(field="largest_height")
 
 
+@pytest.mark.slow
 def test_a_peak_that_frames_miss_is_said(coarse):
     """The bar ends in a tip, and value, line and time stand on the picture."""
     result = coarse.results["max_stress"]

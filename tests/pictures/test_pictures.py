@@ -134,6 +134,7 @@ def broken_window(*job):
     os.kill(os.getpid(), 11)
 
 
+@pytest.mark.slow
 def test_a_window_that_kills_the_child_is_survived(film, monkeypatch, tmp_path, capfd):
     monkeypatch.setattr(opengl, "open_off_screen", broken_window)
     assert colours(drawn(film, out=tmp_path / "web.png"))[0] > 500
@@ -199,6 +200,7 @@ def test_higher_order_elements_are_curves(tmp_path):
     assert path[:, 2] == pytest.approx(path[:, 0] * (path[:, 0] - 1), abs=1e-15)
 
 
+@pytest.mark.ordinary("3")
 @pytest.mark.parametrize("order", [2, 3])
 def test_curved_elements_of_a_run_are_drawn(no_opengl, tmp_path, order):
     """A cable of four elements that hangs: curves are seen, beside their chords by 2 cm or more; undeformed, lines."""
@@ -330,6 +332,7 @@ def test_one_range_for_all_frames_of_a_run(film, hit, no_opengl, tmp_path):
         assert pictures.look_of(record, values[0], None, (1, 2e3), 1.0, None).limits == (1.0, 2e3)
 
 
+@pytest.mark.slow
 def test_a_range_that_is_left_is_seen_at_the_bar(hit, no_opengl):
     """As a tip of the colour bar at the end that values leave."""
     frame = of_solution(hit).frame(of_solution(hit).chosen())

@@ -152,6 +152,7 @@ def test_energies_are_stacked_to_what_came_in(runs):
     np.testing.assert_allclose(axes.get_lines()[-1].get_ydata(), factor * (book.top[0] + work))
 
 
+@pytest.mark.slow
 def test_the_sum_of_energies_is_told_above_what(runs):
     """What the legend says the sum is above, and the height of its line, are the total energy and loss together."""
     for name, tail in {"static": "", "dynamic": "dissipated_energy"}.items():
@@ -450,6 +451,7 @@ def test_what_a_run_that_failed_has(runs, tmp_path):
     assert not list(tmp_path.rglob("*.png"))
 
 
+@pytest.mark.slow
 def test_files_whose_text_is_text(runs, tmp_path):
     """Of an SVG in full, twice the same; a PDF and a PNG begin as such, and nothing else is left."""
     for ending, head in {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}.items():
@@ -544,6 +546,7 @@ def test_a_summary_that_no_run_has_written(runs, key):
     assert plots.draw(record._replace(summary=bare), "deflection").axes
 
 
+@pytest.mark.slow
 def test_from_memory_and_loaded_alike(runs, tmp_path):
     """With and without a folder, a run gives the same figure, which a notebook shows."""
     scene = refweb.Scene.load(runs / "dynamic.toml")
@@ -559,6 +562,7 @@ def test_from_memory_and_loaded_alike(runs, tmp_path):
     assert not (tmp_path / "none.png").exists()
 
 
+@pytest.mark.slow
 def test_the_verb(runs, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(runs / "static", "a")

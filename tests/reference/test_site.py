@@ -79,13 +79,7 @@ LONG = ("learning", "size-a-net")
 
 
 @pytest.mark.ordinary(
-    "capture-False",
-    "feedback-False",
-    "own-net-False",
-    "plug-ins-False",
-    "python-False",
-    "quick-start-False",
-    "theory-False",
+    "capture-False", "own-net-False", "plug-ins-False", "python-False", "quick-start-False", "theory-False"
 )
 @pytest.mark.parametrize(
     "path, slow",

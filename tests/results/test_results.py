@@ -366,6 +366,7 @@ def test_a_folder_saved_onto_itself_stays(tmp_path):
     assert contents(tmp_path / "out") == before
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="permissions are those of POSIX")
 def test_files_have_the_permissions_of_the_user(tmp_path):
     """In a process of its own, whose mask counts."""

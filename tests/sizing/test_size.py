@@ -147,6 +147,7 @@ def arm_stress(omega, radius=2.0, count=4, modulus=1e9, density=1000.0):
     return modulus * (np.linalg.solve(matrix, right)[0] / h - 1.0)
 
 
+@pytest.mark.ordinary("1.0", "5.0")
 @pytest.mark.parametrize("start", [1.0, 5.0, 9.0])
 def test_a_spinning_arm_as_fast_as_its_root_bears(start, tmp_path):
     """The stress of a stiff arm is ρ ω² R²/2, of lumped masses too; of an elastic one a linear system says it."""
@@ -180,7 +181,7 @@ CHAIN = {
 }
 
 
-@pytest.mark.ordinary("1e-05")
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [1e-5, 3e-5])
 def test_where_two_lines_share_the_largest_stress(start, tmp_path):
     """A chain of two lines with a load at each node is least where both have the stress of the limit.
@@ -212,7 +213,7 @@ LINES_APART = {
 """Two lines that hang apart, of which one carries twice the load: of stresses and deflections as the chain."""
 
 
-@pytest.mark.ordinary("max_stress-100000000.0")
+@pytest.mark.slow
 @pytest.mark.parametrize("objective, unit", [("max_stress", LIMIT), ("-margin", None), ("deflection", LIMIT / MODULUS)])
 def test_where_lines_and_nodes_share_an_objective(objective, unit, tmp_path):
     """Of a mass 3 ρ P/σ at most, the least of the largest stress is σ, of the largest deflection σ/E.
@@ -233,7 +234,7 @@ def test_where_lines_and_nodes_share_an_objective(objective, unit, tmp_path):
     assert light["governs"] and light["costs"] == pytest.approx(costs, rel=1e-6)
 
 
-@pytest.mark.ordinary("deflection < 0.0014285714285714286")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "condition", ["margin > 2", "utilisation < 0.3333333333333333", f"deflection < {LIMIT / MODULUS!r}"]
 )
@@ -278,6 +279,7 @@ def test_where_no_design_meets_the_requirements(tmp_path, capsys):
     assert json.loads((tmp_path / "s" / "run.json").read_text())["values"]["cable.area"] == pytest.approx(2e-6)
 
 
+@pytest.mark.slow
 def test_a_search_that_ends_early_confirms_nothing(tmp_path, capsys):
     """After one run the stress is far below its limit: nothing governs, no cost is known, and the status says so."""
     path = write(tmp_path, parameters={"cable.area": {**AREA, "start": 1e-4}}, starts=1, runs=1, trade_off=False)
@@ -329,6 +331,7 @@ def test_one_of_two_scenes_with_numbers_between_bounds(tmp_path):
 # Searches, of made-up results
 
 
+@pytest.mark.ordinary("direct")
 @pytest.mark.parametrize("method", ["evolution", "direct"])
 def test_searches_come_near(method, tmp_path):
     """x is least where x ≥ 2, within what a search of a few hundred designs can say."""
@@ -385,6 +388,7 @@ def test_starts_in_the_notes(tmp_path):
     assert found.status == "solved" and found.notes[0].startswith("2 of 2 starts end at this objective")
 
 
+@pytest.mark.ordinary("(cable.area > 5e-5 or cable.area < 2e-5)-9e-05")
 @pytest.mark.parametrize("start", [9e-5, pytest.param(1e-6, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("gap", ["(cable.area > 5e-5 or cable.area < 2e-5)", "not 2e-5 <= cable.area <= 5e-5"])
 def test_the_better_side_of_a_condition_with_or(gap, start, tmp_path):

@@ -203,6 +203,7 @@ def test_balls_in_thirty_random_nets():
     assert all(rest for rest, _ in rests) and sum(shared for _, shared in rests) >= 20
 
 
+@pytest.mark.slow
 def test_the_sag_converges_with_elements():
     """Four elements change it by less than two, eight by less than four; contact has the weight, to rounding."""
     heights = []

@@ -76,7 +76,7 @@ def check_slopes(left):
 NAMES = [o.name for o in OBSERVE]
 
 
-@pytest.mark.ordinary("tension-only", "smooth", "linear")
+@pytest.mark.ordinary("tension-only", "linear")
 @pytest.mark.parametrize("law", LAWS)
 def test_taylor_of_laws(law):
     """Of every result by modulus, area, density, prestrain and a load; a table has no modulus."""
@@ -137,6 +137,7 @@ YIELD_BESIDE = {
 }
 
 
+@pytest.mark.ordinary("reel", "contact", "attach")
 @pytest.mark.parametrize("name", YIELD_BESIDE)
 def test_lines_that_yield_beside_other_effects(name):
     """Natural lengths that change, contact and bodies that carry nodes, with the curve in place of yield."""
@@ -194,6 +195,7 @@ EFFECTS = {
 }
 
 
+@pytest.mark.ordinary("temperature", "pressure", "contact", "bending")
 @pytest.mark.parametrize("name", EFFECTS)
 def test_taylor_of_effects(name):
     effects, path = EFFECTS[name]

@@ -495,6 +495,16 @@ def test_load_reversal_ends_at_the_mirror_image(mesh, steps):
         assert step or state.tension.max() <= 10.0 * RESIDUAL * up.tension.max()
 
 
+@pytest.mark.ordinary(
+    "load-triangle",
+    "load-square",
+    "gravity-triangle",
+    "gravity-square",
+    "both-triangle",
+    "both-square",
+    "in plane-triangle",
+    "in plane-square",
+)
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("acting", ["load", "gravity", "both", "in plane"])
 def test_slack_webs(mesh, acting):

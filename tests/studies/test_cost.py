@@ -87,6 +87,7 @@ def test_references_agree(found):
     assert found.trust[0] <= 1e-10 * found.scale and found.trust[1] <= 1e-10 * np.abs(one.x).max()
 
 
+@pytest.mark.slow
 def test_errors_fall_with_the_order(found):
     """Fitted to the observable: 2, 4 and 6 over the step; ±0.5, as the coarsest steps are at 0.9 of the bound."""
     for method, order in (("central-difference", 2), ("explicit-4", 4), ("explicit-6", 6)):

@@ -132,6 +132,7 @@ def test_taut_string_of_elements(mass, elements):
     assert found.spectra[0].shares[:, 0].max() < 1e-12
 
 
+@pytest.mark.ordinary("1-lumped", "1-consistent", "3-lumped", "3-consistent")
 @pytest.mark.parametrize("mass", ["lumped", "consistent"])
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_taut_string_converges_with_twice_its_order(mass, order):
@@ -437,6 +438,7 @@ def test_frames_are_shapes_on_the_equilibrium(tmp_path, order):
     assert 'timestep="1.0"' in listed and 'timestep="2.0"' in listed and "web_000002.vtu" in listed
 
 
+@pytest.mark.slow
 def test_command(folder, capsys):
     assert main(["modes", "../web.toml", "-n", "4"]) == 0
     out = capsys.readouterr().out

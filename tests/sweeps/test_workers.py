@@ -32,6 +32,7 @@ def whole(tmp_path_factory):
     return rows_of(folder / "s")
 
 
+@pytest.mark.slow
 def test_processes_of_which_one_is_killed(tmp_path, whole):
     """The same rows bit for bit, in processes of one thread."""
 

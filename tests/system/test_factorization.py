@@ -178,6 +178,7 @@ def test_what_factorizes_nothing_names_nothing():
     assert refweb.run(scene).solver["factorization"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("library", LIBRARIES[1:])
 def test_modes_agree(library):
     one, other = (refweb.modes(net(by), number=4) for by in ("qdldl", library))

@@ -598,7 +598,14 @@ def segment_distance(a, b, c):
     return np.linalg.norm(a + place * (b - a) - c)
 
 
-@pytest.mark.ordinary("several lines-2-2", "several lines-1-5", "where*-3-1", "the middle*")
+@pytest.mark.ordinary(
+    "several lines-2-2",
+    "the middle of a line-1-1",
+    "the middle of a line-1-5",
+    "the middle of a line-2-2",
+    "the middle of a line-3-1",
+    "where five lines meet-3-1",
+)
 @pytest.mark.parametrize("order, subdivide", FINER)
 @pytest.mark.parametrize("ball", BALLS)
 def test_contact_of_a_straight_line_is_one_at_any_division(ball, order, subdivide):

@@ -700,6 +700,7 @@ print("alive")
     assert done.returncode == 0 and done.stdout == "alive\n" and done.stderr == ""
 
 
+@pytest.mark.ordinary("block", "sparse", "fixed-point")
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("linear_solver", SOLVERS)
 def test_a_good_run_says_nothing(capfd, linear_solver):
