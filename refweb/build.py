@@ -2,13 +2,13 @@
 
 Every refusal is an `InputError` whose message begins with the table it stands in.
 
-May change: private functions, words of messages, and `MAX_WINDOWS`, a limit of what is accepted. Must stay: the
-arguments of `build`, by name, which `Scene` alone gives; memory is checked before anything large is made; `_acting`
-puts bodies and threads first, since other effects use what they add; effects of the lines stand ahead of all others,
-and `Elasticity` first: its term is number 0, which the compiled loop takes as that of the lines by position;
-``effect`` of `_Placed`, which `dynamics.commands` reads and sets by name; messages begin with their table. A check of
-what does not fit together belongs here, one of a single value in the class of its table. Tests:
-``tests/test_build.py``, ``tests/test_scene.py``.
+May change: private functions, words of messages, and `MAX_WINDOWS`, a limit of what is accepted, with which `NEAR` of
+`integrators.averages` has to stay far below a cell. Must stay: the arguments of `build`, by name, which `Scene` alone
+gives; memory is checked before anything large is made; `_acting` puts bodies and threads first, since other effects use
+what they add; effects of the lines stand ahead of all others, and `Elasticity` first: its term is number 0, which the
+compiled loop takes as that of the lines by position; ``effect`` of `_Placed`, which `dynamics.commands` reads and sets
+by name; messages begin with their table. A check of what does not fit together belongs here, one of a single value in
+the class of its table. Tests: ``tests/test_build.py``, ``tests/test_scene.py``.
 """
 
 from __future__ import annotations

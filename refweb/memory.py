@@ -6,8 +6,8 @@ explicit steps below 1 kB.
 
 May change: constants, which are measured and decide only what is refused. Must stay: functions and units [byte], which
 `build`, `runner`, `effects.self_contact`, `net.mesh_readers` and `net.boundary` use; the estimate comes before anything
-large is made. ``tests/net/test_bad_files.py`` and ``tests/results/test_frames.py`` quote messages. Must stay as well:
-all names that `build`, `runner` and other files import.
+large is made. Must stay as well: ``what`` of `check` is a plural; all names that `build`, `runner` and other files
+import. Tests: ``tests/net/test_bad_files.py`` and ``tests/results/test_frames.py``, which quote messages.
 """
 
 from __future__ import annotations

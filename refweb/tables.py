@@ -5,10 +5,11 @@ The same class is the Python value, the TOML table and, for effects, the effect 
 of one line that names the value, the limit and, for a misspelt name, the nearest valid one. Editors know the keys as
 well: `table` is a ``dataclass_transform`` (PEP 681), which wants defaults by name, ``real(default=1.0)``.
 
-May change: private functions. `LARGEST` and `SMALLEST` stand in the schema and the reference, which are then written
-anew (CONTRIBUTING). Must stay: names and arguments of readers and of `Table`, which plug-ins use; messages name value,
-limit and nearest name, and tests quote them; ``accepts`` says what a reader checks, since `refweb.reference` makes the
-schema of it: change both together; all names that `settings`, `effects.body` and other files import. Tests:
+May change: private functions; `LARGEST` and `SMALLEST` as far as products of three stay finite and above 0:
+`reference.words` has `LARGEST` in words, and both stand in the schema and the reference, which are then written anew
+(CONTRIBUTING). Must stay: names and arguments of readers and of `Table`, which plug-ins use; messages name value, limit
+and nearest name, and tests quote them; ``accepts`` says what a reader checks, since `refweb.reference` makes the schema
+of it: change both together; all names that `settings`, `effects.body` and other files import. Tests:
 ``tests/test_tables.py``, ``tests/test_scene.py``, ``tests/reference/test_schema.py``.
 """
 

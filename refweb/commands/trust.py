@@ -1,8 +1,8 @@
 """Find all parts of the error of each result, and say what the numbers are worth."""
 
-# This docstring is the help of the verb. May change: texts. Must stay: `add_arguments` and `run`, which
-# `refweb.__main__` calls; names of options; `show` of the content of `trust.json`, not of `run.json`. Tests:
-# tests/studies/test_further_runs.py.
+# This docstring is the help of the verb. May change: texts, but for `LEAST` and `RUNS` of `dynamics.budget` in that of
+# --budget. Must stay: `add_arguments` and `run`, which `refweb.__main__` calls; names of options; `show` of the content
+# of `trust.json`, not of `run.json`. Tests: tests/studies/test_further_runs.py.
 
 import pathlib
 

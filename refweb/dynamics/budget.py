@@ -3,10 +3,11 @@
 The first run is always completed, since there is no result before. A further run is not begun if it is expected to
 exceed the remaining budget, and it is ended if it will exceed it.
 
-May change: `SEEN`, `SURE` and `SLOWEST`, which decide when a run counts as too dear. Must stay: `clock`, which tests
-replace by a count of steps; names that `simulation`, `accuracy_loop`, `twin_error`, `expected_cost`, `runner` and
-`studies.further_runs` import. With `LEAST` or `RUNS` the help text of `settings.Accuracy` changes, which has them in
-words. Must stay as well: public names of `Budget`, which other files use. Tests: ``tests/dynamics/test_budget.py``.
+May change: `SEEN`, `SURE` and `SLOWEST`, which decide when a run counts as too dear; `SURE` stands in words in the help
+text of `settings.Accuracy`, "twice". Must stay: `clock`, which tests replace by a count of steps; names that
+`simulation`, `accuracy_loop`, `twin_error`, `expected_cost`, `runner` and `studies.further_runs` import. With `LEAST`
+or `RUNS` the help texts of `settings.Accuracy` and of `commands.trust` change, which have them in words. Must stay as
+well: public names of `Budget`, which other files use. Tests: ``tests/dynamics/test_budget.py``.
 """
 
 from __future__ import annotations

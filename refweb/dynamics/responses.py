@@ -3,11 +3,12 @@
 An observable of several lines or nodes has the value of each; which of them counts is decided behind the derivatives,
 so that a difference passes no kink of a largest value.
 
-May change: `MOVED`, private functions; `TIED` and `KINK` decide which derivatives are given to both sides. Must stay:
-values are those that ``history.csv`` and results have for the same observable; fields of `Instant`, `Rates` and
-`Slopes`, which `linear_run`, `gradients` and `peaks` read. `between` is the polynomial of
-`integrators.step.interpolate_kicks`: change both together. Must stay as well: all names that `linear_run` and `kinks`
-import. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
+May change: `MOVED`, private functions; `HALVINGS`, upwards: fewer than 52 find a time less closely than to rounding.
+`TIED`, `KINK`, `BENT` and `ROUNDED` decide which derivatives differ by side: `peaks` takes the first two for largest
+values in time, `kinks` the last two for kinks of forces. Must stay: values are those that ``history.csv`` and results
+have for the same observable; fields of `Instant`, `Rates` and `Slopes`, which `linear_run`, `gradients` and `peaks`
+read. `between` is the polynomial of `integrators.step.interpolate_kicks`: change both together. Must stay as well: all
+names that `linear_run`, `kinks` and `peaks` import. Tests: ``tests/dynamics/test_dynamic_gradients.py``.
 """
 
 from __future__ import annotations

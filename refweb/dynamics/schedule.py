@@ -1,10 +1,11 @@
 """Times of a run: its history rows, the rows with frames, and blocks of rows.
 
-May change: `BLOCK`, `MOST_ROWS` and the measured costs, which change no result. Must stay: times of rows and numbers of
-frames of a scene, since a resumed run finds its row by number, and frames of folders are named by it; with `COMPARED`
-and `FEW` ± changes, and the last digits of runs of few rows, whose steps end at more times; all names that
-`simulation`, `stepped_run` and other files import; public names of `Counts`, which other files use. Tests:
-``tests/dynamics/test_default_rows.py``, ``test_one_row.py``.
+May change: `BLOCK`, `MOST_ROWS` and the measured costs, which change no result; `FEW_CORNERS`, above which `simulation`
+and ``refweb check`` ask `breakpoints` for a finding, and which ``tests/test_pay_for_what_you_call.py`` knows by name.
+Must stay: times of rows and numbers of frames of a scene, since a resumed run finds its row by number, and frames of
+folders are named by it; with `COMPARED` and `FEW` ± changes, and the last digits of runs of few rows, whose steps end
+at more times; all names that `simulation`, `stepped_run` and other files import; public names of `Counts`, which other
+files use. Tests: ``tests/dynamics/test_default_rows.py``, ``test_one_row.py``.
 """
 
 from __future__ import annotations

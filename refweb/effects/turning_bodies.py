@@ -8,9 +8,10 @@ Let S = ∫ r⊗r dm of a body, which is ½ tr(J) 1 − J with its tensor of ine
 The first moment, which includes gravity gradients, has the potential −½ tr(S G). The second does no work. ω is the
 angular velocity in these axes, see `refweb.net.rotation`. A rotation δθ changes S by δθ × S − S × δθ.
 
-May change: how the kernels are written. Must stay: the fields of `BODY`, which `rows_of` writes and kernels read by
-name; the Coriolis moment, which `system.resting_bodies` has once more, by angular velocities: both change together;
-`force_terms`, which `turning_axes` calls. Tests: ``tests/test_contract.py``, ``tests/effects/test_orbit.py``.
+May change: how the kernels are written. Must stay: the fields of `BODY`, which `force_terms` writes and kernels read by
+name, by `body_at`; both moments, which follow from the forces of `turning_axes`: those, these and `turning_flows`
+change together; the Coriolis moment, which `system.resting_bodies` has once more, by angular velocities: both change
+together; `force_terms`, which `turning_axes` calls. Tests: ``tests/test_contract.py``, ``tests/effects/test_orbit.py``.
 """
 
 from __future__ import annotations

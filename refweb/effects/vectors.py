@@ -4,6 +4,8 @@ May change: nothing: kernels of the whole room call these functions, and another
 of all results. Must stay: vectors as tuples of three numbers. A new product is a new function. Must stay as well:
 `cross`, which `bending`, `body_load` and other files import; `dot`, which `bending`, `contact_solver` and other files
 import; `solve`, which `contact_solver` and `drag.implicit_drag` import; `add`, which `drag.implicit_drag` imports.
+Tests, of the kernels that call them: ``tests/test_contract.py``, ``tests/effects/test_bending.py``,
+``tests/effects/test_contact_losses.py``, ``tests/effects/test_drag.py``.
 """
 
 from __future__ import annotations

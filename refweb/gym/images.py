@@ -1,9 +1,9 @@
 """Images of an environment, by the renderer of pictures off screen.
 
 The camera stays for an episode while the scene is within its view, and is moved back where it leaves that. May change:
-`MARGIN`, `LOOK` and the camera. Must stay: an array of uint8, shape (height, width, 3), which `environment` returns;
-`close`, which ends the process that draws; public names of `Images`, which other files use. Tests:
-``tests/gym/test_environment.py``.
+`MARGIN`, `LOOK`, with one view, and the camera. Must stay: an array of uint8, shape (height, width, 3), which
+`environment` returns; `close`, which ends the process that draws; public names of `Images`, which other files use.
+Tests: ``tests/gym/test_environment.py``.
 """
 
 from __future__ import annotations

@@ -4,8 +4,9 @@ The input is the content of ``run.json`` and of ``scene.toml``.
 
 May change: private functions, sentences, and `BESIDE`, a tolerance. Must stay: keys that are read, those of ``web``,
 ``margin`` and ``utilisation`` in ``run.json``; the value of `PACKING`, which stands in the help of `commands.report` as
-well, and `decision`, which `sizing.case` calls; `on_sizes`, `rows_of_worth`, `on_tension` and `on_margin`, which
-`sheet` imports. Tests: ``tests/pages/test_sheet.py``, ``tests/results/test_strength.py``.
+well, and which `page`, `sheet` and `sizing.case` import; `decision`, which `sizing.case` calls; `on_sizes`,
+`rows_of_worth`, `on_tension` and `on_margin`, which `sheet` imports. Tests: ``tests/pages/test_sheet.py``,
+``tests/results/test_strength.py``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@ All of it is read off the classes that check scenes: fields say what keys take, 
 May change: private functions, the order of pages (`FIRST`), `LARGE`, and texts (`SUMMARIES`); ``python -m refweb help
 --markdown > validation/REFERENCE.md`` then writes the reference anew. Must stay: fields of `Page`, `Key` and `Listing`,
 which `words` reads; names of pages, which users type. A new key of a table needs no change here. Must stay as well:
-`header_of`, `line_of` and `pages_of`, which `words` imports. Tests: ``tests/reference/test_help.py``.
+`header_of`, `line_of`, `pages_of` and `names`, which `words` imports, the last `commands.help` as well; "web" stands in
+`FIRST`, as in no other table. Tests: ``tests/reference/test_help.py``.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Pages of the reference as text for a terminal and as Markdown.
 
 May change: private functions, the layout of `as_text`, and texts in `RULES` and `MATERIALS_TEXT` (then write the
-reference anew). Must stay: `as_markdown` in step with ``validation/REFERENCE.md``, which ``python -m refweb help
---markdown`` writes anew; keys of `HOW_TO`, which are names of guides on the site and in help; `guide`, which
-`commands.help` and `site.hooks` import; `overview`, which `commands.help` imports. Tests:
-``tests/reference/test_help.py``, ``tests/reference/test_site.py``.
+reference anew); `RULES` has the value of `tables.LARGEST`. Must stay: `as_markdown` in step with
+``validation/REFERENCE.md``, which ``python -m refweb help --markdown`` writes anew; keys of `HOW_TO`, which are names
+of guides on the site and in help; `guide`, which `commands.help` and `site.hooks` import; `overview`, which
+`commands.help` imports. Tests: ``tests/reference/test_help.py``, ``tests/reference/test_site.py``.
 """
 
 from __future__ import annotations

@@ -3,9 +3,11 @@
 A summary is the content of ``run.json``. The console and the page of a run show the same.
 
 May change: private functions, `FEW_BREAKS` and texts, which are for readers, but for "t = " and "at " in cells of
-`rows_of_results`, which `pages.sections` takes off. Must stay: keys that are read, those of ``run.json``; the
-functions, which `commands.console` and `pages` call; all names that `commands.console`, `pages.sections` and other
-files import. Tests: ``tests/results/test_results.py``, ``tests/results/test_strength.py``.
+`rows_of_results`, which `pages.sections` takes off. Names of columns are such texts: cells are taken by their places, a
+row has as many as there are columns, and the console sets a column without a name left. Must stay: keys that are read,
+those of ``run.json``; the functions, which `commands.console` and `pages` call; `Rows`, which `study_text` and
+`sizing_text` make too; all names that `commands.console`, `pages.sections` and other files import. Tests:
+``tests/results/test_results.py``, ``tests/results/test_strength.py``.
 """
 
 from __future__ import annotations

@@ -5,10 +5,11 @@ Newton's method does not converge from there either, a series of softer nets fol
 rotation. Otherwise Newton's method gets many more iterations. With bars, or with loads that are not dead, only Newton's
 method is used.
 
-May change: constants, and which method is tried next: the residual decides what counts as an equilibrium. Must stay:
-arguments of `solve`, which `registry.STATICS` names and `dynamics.initial_state`, `studies` and `rupture` call too;
-each `Equilibrium` is yielded with its bounds, stability and ``deviations`` set, and before the next is solved. Tests:
-``tests/statics/test_statics.py``.
+May change: constants, and which method is tried next: the residual decides what counts as an equilibrium. `FAR` decides
+which states are refused that satisfy it but have run away, of form finding, lines that yield and winches: a smaller one
+refuses more. Must stay: arguments of `solve`, which `registry.STATICS` names and `dynamics.initial_state`, `studies`
+and `rupture` call too; each `Equilibrium` is yielded with its bounds, stability and ``deviations`` set, and before the
+next is solved. Tests: ``tests/statics/test_statics.py``.
 """
 
 from __future__ import annotations

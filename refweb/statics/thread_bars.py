@@ -1,9 +1,9 @@
 """Bars of a net with threads: those of its lines, and a bar for each segment of a thread, which share one tension.
 
-May change: how arrays are computed, and `SHIFT`, as any correction proves a bound. Must stay: names and meaning of the
-methods and attributes of `bars.Bars`, in place of which `duality_bound` uses it; bars of lines stand first, then
-segments, thread by thread from ``first``. Must follow a change of `Bars`. Must stay as well: `ThreadBars`, which
-`duality_bound` imports. Tests: ``tests/effects/test_thread.py``.
+May change: how arrays are computed, and `SHIFT`, above rounding, as any correction proves a bound. Must stay: names and
+meaning of the methods and attributes of `bars.Bars`, in place of which `duality_bound` uses it; bars of lines stand
+first, then segments, thread by thread from ``first``. Must follow a change of `Bars`. Must stay as well: `ThreadBars`,
+which `duality_bound` imports. Tests: ``tests/effects/test_thread.py``.
 """
 
 from __future__ import annotations

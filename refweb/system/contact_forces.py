@@ -6,11 +6,11 @@ writes a force for each. The contact force on a body is the sum of these alone. 
 whatever else acts. One kernel computes this sum for all bodies: over the near cells in a step of the compiled loop,
 over all cells in a state.
 
-May change: private names. Must stay: the order of results (rows of the system behind the nodes, then pairs of bodies),
-which observables index; arguments of the kernels `forget` and `add_felt` and names in `CONTACT_TERM`, which
-`dynamics.integrators.contacts` uses: change both files together; `ContactTermArray`, which `integrators.contacts`
-imports; `ContactForces` with its public names, which `system` imports. Tests: ``tests/results/test_contact_force.py``,
-``test_every_number.py``.
+May change: private names. Must stay: the order of results (rows of the system behind the nodes, then pairs of bodies,
+those of terms in the order of `effects.base.pairs_of`), which observables index; arguments of the kernels `forget` and
+`add_felt` and names in `CONTACT_TERM`, which `dynamics.integrators.contacts` uses: change both files together;
+`ContactTermArray`, which `integrators.contacts` imports; `ContactForces` with its public names, which `system` imports.
+Tests: ``tests/results/test_contact_force.py``, ``test_every_number.py``.
 """
 
 from __future__ import annotations

@@ -4,6 +4,14 @@ Python runs the kernels of a term, and what they call, on some of its cells: at 
 random displacements, velocities and times. Branches that are not taken there are read in the source, as far as they
 name a column by a number or a constant. An index that is computed in such a branch is not seen. `effect_parts` calls
 `refuse_overruns` for effects of other packages alone.
+
+May change: `CELLS`, and `STATES` by further ones: with fewer of both fewer branches are seen; words of messages and
+remedies, of which ``tests/test_plugins.py`` quotes some. Must stay: `refuse_overruns`, which `effect_parts` calls; in
+`_calls` the order of arguments, which is that of signatures in `refweb.kernels`, since kernels are called by position,
+and the names "data", "cells" and "out", which `_in_source`, `refuse_overruns` and `REMEDIES` know; `_OverrunError` is
+an `IndexError`. Arrays of a trial are copies and its numbers those of one seed: it changes nothing, and refuses the
+same each time. Other exceptions of Python are passed over. A further kernel of a `ForceTerm` belongs in `_calls`:
+without it, its indices are not tried. Tests: ``tests/test_plugins.py``.
 """
 
 from __future__ import annotations

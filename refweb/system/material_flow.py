@@ -3,7 +3,9 @@
 May change: private functions. Must stay: the order of cells, those of tables first (`by_table`), in `shares`, `brought`
 and `slip_rates`, which `integrators.simpson_balance` adds up by position. The kernels of `effects.mass_flow` solve the
 same equations from ``flows`` and ``passages``: change both together. Must stay as well: `MaterialFlow`, which `system`
-imports. Tests: ``tests/effects/test_reel_mass.py``, ``test_winch_mass.py``.
+imports; its public names: `masses`, `rates`, `force` and `brought`, which `system` and implicit methods call, and
+`flows`, `passages` and `speed`, from which `effects.mass_flow` makes its record. Tests:
+``tests/effects/test_reel_mass.py``, ``test_winch_mass.py``.
 """
 
 from __future__ import annotations

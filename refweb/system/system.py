@@ -8,8 +8,9 @@ force and energy uses the numbers of its time t, and `System.at` returns the sys
 net itself keeps its lengths as built. A loop of kernels cannot call Python, and keeps its own array of lengths.
 
 Values are written to arrays of the caller, by default new ones, so that threads may share a system. May change: private
-names and `MOST_TURN`. Must stay: public names, which solvers and plug-ins use. A new cached property belongs in the
-lists of names that `at`, `with_line_data`, `static_system`, `broken_lines`, `statics.shared_push` and
+names and `MOST_TURN`. Must stay: public names, which solvers and plug-ins use; the order of `_in_tangent`, that of
+blocks; `_at_time` is replaced as a whole and its numbers never written to, as threads share it. A new cached property
+belongs in what `at`, `with_line_data`, `static_system`, `broken_lines`, `statics.shared_push` and
 `statics.monotone_loading` drop, if it depends on what these change. Tests: ``tests/system/test_system.py``.
 """
 

@@ -13,11 +13,12 @@ q(t − w))/w, changes its sign between two of these, the cubic through means an
 difference from the parabola through the rates is stored as correction, and ± is at least this. It shows the error by
 many steps in a cell.
 
-May change: `SETTLED`, `HALVINGS` and `PAYS`, which trade cost for ±, and `NEAR`, above rounding. Must stay: fields of
-`Averages` and `CELLS`, which checkpoints keep; `measurements` and `dense_output` give values at `PARTS` + 1 places of a
-step, and follow a change of it; ± holds the error of each mean. Kernels with ``apart`` are called with these arguments
-by `explicit_loop`, `dense_output`, `rows` and `measurements`. Must stay as well: all names that `measurements`,
-`monitors` and other files import. Tests: ``tests/dynamics/test_averages.py``.
+May change: `SETTLED`, `HALVINGS` and `PAYS`, which trade cost for ±, and `NEAR`, above rounding and far below a cell
+over a run, 1/(`CELLS` · `build.MAX_WINDOWS`). Must stay: fields of `Averages` and `CELLS`, which checkpoints keep;
+`measurements` and `dense_output` give values at `PARTS` + 1 places of a step, and follow a change of it; ± holds the
+error of each mean. Kernels with ``apart`` are called with these arguments by `explicit_loop`, `dense_output`, `rows`
+and `measurements`. Must stay as well: all names that `measurements`, `monitors` and other files import. Tests:
+``tests/dynamics/test_averages.py``.
 """
 
 from __future__ import annotations
