@@ -442,6 +442,8 @@ MUTANTS = [
     Mutant("dynamics/integrators/snaps", "        if corner:\n", "        if False:\n"),
     Mutant("dynamics/integrators/snaps", "<= MOVED * np.abs(rates)", "<= 1.0 * np.abs(rates)"),
     Mutant("dynamics/integrators/tangent", "            self._drive(t, t)\n", "            pass\n"),
+    Mutant("dynamics/integrators/tangent", "-= h * jump[", "-= 0.0 * jump["),
+    Mutant("dynamics/gradients", "error[:-shifts], largest[-shifts:]", "error[:-shifts], 0.0"),
     Mutant("dynamics/linear_run", "value + move, left + move", "value, left"),
     Mutant("dynamics/linear_run", "if before is now or not SIGN[o.reduce]:", "if True:"),
     Mutant("dynamics/parameters", "if self._damped:", "if False:"),
