@@ -445,6 +445,7 @@ MUTANTS = [
     Mutant("dynamics/integrators/tangent", "            self._drive(t, t)\n", "            pass\n"),
     Mutant("dynamics/integrators/tangent", "-= h * jump[", "-= 0.0 * jump["),
     Mutant("dynamics/integrators/energy_balance", "rounding ** (1 if system.works else 2)", "rounding**2"),
+    Mutant("dynamics/linear_run", "self.at_snaps.update(", "set().update("),
     Mutant("dynamics/gradients", "error[:-shifts], largest[-shifts:]", "error[:-shifts], 0.0"),
     Mutant("dynamics/linear_run", "value + move, left + move", "value, left"),
     Mutant("dynamics/linear_run", "if before is now or not SIGN[o.reduce]:", "if True:"),

@@ -57,6 +57,8 @@ AMPLIFIED = 10.0
 a hundredth of the number changes a tenth of the result, one way or the other."""
 FINER = 0.1
 """Smaller steps that a refusal names, over those of the scene."""
+OTHER = 1.1
+"""Interval of history rows that a refusal names, over that of the scene."""
 PATHWISE = ("dissipated_energy", "work", "winch_energy", "rupture_energy", "plastic_energy", "step_size")
 """Quantities that are summed over steps."""
 SUPPORTED = (
@@ -101,7 +103,7 @@ class Gradients:
         system = scene.build()
         _refuse(scene, system, solution)
         self._simulation = Simulation(scene, system, load("refweb.solution:Solution")(scene))
-        self._observed, self._known = {o.name: o for o in scene.observables}, {}
+        self._observed, self._known, self._at_snaps = {o.name: o for o in scene.observables}, {}, set()
         self._given = {name: result.error or 0.0 for name, result in solution.results.items()}
         self._simulation.settle(lambda text, share: None)
         integrator = self._simulation.integrator
@@ -141,16 +143,27 @@ class Gradients:
         if known.kept is not None or size > 0.0 and error > limit and known.rivals is not None:
             raise InputError(f'gradient of "{result}" by {path}: {known.kept or known.rivals}')
         if size > 0.0 and error > limit:
-            lost = times[errors > limit].min(initial=self._runs[0].results[result].time)
-            raise InputError(
-                f"the derivative of {result} by {path} is {value:.3g} ± {error:.1g}; behind the horizon, {lost:.4g} "
-                f"s, it has no digit with these steps: use {self._smaller}; where that does not help, small motions "
-                "are chaotic, as of slack lines without damping, even where large ones are not: take a result of an "
-                "earlier time, add damping, or vary the number by refweb sweep"
-            )
+            why = self._why_lost(times[errors > limit], self._runs[0].results[result].time)
+            raise InputError(f"the derivative of {result} by {path} is {value:.3g} ± {error:.1g}; {why}")
         unit = f"{observe.unit} per {BY_LINE[path]}" if path in BY_LINE else observe.unit
         arrays: list[Any] = [None if part is None else np.array([part]) for part in (value, error, left)]
         return Gradient(result, path, "", ("",), *arrays, unit=unit, number=number.number, notes=self._notes(number))
+
+    def _why_lost(self, lost, end):
+        """Reason and remedy where a derivative has no digit from the first of some ``lost`` times on, or at the end."""
+        if len(lost) and self._at_snaps.issuperset(lost):
+            interval = self._simulation.scene.output.interval
+            return (
+                f"a damped line snaps taut at the history row of {lost[0]:.4g} s, which is before it in one and behind "
+                f"it in the other of run and step refinement: use [output] interval = {OTHER * interval:.2g} in place "
+                f"of {interval:g}, or another without a row there"
+            )
+        return (
+            f"behind the horizon, {lost.min(initial=end):.4g} s, it has no digit with these steps: use "
+            f"{self._smaller}; where that does not help, small motions are chaotic, as of slack lines without damping, "
+            "even where large ones are not: take a result of an earlier time, add damping, or vary the number by "
+            "refweb sweep"
+        )
 
     @property
     def _smaller(self):
@@ -227,6 +240,7 @@ class Gradients:
             self._linear(method, run, followed) for method, run in zip(self._methods, self._runs, strict=True)
         )
         sizes = np.array([number.size for number in followed])
+        self._at_snaps |= first.at_snaps | finer.at_snaps
         every = {}
         for name in first.peaks:
             result = self._runs[0].results[name]

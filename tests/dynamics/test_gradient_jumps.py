@@ -51,9 +51,9 @@ def flight(step, effects=(), start=START, time=TIME, **cable):
     )
 
 
-def oscillation(mass, speed, modulus, time, length, start):
+def oscillation(mass, speed, modulus, time, length, start, end=END):
     """Position, velocity and tension at the end: after a flight the line is a spring and a dashpot."""
-    stiffness, passed = modulus * AREA / length, END - (length - start) / speed
+    stiffness, passed = modulus * AREA / length, end - (length - start) / speed
     decay = 0.5 * stiffness * time / mass
     turn = np.sqrt(stiffness / mass - decay**2)
     u = speed * np.exp(-decay * passed) * np.sin(turn * passed) / turn
@@ -111,6 +111,21 @@ def test_a_passage_that_steps_resolve():
     wanted = (high.results["x"].value - low.results["x"].value) / (2.0 * step)
     gradient = refweb.run(scene, progress=False).gradient("x", PATHS["start"])
     assert float(gradient) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_a_snap_at_a_history_row():
+    """Tension and its derivative are those of either side in run and refinement there: other rows are named."""
+    scene = flight(2e-4)
+    solve = replace(scene.solve, duration=0.12)
+    scene = scene.replace(solve=solve, output=refweb.Output(interval=1e-3))
+    with pytest.raises(
+        InputError, match=r"at the history row of 0.05 s, .* use \[output\] interval = 0.0011 in place of 0.001"
+    ):
+        refweb.run(scene, progress=False).gradient("pull", PATHS["start"])
+    solution = refweb.run(scene.replace(output=refweb.Output(interval=1.1e-3)), progress=False)
+    gradient, step = solution.gradient("pull", PATHS["start"]), 1e-6
+    low, high = (oscillation(**TAUT | dict(start=START + s * step), end=0.12)["pull"] for s in (-1.0, 1.0))
+    assert abs(float(gradient) - (high - low) / (2.0 * step)) <= gradient.error[0] < 0.1 * abs(float(gradient))
 
 
 def soft_snap(speed, time, start, gravity=5.0, end=0.03):
