@@ -177,7 +177,8 @@ MIRRORS = {
     "dynamics/integrators/central_difference": "dynamics/test_dynamics.py",
     "dynamics/integrators/explicit_loop": "dynamics/integrators/test_nearby.py dynamics/test_dynamics.py "
     "dynamics/test_impact.py",
-    "dynamics/integrators/energy_balance": "test_readme.py dynamics/test_impact.py effects/test_moved_bodies.py",
+    "dynamics/integrators/energy_balance": "test_readme.py dynamics/test_corners.py dynamics/test_impact.py "
+    "effects/test_moved_bodies.py",
     "dynamics/integrators/ida": "dynamics/integrators/test_ida.py",
     "dynamics/integrators/yielding": "effects/test_plastic.py",
     "dynamics/integrators/averages": "dynamics/test_averages.py",
@@ -442,6 +443,10 @@ MUTANTS = [
     Mutant("dynamics/integrators/snaps", "        if corner:\n", "        if False:\n"),
     Mutant("dynamics/integrators/snaps", "<= MOVED * np.abs(rates)", "<= 1.0 * np.abs(rates)"),
     Mutant("dynamics/integrators/tangent", "            self._drive(t, t)\n", "            pass\n"),
+    Mutant("dynamics/integrators/tangent", "-= h * jump[", "-= 0.0 * jump["),
+    Mutant("dynamics/integrators/energy_balance", "rounding ** (1 if system.works else 2)", "rounding**2"),
+    Mutant("dynamics/linear_run", "self.at_snaps.update(", "set().update("),
+    Mutant("dynamics/gradients", "error[:-shifts], largest[-shifts:]", "error[:-shifts], 0.0"),
     Mutant("dynamics/linear_run", "value + move, left + move", "value, left"),
     Mutant("dynamics/linear_run", "if before is now or not SIGN[o.reduce]:", "if True:"),
     Mutant("dynamics/parameters", "if self._damped:", "if False:"),

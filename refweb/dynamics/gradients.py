@@ -12,7 +12,8 @@ that is kept for a time in which derivatives differ has none, nor has a motion a
 ± is the difference from the gradient of the step-refinement run, with the factors of the results themselves, see
 `refweb.dynamics.twin_error`. At a kink of the force, of a first contact or a line that snaps taut, derivatives have
 errors of order 1 in the step, which may agree by chance; so ± takes the differences at all times before as well, and
-behind a jump of derivatives, as of a damped line that snaps taut, the factor of order 1.
+behind a jump of derivatives, as of a damped line that snaps taut, the factor of order 1. There ± is at least what the
+gradient changes where each jump comes a step later.
 
 From the time on at which run and step refinement have no digit of a result in common, it has no gradient, see
 `refweb.dynamics.divergence`.
@@ -39,6 +40,7 @@ from ..results.observables.slack_fraction import SlackFraction
 from ..statics.gradients import BY_LINE, Gradient, refuse_no_texts
 from .divergence import divergence, lost_before
 from .history import SPREAD
+from .integrators.snaps import Shift, is_damped
 from .linear_run import LinearRun
 from .parameters import SELF, Parameter
 from .peaks import kept, pooled
@@ -55,6 +57,8 @@ AMPLIFIED = 10.0
 a hundredth of the number changes a tenth of the result, one way or the other."""
 FINER = 0.1
 """Smaller steps that a refusal names, over those of the scene."""
+OTHER = 1.1
+"""Interval of history rows that a refusal names, over that of the scene."""
 PATHWISE = ("dissipated_energy", "work", "winch_energy", "rupture_energy", "plastic_energy", "step_size")
 """Quantities that are summed over steps."""
 SUPPORTED = (
@@ -99,7 +103,7 @@ class Gradients:
         system = scene.build()
         _refuse(scene, system, solution)
         self._simulation = Simulation(scene, system, load("refweb.solution:Solution")(scene))
-        self._observed, self._known = {o.name: o for o in scene.observables}, {}
+        self._observed, self._known, self._at_snaps = {o.name: o for o in scene.observables}, {}, set()
         self._given = {name: result.error or 0.0 for name, result in solution.results.items()}
         self._simulation.settle(lambda text, share: None)
         integrator = self._simulation.integrator
@@ -139,16 +143,27 @@ class Gradients:
         if known.kept is not None or size > 0.0 and error > limit and known.rivals is not None:
             raise InputError(f'gradient of "{result}" by {path}: {known.kept or known.rivals}')
         if size > 0.0 and error > limit:
-            lost = times[errors > limit].min(initial=self._runs[0].results[result].time)
-            raise InputError(
-                f"the derivative of {result} by {path} is {value:.3g} ± {error:.1g}; behind the horizon, {lost:.4g} "
-                f"s, it has no digit with these steps: use {self._smaller}; where that does not help, small motions "
-                "are chaotic, as of slack lines without damping, even where large ones are not: take a result of an "
-                "earlier time, add damping, or vary the number by refweb sweep"
-            )
+            why = self._why_lost(times[errors > limit], self._runs[0].results[result].time)
+            raise InputError(f"the derivative of {result} by {path} is {value:.3g} ± {error:.1g}; {why}")
         unit = f"{observe.unit} per {BY_LINE[path]}" if path in BY_LINE else observe.unit
         arrays: list[Any] = [None if part is None else np.array([part]) for part in (value, error, left)]
         return Gradient(result, path, "", ("",), *arrays, unit=unit, number=number.number, notes=self._notes(number))
+
+    def _why_lost(self, lost, end):
+        """Reason and remedy where a derivative has no digit from the first of some ``lost`` times on, or at the end."""
+        if len(lost) and self._at_snaps.issuperset(lost):
+            interval = self._simulation.scene.output.interval
+            return (
+                f"a damped line snaps taut at the history row of {lost[0]:.4g} s, which is before it in one and behind "
+                f"it in the other of run and step refinement: use [output] interval = {OTHER * interval:.2g} in place "
+                f"of {interval:g}, or another without a row there"
+            )
+        return (
+            f"behind the horizon, {lost.min(initial=end):.4g} s, it has no digit with these steps: use "
+            f"{self._smaller}; where that does not help, small motions are chaotic, as of slack lines without damping, "
+            "even where large ones are not: take a result of an earlier time, add damping, or vary the number by "
+            "refweb sweep"
+        )
 
     @property
     def _smaller(self):
@@ -219,15 +234,19 @@ class Gradients:
                 refused[path] = str(error)
         if not numbers:
             return
+        shifts = [Shift(system, number) for number in numbers] if is_damped(system) else []
+        followed = [*numbers, *shifts]
         first, finer = (
-            self._linear(method, run, numbers) for method, run in zip(self._methods, self._runs, strict=True)
+            self._linear(method, run, followed) for method, run in zip(self._methods, self._runs, strict=True)
         )
-        sizes = np.array([number.size for number in numbers])
+        sizes = np.array([number.size for number in followed])
+        self._at_snaps |= first.at_snaps | finer.at_snaps
         every = {}
         for name in first.peaks:
             result = self._runs[0].results[name]
             order = 1 if first.snapped <= result.time else 2
-            every[name] = _with_errors(self._observed[name], first, finer, self._factor(order), result, sizes)
+            parts = first, finer, self._factor(order), result, sizes
+            every[name] = _with_errors(self._observed[name], *parts, len(shifts))
         for n, number in enumerate(numbers):
             self._known[number.path] = number, {name: parts[n] for name, parts in every.items()}
 
@@ -266,8 +285,8 @@ class Known(NamedTuple):
     kept: str | None
 
 
-def _with_errors(observe, first, finer, factor, result, sizes):
-    """The `Known` of a result by each of some numbers of these sizes, a list."""
+def _with_errors(observe, first, finer, factor, result, sizes, shifts):
+    """The `Known` of a result by each of some numbers, a list; ``sizes`` are theirs and, last, those of shifts."""
     name, end, sign, unit = observe.name, result.time, SIGN[observe.reduce], observe.unit
     pool = pooled(first.peaks[name], end, sign)
     peaks, main = first.peaks[name], first.peaks[name][pool.at]
@@ -277,10 +296,13 @@ def _with_errors(observe, first, finer, factor, result, sizes):
     apart = np.maximum(np.abs(pool.value - refined.value), np.abs(pool.left - refined.left))
     if count:
         apart = np.maximum(apart, [largest_mean(times, column, end) for column in np.abs(rows - beside).T])
-    error = factor * apart + LEAST * np.maximum(np.abs(pool.value), np.abs(pool.left))
+    largest = np.maximum(np.abs(pool.value), np.abs(pool.left))
+    error = factor * apart + LEAST * largest
+    if shifts:
+        error = np.maximum(error[:-shifts], largest[-shifts:])
     errors, before, known = factor * np.abs(rows - beside)[times <= end].T, times[times <= end], []
     right, falling = kept(first.samples.get(name, []), main.value, sizes)
-    for n in range(len(sizes)):
+    for n in range(len(error)):
         value, left = pool.value[n], pool.left[n]
         if abs(value - left) <= error[n]:
             value = left = main.slopes.value[n]

@@ -47,6 +47,8 @@ class LinearRun:
         Time [s] from which on the motion has no derivative, and text of this kink, by the index of a number.
     snapped : float
         Time of the first line that snaps taut with a jump of its damping force [s], infinite if none does.
+    at_snaps : set of float
+        Times of rows at an end of a step in which a line does.
     """
 
     def __init__(self, integrator, motion, numbers, observed, results, errors):
@@ -63,7 +65,7 @@ class LinearRun:
         self.times, self.rows = [], {o.name: [] for o in observed}
         self.peaks, self.samples = {o.name: [] for o in observed}, {o.name: [] for o in self._reduced}
         self.kinks = self._tangent.snaps.kinks if self._tangent.snaps else {}
-        self.snapped, self._delays = np.inf, np.zeros((len(numbers), 0))
+        self.snapped, self.at_snaps, self._delays = np.inf, set(), np.zeros((len(numbers), 0))
 
     def follow(self, times, sampled):
         """Follow the run to each of some times, and take a row at each time of a set; return itself."""
@@ -82,8 +84,10 @@ class LinearRun:
         self._tangent.step(t, h, course.x, course.v, course.force, corner)
         if self._tangent.snaps:
             self._delays = self._tangent.snaps.delays
-            self.snapped = min(self.snapped, t if self._delays.size else np.inf)
         self._add_instant(t, h)
+        if self._delays.size:
+            self.snapped = min(self.snapped, t)
+            self.at_snaps.update(time for time in self.times[-2:] if time >= t - (1.0 + BESIDE) * h)
 
     def _add_instant(self, t, h):
         """Take the state at the end t of a step h, and at a corner of a table that before it as well."""

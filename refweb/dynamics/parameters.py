@@ -23,7 +23,7 @@ from ..messages import quote
 from ..reference.paths import with_value
 from ..statics.gradients import number_and_size
 from ..system.static_system import at_rest
-from .integrators.snaps import gaps_of
+from .integrators.snaps import gaps_of, is_damped
 
 CHANGE = 3e-7
 """Largest relative change of data by a step: its square and rounding over it leave errors of 1e-9 of a derivative."""
@@ -93,7 +93,7 @@ class Parameter:
         self._lighter = self._inverse_of(high) - self._inverse_of(low)
         self._outs = system.per_cell()
         over = any(system.terms[n].over_lines for n in self.differing)
-        self._damped = over and "damping_time" in (system.net.line_data.dtype.names or ())
+        self._damped = over and is_damped(system)
 
     def _changed(self):
         """(Step, systems) for a change of data by `CHANGE`."""

@@ -236,3 +236,23 @@ def test_auto_counts_corners(monkeypatch):
     for corners, method in ((2, "cvode"), (1500, "central-difference")):
         given = trembling(corners, method="auto", start="equilibrium")
         assert method_choice.decided(given, given.build()).solve.method == method
+
+
+@pytest.mark.parametrize("method", ["central-difference", "cvode"])
+def test_a_line_that_is_pulled_just_taut(method):
+    """Work of the support is that of forces by rounding: they are no drift of energy, and the mass stays."""
+    rows = [(0.0, 0.0, 0.0, 0.0), (0.05, -0.1, 0.0, 0.0), (0.2, -0.1, 0.0, 0.0)]
+    solution = refweb.run(
+        refweb.Scene(
+            web=refweb.Inline(points=[[0, 0, 0], [0.9, 0, 0]], lines=[[0, 1]], supports=[0], natural_length=1.0),
+            cable=refweb.Cable(law="tension-only", modulus=1e7, area=1e-4, density=0.0),
+            effects=[
+                refweb.PointMass(node=1, mass=1.0),
+                refweb.Damping(rate=0.1),
+                refweb.Motion(node=[0], displacement=rows),
+            ],
+            observe=[refweb.Observe(name="fast", quantity="velocity", node=1, reduce="max")],
+            solve=refweb.Dynamic(duration=0.1, **METHODS[method]),
+        )
+    )
+    assert 0.0 <= solution.results["fast"].value < 1e-12  # EA times rounding over 1 kg, for 0.1 s

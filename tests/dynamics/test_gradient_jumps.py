@@ -51,9 +51,9 @@ def flight(step, effects=(), start=START, time=TIME, **cable):
     )
 
 
-def oscillation(mass, speed, modulus, time, length, start):
+def oscillation(mass, speed, modulus, time, length, start, end=END):
     """Position, velocity and tension at the end: after a flight the line is a spring and a dashpot."""
-    stiffness, passed = modulus * AREA / length, END - (length - start) / speed
+    stiffness, passed = modulus * AREA / length, end - (length - start) / speed
     decay = 0.5 * stiffness * time / mass
     turn = np.sqrt(stiffness / mass - decay**2)
     u = speed * np.exp(-decay * passed) * np.sin(turn * passed) / turn
@@ -113,6 +113,60 @@ def test_a_passage_that_steps_resolve():
     wanted = (high.results["x"].value - low.results["x"].value) / (2.0 * step)
     gradient = refweb.run(scene, progress=False).gradient("x", PATHS["start"])
     assert float(gradient) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_a_snap_at_a_history_row():
+    """Tension and its derivative are those of either side in run and refinement there: other rows are named."""
+    scene = flight(2e-4)
+    solve = replace(scene.solve, duration=0.12)
+    scene = scene.replace(solve=solve, output=refweb.Output(interval=1e-3))
+    with pytest.raises(
+        InputError, match=r"at the history row of 0.05 s, .* use \[output\] interval = 0.0011 in place of 0.001"
+    ):
+        refweb.run(scene, progress=False).gradient("pull", PATHS["start"])
+    solution = refweb.run(scene.replace(output=refweb.Output(interval=1.1e-3)), progress=False)
+    gradient, step = solution.gradient("pull", PATHS["start"]), 1e-6
+    low, high = (oscillation(**TAUT | dict(start=START + s * step), end=0.12)["pull"] for s in (-1.0, 1.0))
+    assert abs(float(gradient) - (high - low) / (2.0 * step)) <= gradient.error[0] < 0.1 * abs(float(gradient))
+
+
+def soft_snap(speed, time, start, gravity=5.0, end=0.03):
+    """A mass thrown up at a slack line snaps it taut near the top of its flight and falls back, beside scipy."""
+    taut = (speed - np.sqrt(speed**2 - 2.0 * gravity * (1.0 - start))) / gravity
+    stiffness = MODULUS * AREA
+
+    def slack(t, y):
+        return y[0] + time * y[1]
+
+    slack.terminal, slack.direction = True, -1
+    found = solve_ivp(
+        lambda t, y: [y[1], -gravity - stiffness * (y[0] + time * y[1])],
+        (taut, end), [0.0, speed - gravity * taut], "DOP853", rtol=1e-12, atol=1e-15, events=slack,
+    )  # fmt: skip
+    left, (u, v) = end - found.t[-1], found.y[:, -1]
+    return {"x": 1.0 + u + v * left - 0.5 * gravity * left**2, "v": v - gravity * left}
+
+
+@pytest.mark.parametrize("phase", [1.27, 1.6, 1.88])
+def test_run_and_refinement_that_agree_by_chance(phase):
+    """A soft snap lies alike in the steps of both runs; ± is what a snap a step later changes, and so is sound."""
+    numbers = dict(speed=np.sqrt(0.0632**2 + 1e-2), time=TIME, start=0.999 + phase * 2e-4 * 0.0632)
+    scene = flight(2e-4, (refweb.Gravity(acceleration=(-5.0, 0.0, 0.0)),), numbers["start"])
+    mass, _, *effects = scene.effects
+    scene = scene.replace(
+        effects=[mass, refweb.Velocity(node=[1], value=(numbers["speed"], 0.0, 0.0)), *effects],
+        observe=scene.observe[:2],
+        solve=replace(scene.solve, duration=0.03),
+        output=refweb.Output(interval=3e-3),
+    )
+    solution = refweb.run(scene, progress=False)
+    solution.gradients.follow(PATHS[key] for key in numbers)
+    for key, value in numbers.items():
+        step = 1e-6 if key == "start" else 1e-4 * value
+        low, high = (soft_snap(**{**numbers, key: value + s * step}) for s in (-1.0, 1.0))
+        for name in low:
+            gradient, exact = solution.gradient(name, PATHS[key]), (high[name] - low[name]) / (2.0 * step)
+            assert abs(float(gradient) - exact) <= gradient.error[0] < 0.1 * abs(exact), (name, key)
 
 
 @pytest.mark.slow

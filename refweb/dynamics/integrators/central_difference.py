@@ -119,7 +119,7 @@ class CentralDifference(Integrator):
         self.model = Model.of(system, outs)
         self._observed = Observed.of(probes, sums, len(outs), outs, self.model.contacts)
         self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])
-        self._events, self._least_energy = event_rows(events), least_energy(net)
+        self._events, self._least_energy = event_rows(events), least_energy(system)
         self._taken, self._prepared = None, False
         self._kept: Any = ()
         self._history = History.empty(0, len(probes), system.terms)

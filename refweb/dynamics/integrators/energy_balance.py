@@ -7,7 +7,7 @@ size) and ``work`` ends with that of motion: `rows`, `simpson_balance` and `Hist
 its value in words in ``validation/how_it_works.py``, which ``tests/test_readme.py`` compares. Kernels are called by
 `explicit_loop`, `step`, `dense_output`, `rows` and `simpson_balance`, which follow their arguments; another order of
 sums changes last bits of work. Must stay as well: all names that `explicit_loop`, `simpson_balance` and other files
-import. Tests: ``tests/dynamics/test_impact.py``.
+import. Tests: ``tests/dynamics/test_impact.py``, ``tests/dynamics/test_corners.py``.
 """
 
 from __future__ import annotations
@@ -49,13 +49,14 @@ if a load rises from zero on a web at rest, the first rows compare the errors of
 """
 
 
-def least_energy(net):
+def least_energy(system):
     """Least energy with which a drift is compared [J]: that of strains of a few roundings, over `DRIFT`.
 
-    A web at rest whose lines have exactly their natural length has only energies by rounding.
+    A web at rest whose lines have exactly their natural length has only energies by rounding. Where supports or natural
+    lengths move, the forces of such strains do work on the way, which counts as one of the length of each line.
     """
-    lines = net.line_data
-    return float(0.5 * (lines.ea * lines.natural_length).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
+    lines, rounding = system.net.line_data, 8.0 * np.finfo(float).eps
+    return float(0.5 * (lines.ea * lines.natural_length).sum() * rounding ** (1 if system.works else 2) / DRIFT)
 
 
 def own_energies(total, system):

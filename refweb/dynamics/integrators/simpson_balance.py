@@ -155,7 +155,7 @@ class SimpsonBalance:
     """
 
     def __init__(self, system, hold, fast, uneven=UNEVEN):
-        self.system, self._hold, self.least_energy = system, hold, least_energy(system.net)
+        self.system, self._hold, self.least_energy = system, hold, least_energy(system)
         self._uneven = np.array([UNEVEN, uneven])
         self._linear, self._turns = system.rows - system.net.spins, RigidRotations.of(system.net)
         self._still = system.net.mass[: self._linear].sum() * fast

@@ -19,7 +19,8 @@ A law whose slope changes over a strain that is short against that of a step is 
 ends of the step gives the part of Δσ' that is in the steps.
 
 May change: private functions, and constants, which decide what counts as a jump. Must stay: public names of `Snaps`,
-which `tangent` and `linear_run` use, and `gaps_of`, which `dynamics.parameters` calls. Tests:
+which `tangent` and `linear_run` use; `Shift`, which `gradients` makes; `gaps_of` and `is_damped`, which
+`dynamics.parameters` calls. Tests:
 ``tests/dynamics/test_dynamic_gradients.py``, ``tests/dynamics/test_gradient_jumps.py``.
 """
 
@@ -53,6 +54,41 @@ def strains_of(system, t, x):
 def gaps_of(system, t, x):
     """Strain of each element of a system above its slackness, shape (elements,)."""
     return strains_of(system, t, x) - system.line_data(t).slackness
+
+
+def is_damped(system):
+    """Tell if lines of a system have a damping time."""
+    return "damping_time" in (system.net.line_data.dtype.names or ())
+
+
+class Shift:
+    """Change of the derivative by a number where each snap comes a step later; it is followed as one by a number.
+
+    A run has a snap at the end of a step, and the error of its derivatives is in proportion to the time from the snap
+    to this end. A shift has the attributes of a `refweb.dynamics.parameters.Parameter` on which nothing depends.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        The system.
+    number : refweb.dynamics.parameters.Parameter
+        The number.
+    """
+
+    def __init__(self, system, number):
+        self.size, self.step, self.differing = number.size, number.step, ()
+        self.systems, self.start = (system, system), np.zeros_like(number.start)
+
+    def beside(self, step):
+        """Systems with a value below and above."""
+        return self.systems
+
+    def add_rate(self, t, x, v, f, inverse, rate):
+        """Add nothing to accelerations."""
+
+    def driven(self, t, at, rows):
+        """Derivatives of prescribed positions and velocities."""
+        return np.zeros((2, len(rows), 3))
 
 
 class Snaps:

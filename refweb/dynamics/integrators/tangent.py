@@ -34,7 +34,7 @@ from numba import types
 from ...errors import IntegrationError
 from ...kernels import INDICES, kernel
 from .integrator import SAME
-from .snaps import Snaps
+from .snaps import Shift, Snaps, is_damped
 
 CUBE = types.Array(types.float64, 3, "C")
 MOST_ROUNDS, CLOSE = 200, 1e-13
@@ -168,7 +168,7 @@ class Tangent:
     integrator : refweb.dynamics.integrators.central_difference.CentralDifference
         The method, of a system without attached nodes, bodies that turn and internal variables.
     numbers : sequence of refweb.dynamics.parameters.Parameter
-        The numbers p.
+        The numbers p; behind them may be as many `refweb.dynamics.integrators.snaps.Shift`.
     t : float
         Time of the start [s].
     x, v, f : ndarray, shape (rows, 3)
@@ -199,8 +199,8 @@ class Tangent:
         self.x, self.v = (np.array([number.start[k] for number in numbers]).reshape(shape) for k in (0, 1))
         self.before = None
         self._set_rates(t, x, v, f)
-        damped = "damping_time" in (self.system.net.line_data.dtype.names or ())
-        self.snaps = Snaps(self.system, numbers, x, v, self.x) if damped else None
+        self._shifts = sum(isinstance(number, Shift) for number in numbers)
+        self.snaps = Snaps(self.system, numbers, x, v, self.x) if is_damped(self.system) else None
 
     def _rates(self, t, x, v, f):
         """∂(M⁻¹f)/∂p − M⁻¹K δx, shape (p, rows, 3)."""
@@ -231,8 +231,10 @@ class Tangent:
         self.v += 0.5 * h * self.a
         self.x += h * self.v
         self._drive(t, t - 0.5 * h)
+        before = self.v.copy(), self.a
         if self.snaps:
             self.snaps.add(t, h, x, v, self.x, self.v, self.inverse, corner)
+        jump = self.v - before[0]
         now, behind = t, (v, f)
         if corner:
             now, v = t - BESIDE * h, v.copy()
@@ -246,6 +248,9 @@ class Tangent:
         else:
             self.a = rub(rates)
         self.v += 0.5 * h * self.a
+        if self._shifts and self.snaps.delays.size:
+            self.x[-self._shifts :] -= h * jump[: self._shifts]
+            self.v[-self._shifts :] -= h * (self.a - before[1])[: self._shifts]
         self.before = None
         if corner:
             self.before = v, self.inverse * f, self.x.copy(), self.v.copy(), self.a
