@@ -113,8 +113,8 @@ class Kernel:
     def _body(self):
         """The dispatcher that kernels see."""
         given = {**numba_internals.options(self._options, self._counted), **numba_internals.BARE}
-        linked = self.apart is None
-        cache = numba_internals.Cache(self.py_func.__qualname__.rpartition(".")[2], lambda: self._key, linked)
+        linked, called = self.apart is None, self.signature is not None
+        cache = numba_internals.Cache(self.py_func.__qualname__.rpartition(".")[2], lambda: self._key, linked, called)
         return numba_internals.dispatcher(self.py_func, given, cache)
 
     def _compiled(self):
@@ -156,7 +156,7 @@ class Kernel:
         if self.signature is not None:
             return functools.partial(entry_of(self.signature), self.address())
         name = "entry_" + self.py_func.__qualname__.rpartition(".")[2]
-        cache = numba_internals.Cache(name, lambda: f"entry {self._key}", False)
+        cache = numba_internals.Cache(name, lambda: f"entry {self._key}")
         return numba_internals.dispatcher(self.py_func, {**self._options, **numba_internals.ENTRY}, cache)
 
     def __call__(self, *arguments):
@@ -183,7 +183,7 @@ def entry_of(signature):
     names = ", ".join(f"a{n}" for n in range(len(signature.args)))
     space = {"kernel_at": numba_internals.kernel_at(signature), "__name__": __name__}
     exec(f"def entry(address, {names}): return kernel_at(address)({names})", space)
-    cache = numba_internals.Cache("entry", lambda: f"entry {signature}", False)
+    cache = numba_internals.Cache("entry", lambda: f"entry {signature}")
     made = numba_internals.dispatcher(space["entry"], {**COMMON, **numba_internals.ENTRY}, cache)
     made.compile(signature.return_type(types.intp, *signature.args))
     made.disable_compile()

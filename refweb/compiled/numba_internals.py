@@ -11,6 +11,9 @@ options of `njit`      entries from Python are two fifths of what it takes to  t
                        array and call
 call by address        a caller that links its callees optimizes all that is   kernels are linked
                        below it again
+``JITCodeLibrary``     of a linked kernel all callers run the copy that is     the first run, which
+                       loaded first, and copies may differ in rounding; code   compiles, may differ from
+                       of a kernel that is only linked is never run            later ones in rounding
 operators of types     kernels read records and tables as Python does         none: what `records` and `tables`
 of one's own                                                                   need of numba beside its
                                                                                ``extending`` stands here
@@ -39,7 +42,8 @@ import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils, config, sigutils
-from numba.core.compiler import CompileResult
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.imputils import lower_builtin, lower_constant
 from numba.core.runtime.nrt import rtsys
@@ -97,10 +101,12 @@ class Cache:
         Text of all that the machine code depends on besides the types of its arguments.
     linked : bool
         True if other kernels may be optimized with it. Else the data for that, most of a file, is left out.
+    called : bool
+        True if it is called by its address or from Python. Else its machine code is left out.
     """
 
-    def __init__(self, name, key, linked):
-        self.name, self.key, self.linked = name, key, linked
+    def __init__(self, name, key, linked=False, called=True):
+        self.name, self.key, self.linked, self.called = name, key, linked, called
 
     def file(self, signature, processor=None):
         """Name of the file of a signature."""
@@ -130,14 +136,51 @@ class Cache:
 
     def save_overload(self, signature, result):
         """Write the machine code of a signature."""
-        library, *rest = result._reduce()
-        name, kind, code = library
-        if kind == "object" and not self.linked:
-            made = result.fndesc
-            names = made.mangled_name, made.llvm_cpython_wrapper_name, made.llvm_cfunc_wrapper_name
-            stubs = "\n".join(f'define void @"{stub}"() {{ ret void }}' for stub in names)
-            code = code[0], llvm.parse_assembly(stubs).as_bitcode()
-        store.write(self.file(signature), dumps(((name, kind, code), *rest)))
+        store.write(self.file(signature), dumps(result._reduce()))
+
+
+class _Library(JITCodeLibrary):
+    """Machine code of one function, which calls no copy of a linked kernel but its own.
+
+    LLVM would let all libraries with a copy of a kernel call the copy that is loaded first. Copies are optimized in
+    different ways and so may differ in rounding; then a run that compiles would differ from later ones.
+    """
+
+    def __init__(self, codegen, name, cache):
+        super().__init__(codegen, name)
+        self.cache = cache
+        self.enable_object_caching()
+
+    def _finalize_final_module(self):
+        module = self._final_module
+        functions = [function for function in module.functions if not function.is_declaration]
+        if self.cache.linked:
+            self._finalized = True  # the functions are, which the next line asks for
+            self._get_module_for_linking()
+        else:
+            names = [function.name for function in functions if function.linkage == llvm.Linkage.external]
+            self._shared_module = llvm.parse_assembly("\n".join(f'define void @"{n}"() {{ ret void }}' for n in names))
+        if self.cache.called:
+            for function in functions:
+                if function.linkage == llvm.Linkage.linkonce_odr:
+                    function.linkage = "internal"
+        else:
+            names = [value.name for value in module.global_variables if value.name.startswith("_ZN08NumbaEnv")]
+            self._final_module = llvm.parse_assembly("\n".join(f'@"{name}" = common global i64 0' for name in names))
+            self._final_module.name = module.name
+        super()._finalize_final_module()
+
+
+def _compiler_of(cache):
+    """Compiler of numba that makes a `_Library`."""
+
+    class KernelCompiler(Compiler):
+        def define_pipelines(self):
+            state = self.state
+            state.library = _Library(state.targetctx.codegen(), state.func_id.func_qualname, cache)
+            return super().define_pipelines()
+
+    return KernelCompiler
 
 
 def without_literals(signature):
@@ -155,7 +198,7 @@ def dispatcher(function, given, cache) -> Any:
     """A dispatcher of numba with a `Cache`; one thread and one process compiles at a time."""
     if PLAIN:
         return numba.njit(cache=function.__code__.co_filename != "<string>", **given)(function)
-    made: Any = numba.njit(**given)(function)
+    made: Any = numba.njit(pipeline_class=_compiler_of(cache), **given)(function)
     made._cache, compile_one = cache, made.compile
 
     def compile_alone(signature):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from refweb.compiled import kernel as kernels
-from refweb.compiled import keys, watched
+from refweb.compiled import keys, store, watched
 from refweb.kernels import Matrix, Vector, kernel
 
 FACTORY = '''
@@ -59,8 +59,8 @@ def run(tmp_path):
         (own / "factory.py").write_text(FACTORY.format(text=text, lines=lines))
         (own / "one.py").write_text("from refweb.kernels import kernel\n\n" + INNER[kind].format(number=number))
 
-    def start(lines=SHOW, **more):
-        command = [sys.executable, "-c", lines]
+    def start(lines=SHOW, arguments="", **more):
+        command = [sys.executable, "-c", lines, *arguments]
         done = subprocess.run(command, env=environment | more, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         return done.stdout.split()
@@ -97,6 +97,37 @@ def test_the_public_parts_of_numba_alone_give_the_same(run):
     for kind in INNER:
         run.write(kind, 3.0)
         assert run(REFWEB_PLAIN="1")[0] == "6.0"
+
+
+CLASH = """
+import sys
+from refweb.kernels import kernel
+
+TEXT = '''
+import math
+@kernel()
+def inner(value, times):
+    for _ in range(times):
+        {lines}
+    return {number} + 0.0 * value
+
+@kernel(apart=())
+def outer{number}(value: float, times: int) -> float:
+    return inner(value, times) * inner(2.0 * value, times + 1) * inner(3.0 * value, times + 2)
+'''
+for number in map(int, sys.argv[1:]):
+    space = {"kernel": kernel, "__name__": "__main__"}
+    lines = "value = math.sin(value) + math.cos(value) / (2.0 + value * value); " * 30  # too many to be inlined
+    exec(TEXT.format(number=number, lines=lines), space)
+    outer = space[f"outer{number}"]
+    print(outer(1.0, 2), end=" ")
+"""
+
+
+def test_a_caller_keeps_its_own_copy_of_a_linked_kernel_whatever_is_loaded_before(run):
+    """Two processes give different kernels the same symbol; a third one loads the callers of both."""
+    outcomes = [run(CLASH, arguments=numbers) for numbers in ("2", "3", "23", "32")]
+    assert outcomes == [["8.0"], ["27.0"], ["8.0", "27.0"], ["27.0", "8.0"]]
 
 
 def calls(module, text):
@@ -243,6 +274,35 @@ def test_a_warm_process_compiles_nothing():
     for _ in range(2):
         told = subprocess.run([sys.executable, "-c", WARM], capture_output=True, text=True, check=True).stdout
     assert json.loads(told) == [0.0, 0.0, 0.0, 0.0, 0]
+
+
+COMPILED_AGAIN = ("contact", "detect", "within", "deepest", "depth", "meets", "pull_at", "collides", "step_back")
+RUBS = """
+import hashlib, json, sys
+import refweb
+solution = refweb.run(refweb.Scene.load("square-impact", {"solve.duration": 1.2e-2, "contact.friction": 0.3}))
+digests = {name: hashlib.sha256(values.tobytes()).hexdigest() for name, values in solution.history.items()}
+print(json.dumps([solution.cost["compile_s"] > 0.0, digests]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+def test_a_run_that_compiles_has_the_bits_of_one_that_loads(tmp_path):
+    """For an impact with friction, of whose machine code that of contact is compiled again."""
+
+    def run_with(**more):
+        command = [sys.executable, "-c", RUBS]
+        done = subprocess.run(command, capture_output=True, text=True, check=True, env={**os.environ, **more})
+        return json.loads(done.stdout)
+
+    run_with()
+    for path in store.folder().iterdir():
+        if not path.name.startswith(COMPILED_AGAIN):
+            (tmp_path / path.name).symlink_to(path.absolute())
+    first, second = (run_with(REFWEB_CACHE=str(tmp_path)) for _ in range(2))
+    assert (first[0], second[0]) == (True, False)
+    assert first[1] == second[1]
 
 
 QUICK = """

@@ -92,7 +92,7 @@ def far(x, cells, data, c, nodes):
     return first > 2.0 * (radius * radius + length)  # then |first| > radius + length
 
 
-@kernel(forceinline=True)  # force and penetration check would each have a copy, and call that which was loaded first
+@kernel(forceinline=True)  # force and penetration check call it for each cell
 def closest(x, cells, data, c, nodes, functions):
     """(place of the point of cell c nearest the centre, its squared distance)."""
     xi = 0.0
