@@ -355,6 +355,7 @@ MUTANTS = [
     Mutant("net/law_keys", 'object.__setattr__(table, "modulus", None)', "pass"),
     Mutant("effects/line_kernels", "d * (along - across) * p[i] * p[j]", "d * along * p[i] * p[j]"),
     Mutant("effects/elasticity", "pulled = (1.0 + e) * stress", "pulled = stress"),
+    Mutant("effects/elasticity", "f[j, 1] -= d1[k]", "f[j, 1] -= d0[k]"),
     Mutant(
         "effects/damping",
         "max(time * rate * tangent(e, line), -above_floor(e, line))",

@@ -16,7 +16,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from .numba_internals import make_array
@@ -81,3 +83,29 @@ def number_at(typing, address, index):
         return builder.load(builder.gep(numbers, [index]))
 
     return types.float64(types.int64, types.int64), build
+
+
+@_intrinsic
+def numbers_at(typing, matrix, row, column):
+    """The numbers of a row of a C-contiguous matrix from a column on, in kernels.
+
+    Indices without sign count from there, without a check: loops over them use all lanes of the processor.
+    """
+
+    def build(context, builder, signature, arguments):
+        array, row, column = arguments
+        array = make_array(signature.args[0])(context, builder, array)
+        return builder.gep(array.data, [builder.add(builder.mul(row, builder.extract_value(array.shape, 1)), column)])
+
+    return types.CPointer(matrix.dtype)(matrix, types.intp, types.intp), build
+
+
+@intrinsic(prefer_literal=True)
+def numbers_aside(typing, count):
+    """Space for a constant count of numbers, to the end of the kernel; nothing else has an address in it."""
+
+    def build(context, builder, signature, arguments):
+        shape = ir.ArrayType(context.get_value_type(types.float64), count.literal_value)
+        return builder.bitcast(cgutils.alloca_once(builder, shape), shape.element.as_pointer())
+
+    return types.CPointer(types.float64)(count), build

@@ -361,6 +361,8 @@ class ForceTerm:
         on.
     force : kernel
         Adds to the forces.
+    by_blocks : kernel, optional
+        The same for steps of an explicit method, from numbers as `refweb.effects.line_kernels.blocks_of` arranges them.
     balance : Balance
         Part in the balances of energy and momentum.
     energy : kernel, optional
@@ -388,6 +390,7 @@ class ForceTerm:
     internal: InternalVariables | None = None
     adds_tension: bool = False
     observed: int = 0
+    by_blocks: Callable[..., Any] | None = None
 
     @property
     def over_lines(self) -> bool:

@@ -12,21 +12,22 @@ digits of all results. Must stay: the name "elasticity", which `statics.gradient
 `System` takes the numbers of its lines; "strain_energy", a column of ``history.csv``; `Elasticity`, which `build` and
 `statics.monotone_loading` take; the order of what `kernels` returns, which `wound_lines` and ``tests/test_contract.py``
 unpack, with ∂E/∂L as the last, which `plastic` and `viscous` take; `strains`, which `results.state`, `statics`,
-`plastic` and `viscous` call, and `length_force`, which `natural_lengths` calls; columns of `LINE_OUT`. Tests:
-``tests/test_contract.py``, ``tests/net/test_elements.py``.
+`plastic` and `viscous` call, and `length_force`, which `natural_lengths` calls; both force kernels have the same sums;
+columns of `LINE_OUT`. Tests: ``tests/test_contract.py``, ``tests/net/test_elements.py``.
 """
 
 from __future__ import annotations
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.rows import record_at
+from ..compiled.rows import numbers_aside, numbers_at, record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..tables import Table, table
 from .base import LINE_OUT, Balance, ForceTerm, Tangent
-from .line_kernels import add_row_sums, add_stiffness, line_at, pull_together, strain
+from .line_kernels import BLOCK, add_row_sums, add_stiffness, line_at, pull_together, strain, strain_of
 
 
 @functools.cache
@@ -50,47 +51,18 @@ def kernels(law, record, gradients, weights):
     points, nodes = len(gradients), len(gradients[0])
     flat = tuple(value for row in gradients for value in row)
 
-    @kernel(forceinline=True)
-    def pull_at(x, cells, data, c, q):
-        """(dx/dξ, w T/|dx/dξ|, T, ε) at quadrature point q of element c."""
-        p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
-        tension = stress(e, record_at(record, data, c, 0))
-        return p0, p1, p2, weights[q] * tension * inverse, tension, e
-
-    @kernel()
-    def add_pull(f, cells, c, pull, out):
-        """Add the forces of an element of one point, and write its output."""
-        p0, p1, p2, scale, tension, e = pull
-        pull_together(f, cells, c, 0, nodes, flat, scale, p0, p1, p2)
-        shows = record_at(LINE_OUT, out, c, 0)
-        shows.tension, shows.strain = tension, e
-
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
             largest = stretched = 0.0
             for q in range(points):
-                p0, p1, p2, scale, tension, e = pull_at(x, cells, data, c, q)
+                p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
+                tension = stress(e, record_at(record, data, c, 0))
                 if q == 0 or tension > largest:
                     largest, stretched = tension, e
-                pull_together(f, cells, c, q, nodes, flat, scale, p0, p1, p2)
+                pull_together(f, cells, c, q, nodes, flat, weights[q] * tension * inverse, p0, p1, p2)
             shows = record_at(LINE_OUT, out, c, 0)
             shows.tension, shows.strain = largest, stretched
-
-    @kernel(FORCE)
-    def force_of_four(t, x, v, f, cells, data, out):
-        """Forces of elements of one point, four at once, which uses the processor better."""
-        fours = cells.shape[0] // 4 * 4
-        for n in range(0, fours, 4):
-            i, j, k, m = np.uint64(n), np.uint64(n + 1), np.uint64(n + 2), np.uint64(n + 3)
-            first, second = pull_at(x, cells, data, i, 0), pull_at(x, cells, data, j, 0)
-            third, fourth = pull_at(x, cells, data, k, 0), pull_at(x, cells, data, m, 0)
-            add_pull(f, cells, i, first, out)
-            add_pull(f, cells, j, second, out)
-            add_pull(f, cells, k, third, out)
-            add_pull(f, cells, m, fourth, out)
-        for n in range(fours, cells.shape[0]):
-            add_pull(f, cells, np.uint64(n), pull_at(x, cells, data, np.uint64(n), 0), out)
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
@@ -140,7 +112,71 @@ def kernels(law, record, gradients, weights):
                 total += weights[q] * (energy_density(e, line) - pulled)
             out[c] = total
 
-    return force_of_four if points == 1 else force, energy, stiffness, bound, every_strain, length_force
+    return force, energy, stiffness, bound, every_strain, length_force
+
+
+class Line(NamedTuple):
+    """Numbers of a line by the names of `refweb.net.laws.law.LINE`, for a law in `force_by_blocks`."""
+
+    natural_length: float
+    ea: float
+    slackness: float
+    smoothing: float
+    g0: float
+    r0: float
+    reference: tuple[float, float, float]
+    distance: float
+
+
+@functools.cache
+def force_by_blocks(law):
+    """Force kernel of straight elements of a law without columns, for numbers by `line_kernels.blocks_of`.
+
+    It has the sums of `kernels` in the same order, in three loops over each block: over nodes, over elements, whose
+    strains and tensions take all lanes of the processor as it has no branch, and over nodes. Elements that follow each
+    other often share their first node, whose force is not written in between.
+    """
+    stress = law.stress
+
+    @kernel(FORCE, leaf=True)
+    def force(t, x, v, f, cells, data, out):
+        d0, d1, d2 = numbers_aside(BLOCK), numbers_aside(BLOCK), numbers_aside(BLOCK)
+        tensions, strains = numbers_aside(BLOCK), numbers_aside(BLOCK)
+        for begin in range(0, cells.shape[0], BLOCK):
+            count, first, block = np.uint64(min(BLOCK, cells.shape[0] - begin)), np.uint64(begin), begin // BLOCK
+            for k in range(count):
+                i, j = np.uint64(cells[first + k, 0]), np.uint64(cells[first + k, 1])
+                d0[k], d1[k], d2[k] = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+            natural, ea = numbers_at(data, block, 0), numbers_at(data, block, BLOCK)
+            slackness, smoothing = numbers_at(data, block, 2 * BLOCK), numbers_at(data, block, 3 * BLOCK)
+            g0, r0 = numbers_at(data, block, 4 * BLOCK), numbers_at(data, block, 5 * BLOCK)
+            x0, x1 = numbers_at(data, block, 6 * BLOCK), numbers_at(data, block, 7 * BLOCK)
+            x2, distance = numbers_at(data, block, 8 * BLOCK), numbers_at(data, block, 9 * BLOCK)
+            for k in range(count):
+                reference = x0[k], x1[k], x2[k]
+                numbers = natural[k], ea[k], slackness[k], smoothing[k], g0[k], r0[k]
+                line = Line(*numbers, reference, distance[k])
+                p0, p1, p2, inverse, e = strain_of(line, d0[k], d1[k], d2[k])
+                tension = stress(e, line)
+                scale = tension * inverse
+                tensions[k], strains[k] = tension, e
+                d0[k], d1[k], d2[k] = scale * p0, scale * p1, scale * p2
+            row = np.uint64(cells[first, 0])
+            f0, f1, f2 = f[row, 0], f[row, 1], f[row, 2]
+            for k in range(count):
+                i, j = np.uint64(cells[first + k, 0]), np.uint64(cells[first + k, 1])
+                if i != row:
+                    f[row, 0], f[row, 1], f[row, 2] = f0, f1, f2
+                    f0, f1, f2, row = f[i, 0], f[i, 1], f[i, 2], i
+                f0, f1, f2 = f0 + d0[k], f1 + d1[k], f2 + d2[k]
+                f[j, 0] -= d0[k]
+                f[j, 1] -= d1[k]
+                f[j, 2] -= d2[k]
+                shows = record_at(LINE_OUT, out, begin + k, 0)
+                shows.tension, shows.strain = tensions[k], strains[k]
+            f[row, 0], f[row, 1], f[row, 2] = f0, f1, f2
+
+    return force
 
 
 def of(net):
@@ -172,6 +208,7 @@ class Elasticity(Table):
             cells=net.cells,
             data=None,
             force=force,
+            by_blocks=force_by_blocks(net.law) if net.order == 1 and not net.law.columns else None,
             energy=energy,
             tangent=Tangent(stiffness, bound),
             balance=Balance("strain_energy", internal=True),

@@ -15,9 +15,12 @@ import math
 
 import numpy as np
 
-from ..compiled.rows import record_at
+from ..compiled.rows import record_at, width_of
 from ..kernels import kernel
 from ..net.laws.law import LINE
+
+BLOCK = 256
+"""Number of elements whose forces are found together: their numbers stay in the nearest cache."""
 
 
 @kernel(forceinline=True)
@@ -58,8 +61,12 @@ def direction(x, cells, c, end):
 @kernel(forceinline=True)
 def strain(x, cells, data, c, q, nodes, gradients):
     """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c."""
-    u0, u1, u2 = gradient(x, cells, c, q, nodes, gradients)
-    line = line_at(data, c)
+    return strain_of(line_at(data, c), *gradient(x, cells, c, q, nodes, gradients))
+
+
+@kernel(forceinline=True)
+def strain_of(line, u0, u1, u2):
+    """Strain as `strain` returns it, from the numbers of a line and du/dξ."""
     natural, r0, r1, r2, r = line.natural_length, line.reference[0], line.reference[1], line.reference[2], line.distance
     p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
     length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
@@ -104,3 +111,17 @@ def pull_together(f, cells, c, q, nodes, gradients, scale, p0, p1, p2):
         f[row, 0] -= d * p0
         f[row, 1] -= d * p1
         f[row, 2] -= d * p2
+
+
+def blocks_of(lines):
+    """Line data by blocks of `BLOCK` elements, column after column, shape (blocks, columns · `BLOCK`).
+
+    Parameters
+    ----------
+    lines : ndarray, shape (elements, columns)
+        Numbers of straight elements, of which the first columns, those of `LINE`, are taken.
+    """
+    count, columns = -(-len(lines) // BLOCK), width_of(LINE)
+    blocks = np.zeros((count * BLOCK, columns))
+    blocks[: len(lines)] = lines[:, :columns]
+    return np.ascontiguousarray(blocks.reshape(count, BLOCK, columns).swapaxes(1, 2)).reshape(count, -1)

@@ -10,6 +10,7 @@ from nets import LAWS, skew_cable, skew_net, skew_web, system
 from oracle import Oracle
 
 from refweb.effects.elasticity import Elasticity
+from refweb.effects.line_kernels import BLOCK, blocks_of
 from refweb.net import discretisation, elements
 from refweb.net.cable import Cable
 from refweb.net.web import Web
@@ -261,16 +262,14 @@ def test_line_of_zero_length(law, start, moved):
 
 @pytest.mark.parametrize("law", LAWS, ids=str)
 def test_lines_taken_together_pull_as_each_alone(law):
-    """Four at once, and what is left of them: whatever their number, forces are those of the lines one by one."""
+    """By blocks, and what is left of the last: whatever their number, forces are those of the lines one by one."""
     net = skew_system(law)
-    force, x, none = net.terms[0].force, displacement(3), np.zeros((6, 3))
-    cells, data = net.net.cells, net.net.line_data.matrix
-    assert len(cells) > 8
-    for count in range(len(cells) + 1):
-        together, alone, shown, one = none.copy(), none.copy(), np.zeros((count, 2)), np.zeros((1, 2))
-        force(0.0, x, none, together, cells[:count], data[:count], shown)
-        for c in range(count):
-            force(0.0, x, none, alone, cells[c : c + 1], data[c : c + 1], one)
-            # the same products, which either may contract with sums
-            assert shown[c] == pytest.approx(one[0], rel=1e-14, abs=1e-14 * np.abs(data[c]).max())
+    term, x, none = net.terms[0], displacement(3), np.zeros((6, 3))
+    cells, data = (np.tile(part, (2 * BLOCK, 1)) for part in (net.net.cells, net.net.line_data.matrix))
+    for count in (1, 2, 9, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK + 7):
+        together, alone, shown, one = none.copy(), none.copy(), np.zeros((count, 3)), np.zeros((count, 3))
+        term.by_blocks(0.0, x, none, together, cells[:count], blocks_of(data[:count]), shown)
+        term.force(0.0, x, none, alone, cells[:count], data[:count], one)
+        # the same products, which either may contract with sums
+        np.testing.assert_allclose(shown, one, rtol=1e-14, atol=1e-14 * np.abs(data).max())
         np.testing.assert_allclose(together, alone, rtol=0.0, atol=TIGHT * max(np.abs(alone).max(), 1e-300))

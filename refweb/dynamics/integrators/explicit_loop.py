@@ -89,7 +89,7 @@ def inner_stages(
         return False
     terms, inverse, fixed = model.terms, model.inertia.inverse, model.inertia.fixed
     turns = model.inertia.turns
-    x, v, f, first = running.x, running.v, running.f, (terms.forces[0], terms.cells[0], terms.data[0])
+    x, v, f, first = running.x, running.v, running.f, (terms.of_lines[0], terms.cells[0], terms.numbers)
     forces, cells, data, outs = terms.forces, terms.cells, terms.data, terms.outs
     drifted = kicked = now - h
     for n in range(scheme.drifts.size - 1):
@@ -149,7 +149,7 @@ def run_steps(
     viscous, powers, extra, half = terms.viscous, terms.powers, space.extra, space.half
     plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    lines, first, data_of_lines = terms.outs[0], terms.forces[0], terms.data[0]
+    lines, first, numbers = terms.outs[0], terms.of_lines[0], terms.numbers
     near, events, averaged = nearby.terms.size > 0, running.events, observed.windows.slots.size > 0
     pushing, rubbing = model.outside.pushing.size > 0, model.implicit_contacts.terms
     stages, looked, reaction = scheme.drifts.size - 1, extremes.looked, space.reaction
@@ -177,7 +177,7 @@ def run_steps(
         if near:
             update_neighbours(drift, x, v, bits, before, model)
             check_last_drift(now - h, model, running)
-        first(now, x, v, f, terms.cells[0], data_of_lines, lines)
+        first(now, x, v, f, terms.cells[0], numbers, lines)
         for i in terms.still:
             act(i, now, x, v, f, terms)
         if near:
