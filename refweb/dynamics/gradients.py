@@ -359,4 +359,7 @@ def _refuse(scene, system, solution):
     for term in system.terms:
         refused.append((f"[{term.name}] of so many pairs of lines", term.contact.finder is not None))
     if names := [name for name, stands in refused if stands]:
-        raise InputError(f"gradients of dynamics take no {names[0]}; they take {SUPPORTED}")
+        raise InputError(
+            f"gradients of dynamics take no {names[0]}: vary the number by refweb sweep, or take the difference of two "
+            f"runs; they take {SUPPORTED}"
+        )

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -521,7 +521,7 @@ def number_and_size(given, path):
     """The number at a path in the dict of a scene, and its size: of a number that is 0 that of its list, else 1."""
     number = number_at(given, path)
     if number is None:
-        raise InputError(f"path {quote(path)} is no number of this scene, {nearest(path, numbers_of(given))}")
+        raise InputError(f"path {quote(path)} is no number of this scene, {_remedy(given, path.split('.'))}")
     head, _, last = path.rpartition(".")
     beside = [number_at(given, f"{head}.{k}") for k in range(10)] if last.isdecimal() else []
     largest = max([abs(each) for each in beside if each is not None], default=0.0)
@@ -530,17 +530,34 @@ def number_and_size(given, path):
 
 def number_at(given, path):
     """The number at a path in the dict of a scene, None where there is none."""
-    inner: Any = given
-    for key in path.split("."):
-        if isinstance(inner, dict):
-            inner = inner.get(key)
-        elif isinstance(inner, (list, tuple)):
-            names = [entry.get("name") if isinstance(entry, dict) else None for entry in inner]
-            at = names.index(key) if key in names else int(key) if key.isdecimal() else len(inner)
-            inner = inner[at] if at < len(inner) else None
-        else:
-            return None
-    return float(inner) if isinstance(inner, (int, float)) and not isinstance(inner, bool) else None
+    value = reduce(_below, path.split("."), given)
+    return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else None
+
+
+def _below(value: Any, key: str) -> Any:
+    """What stands at a key, number or name of a table or list, None where nothing does."""
+    if isinstance(value, dict):
+        return value.get(key)
+    if not isinstance(value, (list, tuple)):
+        return None
+    names = [entry.get("name") if isinstance(entry, dict) else None for entry in value]
+    at = names.index(key) if key in names else int(key) if key.isdecimal() else len(value)
+    return value[at] if at < len(value) else None
+
+
+def _remedy(given, keys):
+    """Range of a number in a path without a number of the scene, else the nearest path that begins as it does."""
+    head: list[str] = []
+    for key in keys:
+        value = reduce(_below, head, given)
+        if isinstance(value, (list, tuple)) and _below(value, key) is None and value and key.isdecimal():
+            return f"{short('.'.join(head))} has 0 … {len(value) - 1}"
+        if _below(value, key) is None:
+            break
+        head.append(key)
+    paths = numbers_of(given)
+    begun = [path for path in paths if path.startswith("".join(f"{key}." for key in head))]
+    return nearest(".".join(keys), begun or paths)
 
 
 def numbers_of(given, above=""):

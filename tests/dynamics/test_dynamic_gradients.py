@@ -653,7 +653,10 @@ REFUSED = [
         dict(solve=dict(method="cvode", step_size=None)),
         'method = "cvode": gradients of dynamics follow the steps of central',
     ),
-    (dict(cable=dict(strength=1e9), effects=(refweb.Rupture(),)), "take no .rupture.; they take lines"),
+    (
+        dict(cable=dict(strength=1e9), effects=(refweb.Rupture(),)),
+        "take no .rupture.: vary the number by refweb sweep, .*; they take lines",
+    ),
     (dict(cable=dict(viscous=refweb.Viscous(arms=[[0.2, 0.1]]))), "take no lines or threads with a memory"),
 ]
 

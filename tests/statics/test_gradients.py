@@ -534,6 +534,7 @@ def test_refusals(tmp_path):
         (("tension", ["cable.area"]), r"path = \['cable.area'\] must be the path of a number: .*cable.area, "),
         (("tensoin", "cable.area"), 'result "tensoin" is none of this scene, did you mean "tension"'),
         (("tension", "cable.aera"), r'path "cable.aera" is no number of this scene, did you mean "cable.area"'),
+        (("tension", "observe.97.node"), r'path "observe.97.node" is no number of this scene, observe has 0 … \d+$'),
         (("tension", "cable.knot_factor"), r"cable.knot_factor = 1 cannot be changed to both sides: .* must be ≤ 1"),
         (("tension", "cable.aera", "line"), r'by line there is no "cable.aera", did you mean "cable.area"'),
         (("tension", "cable.area", "node"), r"by node there is no"),
