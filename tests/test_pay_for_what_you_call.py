@@ -379,7 +379,7 @@ TABLES = {
     "fold": {"ratio": 0.5, "gap": 0.0},
 }
 SOLVED = ("detection", "law")
-LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
+LISTED = ("force", "force in steps", "energy", "bound", "bound of damping", *SOLVED)
 LISTED += ("relax", "motion", "work of lengths", "impulse", "near", "within", "ahead", "collisions", "probe")
 TERM = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: TERM for name in ("gravity", "load", "contact", "pressure", "thrust", "bending", "thread")}
@@ -529,7 +529,7 @@ def handed(monkeypatch):
 
 def summed(*effects):
     """The same from `KERNELS`; a web alone has its elasticity, and one work of lengths serves all that change them."""
-    total = dict.fromkeys(LISTED, 0) | TERM
+    total = dict.fromkeys(LISTED, 0) | TERM | {"force in steps": 1}
     for name in effects:
         for which, number in KERNELS[name].items():
             total[which] += number * (2 if name == "drag" and {"body", "contact"} & set(effects) else 1)
