@@ -354,6 +354,7 @@ MUTANTS = [
     Mutant("net/laws/law", "return np.where(endless, np.inf, high)", "return high"),
     Mutant("net/law_keys", 'object.__setattr__(table, "modulus", None)', "pass"),
     Mutant("effects/line_kernels", "d * (along - across) * p[i] * p[j]", "d * along * p[i] * p[j]"),
+    Mutant("system/multifrontal", "dsyrk(-1.0, rest, beta=1.0", "dsyrk(-1.0, rest, beta=0.5"),
     Mutant("effects/elasticity", "pulled = (1.0 + e) * stress", "pulled = stress"),
     Mutant("effects/elasticity", "f[j, 1] -= d1[k]", "f[j, 1] -= d0[k]"),
     Mutant(

@@ -1,17 +1,22 @@
 """Factorizations of tangents: LDLᵀ, whose D shows the signs of the pivots, and LU of unsymmetric matrices.
 
-Three libraries compute LDLᵀ. qdldl works column by column, and is fast while the factor fits into the cache. SuperLU of
+Four codes compute LDLᵀ. qdldl works column by column, and is fast while the factor fits into the cache. SuperLU of
 scipy computes LU; if all its pivots are on the diagonal, U is D Lᵀ. It is used from `LARGEST` unknowns on. On a CPU
 with 8 MB of cache, a factorization of a square web takes 15 ms with qdldl and 27 ms with SuperLU at 7203 unknowns. It
-takes 0.46 and 0.18 s at 29 403, and 4.6 and 1.4 s at 118 803. rslab (``pip install 'refweb[fast]'``) works on blocks of
-columns, and keeps its ordering. It is used from `LARGE` unknowns on, if it is installed. Five load steps of a square
-web from flat take 9.4 s CPU with qdldl and 3.8 s with rslab at 29 403 unknowns, 1.8 and 1.4 s at 10 443; at 4563
-factorizations cost the same. rslab is a young library: if the residual of a solution or the signs of its pivots are
-wrong, qdldl replaces it for the rest of the run, with a finding.
+takes 0.46 and 0.18 s at 29 403, and 4.6 and 1.4 s at 118 803. `refweb.system.multifrontal` takes positive definite
+matrices alone, and SuperLU all others. It is used from `HUGE` unknowns on: at 118 803 unknowns, a factorization takes
+0.3 times that of SuperLU (squares), 0.15 (triangles) and 0.2 (hexagons, 237 009), and a solution 1.5 times. One load on
+squares takes 6 in place of 9.6 times a factorization by SuperLU; at 29 403 unknowns both take the same time.
 
-May change: `LARGE`, `LARGEST` and `NEMIN`, which are measured: they change times, and results by rounding; the insides
-of the classes. `FINE` and `ROUGH` decide when a solution is refined or refused. Must stay: keys of `LIBRARIES`, the
-same as `registry.FACTORIZATIONS` and values of scenes; `Lu` and `Factor` have ``update``, ``solve``, ``shift`` and
+rslab (``pip install 'refweb[fast]'``) works on blocks of columns, and keeps its ordering. It is used from `LARGE`
+unknowns on, if it is installed. Five load steps of a square web from flat take 9.4 s CPU with qdldl and 3.8 s with
+rslab at 29 403 unknowns, 1.8 and 1.4 s at 10 443; at 4563 factorizations cost the same. rslab is a young library: if
+the residual of a solution or the signs of its pivots are wrong, qdldl replaces it for the rest of the run, with a
+finding.
+
+May change: `LARGE`, `LARGEST`, `HUGE` and `NEMIN`, which are measured: they change times, and results by rounding; the
+insides of the classes. `FINE` and `ROUGH` decide when a solution is refined or refused. Must stay: keys of `LIBRARIES`,
+the same as `registry.FACTORIZATIONS` and values of scenes; `Lu` and `Factor` have ``update``, ``solve``, ``shift`` and
 ``solutions`` alike, since `statics.newton` holds either. Signs of pivots decide stability in statics and counts of
 modes. Must stay as well: `weak_pivot`, which `links` and `integrators.massless_nodes` import; `negative_pivots`, which
 `statics.stability` and `studies.turning` import; `Library`, which `system` imports; public names of `Lu`, which other
@@ -28,8 +33,8 @@ import numpy as np
 
 from ..errors import InputError
 
-LARGE, LARGEST = 5000, 20_000
-"""Numbers of unknowns from which on rslab is used, if it is installed, and SuperLU if it is not."""
+LARGE, LARGEST, HUGE = 5000, 20_000, 50_000
+"""Numbers of unknowns from which on rslab is used, if it is installed, and SuperLU and fronts if it is not."""
 FINE, ROUGH = 1e-8, 1e-2
 """Relative residual to which a solution is refined, and relative residual above which a solution is refused."""
 
@@ -43,12 +48,12 @@ class Library:
 
     Parameters
     ----------
-    asked : {"auto", "qdldl", "superlu", "rslab"}
+    asked : {"auto", "qdldl", "superlu", "multifrontal", "rslab"}
         Library that the scene asks for.
 
     Attributes
     ----------
-    name : {"qdldl", "superlu", "rslab"}
+    name : {"qdldl", "superlu", "multifrontal", "rslab"}
         Name of the library in use.
     why : str or None
         Its name and the reason for the choice; None before the first factorization.
@@ -73,7 +78,8 @@ class Library:
         self.name = self._asked
         if self._asked == "auto":
             fast = size >= LARGE and importlib.util.find_spec("rslab")
-            self.name = "rslab" if fast else "superlu" if size >= LARGEST else "qdldl"
+            slow = "multifrontal" if size >= HUGE else "superlu" if size >= LARGEST else "qdldl"
+            self.name = "rslab" if fast else slow
         self.why = f"{self.name}, {f'for {size} unknowns' if self._asked == 'auto' else 'as asked for'}"
 
     def fall_back(self, what):
@@ -221,7 +227,14 @@ class _Rslab:
         return negative + zero if complete else None
 
 
-LIBRARIES = {"qdldl": Qdldl, "superlu": _Superlu, "rslab": _Rslab}
+def _multifrontal(pattern):
+    """A `refweb.system.multifrontal.Multifrontal`, whose kernels only its caller needs."""
+    from .multifrontal import Multifrontal
+
+    return Multifrontal(pattern)
+
+
+LIBRARIES = {"qdldl": Qdldl, "superlu": _Superlu, "rslab": _Rslab, "multifrontal": _multifrontal}
 
 
 class Factor:
@@ -251,10 +264,12 @@ class Factor:
         if not self.pattern.size:
             return
         self.shift = shift
-        try:
-            self._adopt(self.pattern.library.name)
-        except RuntimeError:  # singular, of which qdldl leaves what can be used
-            self._adopt("qdldl")
+        name = self.pattern.library.name
+        for by in (name, "superlu") if name == "multifrontal" else (name,):  # which takes positive definite ones alone
+            with contextlib.suppress(RuntimeError):
+                self._adopt(by)
+                return
+        self._adopt("qdldl")  # singular, of which qdldl leaves what can be used
 
     def _adopt(self, name):
         """Factorize by a library."""

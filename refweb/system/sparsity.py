@@ -60,12 +60,15 @@ class Pattern:
         The pattern.
     slots : list of ndarray of int32, shape (cells, (3 arity)²)
         Position in the values of each entry of a cell's block, row by row; −1 if a component is supported.
+    row : ndarray of int, shape (n,)
+        Row of each unknown.
     diagonal : ndarray of int
         Positions of the diagonal in the values.
     """
 
     def __init__(self, rows, free, cells, library, also=()):
-        self.size = n = len(free)
+        self.size, self.row = len(free), np.asarray(free) // 3
+        n = self.size
         self.library = library
         library.choose(n)
         number = np.full((rows, 3), -1, dtype=np.int32)
@@ -106,24 +109,24 @@ class Pattern:
         return places
 
     @cached_property
-    def _columns(self):
+    def columns(self):
         """Column of each entry, shape (entries,)."""
         return np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.indptr))
 
     @cached_property
     def lower(self):
         """Positions of the lower triangle, diagonal included, shape (entries,)."""
-        return np.flatnonzero(self.indices >= self._columns)
+        return np.flatnonzero(self.indices >= self.columns)
 
     @cached_property
     def upper(self):
         """Positions of the upper triangle, diagonal included, shape (entries,)."""
-        return np.flatnonzero(self.indices <= self._columns)
+        return np.flatnonzero(self.indices <= self.columns)
 
     @cached_property
     def _upper_pattern(self):
         """Row of each entry of the upper triangle, and the starts of its columns."""
-        starts = np.searchsorted(self._columns[self.upper], np.arange(self.size + 1))
+        starts = np.searchsorted(self.columns[self.upper], np.arange(self.size + 1))
         return self.indices[self.upper], starts.astype(np.int32)
 
     def assemble(self, blocks):
@@ -146,7 +149,7 @@ class Pattern:
     @cached_property
     def _lower_pattern(self):
         """Pattern of the lower triangle with unknowns counted from the last one on, see `_upper_pattern`."""
-        ends = np.searchsorted(self._columns[self.lower], np.arange(self.size + 1))
+        ends = np.searchsorted(self.columns[self.lower], np.arange(self.size + 1))
         starts = len(self.lower) - ends[::-1]
         return self.size - 1 - self.indices[self.lower][::-1], starts.astype(np.int32)
 

@@ -1,4 +1,4 @@
-"""LDLᵀ by three libraries: the same solutions and signs of pivots, which is taken, and what is done where one errs.
+"""LDLᵀ by four libraries: the same solutions and signs of pivots, which is taken, and what is done where one errs.
 
 Truth of the signs are eigenvalues by numpy.
 """
@@ -17,7 +17,7 @@ from refweb.system.sparsity import Pattern
 
 THERE = importlib.util.find_spec("rslab") is not None
 needs_rslab = pytest.mark.skipif(not THERE, reason='rslab, of the extra "fast", is not installed')
-LIBRARIES = ["qdldl", "superlu", pytest.param("rslab", marks=needs_rslab)]
+LIBRARIES = ["qdldl", "superlu", "multifrontal", pytest.param("rslab", marks=needs_rslab)]
 
 
 def pattern(library, n=6):
@@ -101,6 +101,8 @@ def test_the_choice(monkeypatch):
     for there in (True, False):
         monkeypatch.setattr(factorization.importlib.util, "find_spec", lambda name, there=there: there or None)
         for size, fast, else_ in (
+            (factorization.HUGE, "rslab", "multifrontal"),
+            (factorization.HUGE - 1, "rslab", "superlu"),
             (factorization.LARGEST, "rslab", "superlu"),
             (factorization.LARGE, "rslab", "qdldl"),
             (factorization.LARGE - 1, "qdldl", "qdldl"),

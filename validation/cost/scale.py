@@ -1,6 +1,6 @@
 """How cost grows with size: statics with its bounds and explicit steps, up to the largest web that is asked for.
 
-    python -m validation.cost.scale [CELLS [qdldl | superlu | rslab | auto [MESHES]]]
+    python -m validation.cost.scale [CELLS [qdldl | superlu | multifrontal | rslab | auto [MESHES]]]
 
 Square, triangle and hexagon webs of cells × cells up to CELLS a side, 100 by default, each size in a process of its
 own with one thread. Statics: five load steps of a load at the centre, from flat, with error bounds; the unit is one
