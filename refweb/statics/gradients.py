@@ -535,7 +535,7 @@ def number_at(given, path):
 
 
 def _below(value: Any, key: str) -> Any:
-    """What stands at a key, number or name of a table or list, None where nothing does."""
+    """The value at a key, number or name of a table or list, None where there is none."""
     if isinstance(value, dict):
         return value.get(key)
     if not isinstance(value, (list, tuple)):
