@@ -47,7 +47,9 @@ eight scenes of different character. ``python -m validation.cost.explicit``, ``v
 **How far it goes.** One process and one thread carry a web as far as memory does. Five load steps of a web from flat,
 with their bounds, take 12 factorizations by rslab of the square web at 118 803 unknowns, 13 of the triangle web at 120
 300 and 22 of the hexagon web at 237 009, which hangs together by far fewer lines, and 10, 13 and 20 by SuperLU, which
-comes with scipy: 9, 7 and 11 times the CPU time of one by SuperLU with rslab, 20, 18 and 28 times without. qdldl, which
+comes with scipy: 9, 7 and 11 times the CPU time of one by SuperLU with rslab, 20, 18 and 28 times by SuperLU.
+Without rslab, fronts factorize from 50 000 unknowns on: one load then takes 6 (squares), 3.6 (triangles) and 4.8 times
+(hexagons) the CPU time of one by SuperLU, and 9.6, 11.9 and 16 times with SuperLU itself. qdldl, which
 factorizes smaller webs, would take 28 to 36 times, and 48 where the CPU has little cache. With rslab the square web
 takes 20 factorizations, 102 s and 3.2 GB at 747 003 unknowns, 21, 208 s and 6.1 GB at 1 465 803, and at a million
 cells, 1 998 000 lines and 2 994 003 unknowns, 23, 545 s and 12.5 GB, with energies proven to 2e-14 of themselves. CPU

@@ -31,9 +31,9 @@ A factorization that is near enough is used again, by conjugate gradients with t
 `refweb.system.conjugate_gradients`: of webs of 40 000 cells five load steps with their error bounds take 12
 factorizations by rslab (squares, 118 803 unknowns), 13 (triangles) and 22 (hexagons), by SuperLU, whose solutions cost
 less beside them, 10, 13 and 20. One load on squares takes 7. In units of one factorization by SuperLU, one load costs
-11 by SuperLU and 4 by rslab, and five loads cost 19 and 10: by SuperLU 10 for factorizations, 6 for 190 solutions and 3
-for tangents, searches and bounds. To keep its ordering would save a tenth of a factorization, and cost a twentieth of
-each solution. Forces without a potential have an unsymmetric tangent, its LU and a search of their own, see
+10 by SuperLU, 6 by `refweb.system.multifrontal` and 4 by rslab. By fronts that is 2.4 for 7 factorizations with their
+order, 2.4 for solutions and 1 for pattern, tangents, searches and bounds. Five loads cost 18, 15 and 9, with 190
+solutions. Forces without a potential have an unsymmetric tangent, its LU and a search of their own, see
 `refweb.statics.residual_search`.
 
 May change: constants and the choice of steps: they change numbers of factorizations, and results within the residual.

@@ -2,9 +2,9 @@
 
 They solve A y = b with a factorization of M. The number of iterations grows as √κ, κ the condition number of M⁻¹A.
 Between two load steps of a web, whose tensions differ by a factor of two or three, a solution to 1 % takes two or three
-iterations. An iteration costs a ninth (rslab) to a thirtieth (SuperLU) of a factorization at 118 803 unknowns. If a few
-iterations are not enough, a factorization of A itself costs less. If A or M shows a direction without stiffness, only a
-factorization can tell more. Both cases end the iteration.
+iterations. An iteration costs a sixth (fronts), a ninth (rslab) or a thirtieth (SuperLU) of a factorization at 118 803
+unknowns. If a few iterations are not enough, a factorization of A itself costs less. If A or M shows a direction
+without stiffness, only a factorization can tell more. Both cases end the iteration.
 
 May change: the rule by which the iteration ends early; it changes the cost of `statics.newton`, and how sharp the
 bounds of `statics.duality_bound` are. Must stay: arguments of `solve` and fields of `Found`, which both read, and that
