@@ -42,6 +42,7 @@ MIRRORS = {
     "net/sag": "studies/test_form.py",
     "statics/bars": "studies/test_form.py statics/test_statics.py",
     "system/dissection": "system/test_multifrontal.py",
+    "system/multifrontal": "system/test_multifrontal.py",
     "system/weak_form": "net/test_elements.py",
     "system/kernel_trial": "test_plugins.py",
     "net/laws": "net/test_laws.py net/test_elements.py",
