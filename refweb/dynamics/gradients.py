@@ -57,7 +57,7 @@ AMPLIFIED = 10.0
 a hundredth of the number changes a tenth of the result, one way or the other."""
 FINER = 0.1
 """Smaller steps that a refusal names, over those of the scene."""
-OTHER = 1.1
+LONGER = 1.1
 """Interval of history rows that a refusal names, over that of the scene."""
 PATHWISE = ("dissipated_energy", "work", "winch_energy", "rupture_energy", "plastic_energy", "step_size")
 """Quantities that are summed over steps."""
@@ -155,7 +155,7 @@ class Gradients:
             interval = self._simulation.scene.output.interval
             return (
                 f"a damped line snaps taut at the history row of {lost[0]:.4g} s, which is before it in one and behind "
-                f"it in the other of run and step refinement: use [output] interval = {OTHER * interval:.2g} in place "
+                f"it in the other of run and step refinement: use [output] interval = {LONGER * interval:.2g} in place "
                 f"of {interval:g}, or another without a row there"
             )
         return (

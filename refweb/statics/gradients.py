@@ -547,16 +547,16 @@ def _below(value: Any, key: str) -> Any:
 
 def _remedy(given, keys):
     """Range of a number in a path without a number of the scene, else the nearest path that begins as it does."""
-    head: list[str] = []
+    value, head = given, ""
     for key in keys:
-        value = reduce(_below, head, given)
-        if isinstance(value, (list, tuple)) and _below(value, key) is None and value and key.isdecimal():
-            return f"{short('.'.join(head))} has 0 … {len(value) - 1}"
-        if _below(value, key) is None:
+        inner = _below(value, key)
+        if inner is None:
+            if isinstance(value, (list, tuple)) and value and key.isdecimal():
+                return f"{short(head[:-1])} has 0 … {len(value) - 1}"
             break
-        head.append(key)
+        value, head = inner, f"{head}{key}."
     paths = numbers_of(given)
-    begun = [path for path in paths if path.startswith("".join(f"{key}." for key in head))]
+    begun = [path for path in paths if path.startswith(head)]
     return nearest(".".join(keys), begun or paths)
 
 

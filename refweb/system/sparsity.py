@@ -67,8 +67,8 @@ class Pattern:
     """
 
     def __init__(self, rows, free, cells, library, also=()):
-        self.size, self.row = len(free), np.asarray(free) // 3
-        n = self.size
+        self.size = n = len(free)
+        self.row = np.asarray(free) // 3
         self.library = library
         library.choose(n)
         number = np.full((rows, 3), -1, dtype=np.int32)

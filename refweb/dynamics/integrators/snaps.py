@@ -19,9 +19,9 @@ A law whose slope changes over a strain that is short against that of a step is 
 ends of the step gives the part of Δσ' that is in the steps.
 
 May change: private functions, and constants, which decide what counts as a jump. Must stay: public names of `Snaps`,
-which `tangent` and `linear_run` use; `Shift`, which `gradients` makes; `gaps_of` and `is_damped`, which
-`dynamics.parameters` calls. Tests:
-``tests/dynamics/test_dynamic_gradients.py``, ``tests/dynamics/test_gradient_jumps.py``.
+which `tangent` and `linear_run` use; `Shift`, which `gradients` makes; `gaps_of`, which `dynamics.parameters` calls,
+and `is_damped`, which `gradients` and `tangent` call as well. Tests: ``tests/dynamics/test_dynamic_gradients.py``,
+``tests/dynamics/test_gradient_jumps.py``.
 """
 
 from __future__ import annotations

@@ -231,10 +231,10 @@ class Tangent:
         self.v += 0.5 * h * self.a
         self.x += h * self.v
         self._drive(t, t - 0.5 * h)
-        before = self.v.copy(), self.a
         if self.snaps:
+            before = self.v.copy(), self.a
             self.snaps.add(t, h, x, v, self.x, self.v, self.inverse, corner)
-        jump = self.v - before[0]
+            jump = self.v - before[0]
         now, behind = t, (v, f)
         if corner:
             now, v = t - BESIDE * h, v.copy()
