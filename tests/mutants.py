@@ -24,7 +24,7 @@ import time
 from typing import NamedTuple
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-COPIED = ("refweb", "tests", "validation", "README.md", "pyproject.toml", "LICENSE", "CITATION.cff")
+COPIED = ("refweb", "tests", "validation", "README.md", "CONTRIBUTING.md", "pyproject.toml", "LICENSE", "CITATION.cff")
 LONGEST = 1800.0
 """Time that the tests of a bug may take [s]; one that makes them hang is noticed as well."""
 MIRRORS = {
@@ -156,7 +156,7 @@ MIRRORS = {
     "dynamics/budget": "dynamics/test_budget.py",
     "dynamics/twin_error": "dynamics/test_agreement_by_chance.py dynamics/test_one_row.py "
     "dynamics/test_events.py dynamics/test_dynamics.py",
-    "dynamics/gradients": "dynamics/test_dynamic_gradients.py",
+    "dynamics/gradients": "dynamics/test_dynamic_gradients.py dynamics/test_gradient_jumps.py",
     "dynamics/kinks": "dynamics/test_dynamic_gradients.py dynamics/test_gradient_jumps.py",
     "dynamics/linear_run": "dynamics/test_dynamic_gradients.py dynamics/test_gradient_jumps.py",
     "dynamics/responses": "dynamics/test_dynamic_gradients.py",
@@ -449,7 +449,7 @@ MUTANTS = [
     Mutant("dynamics/integrators/snaps", "        if corner:\n", "        if False:\n"),
     Mutant("dynamics/integrators/snaps", "<= MOVED * np.abs(rates)", "<= 1.0 * np.abs(rates)"),
     Mutant("dynamics/integrators/tangent", "            self._drive(t, t)\n", "            pass\n"),
-    Mutant("dynamics/integrators/tangent", "-= h * jump[", "-= 0.0 * jump["),
+    Mutant("dynamics/integrators/tangent", "-= h * (self.a - before[1])", "-= 0.0 * (self.a - before[1])"),
     Mutant("dynamics/integrators/energy_balance", "rounding ** (1 if system.works else 2)", "rounding**2"),
     Mutant("dynamics/linear_run", "self.at_snaps.update(", "set().update("),
     Mutant("dynamics/gradients", "error[:-shifts], largest[-shifts:]", "error[:-shifts], 0.0"),
