@@ -69,7 +69,6 @@ def run(tmp_path):
     return start
 
 
-@pytest.mark.slow
 def test_machine_code_is_found_again_whatever_the_words_around_it(run):
     run.write("linked", 3.0)
     assert run()[:1] == ["6.0"] and run() == ["6.0"]
