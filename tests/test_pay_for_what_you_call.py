@@ -203,6 +203,8 @@ def contact_roots(contact, shapes, static):
         yield "effects.contact.line_body_friction"
     elif "exponent" in keys or set(shapes) != {"sphere"}:
         yield "effects.contact.penalty"
+    if static and set(shapes) - {"sphere"}:
+        yield "effects.contact.sharp_edges"
     if keys & {"damping", "friction", "exponent"} and "mesh" not in shapes or set(shapes) - {"sphere", "mesh"}:
         yield "net.grown_core"  # a surface of triangles has no core of its own
     if "sphere" in shapes and "exponent" not in keys:

@@ -13,6 +13,10 @@ from __future__ import annotations
 
 import numpy as np
 
+LONGEST, HALVINGS, ROUNDING = 0.1, 30, 1e-14
+"""First move in a direction of negative curvature, over the shortest natural length; number of times that it is halved;
+fall of the energy, over the energy, that is more than rounding."""
+
 
 class EnergySearch:
     """Searches along the steps of one iteration; keeps the energy between them.
@@ -74,3 +78,32 @@ class EnergySearch:
             return y, 2.0 * shift
         good = longest == 1.0 and (drowned or energy - self._energy > 0.25 * 0.5 * slope)
         return y, 0.1 * shift if good else shift
+
+    def down(self, d, x, r, stats):
+        """Move along a direction d of negative curvature, in which the energy falls either way from a saddle.
+
+        Parameters
+        ----------
+        d : ndarray, shape (unknowns,)
+            Direction [m].
+        x, r, stats
+            As for `along`; the force r may be 0.
+
+        Returns
+        -------
+        ndarray, shape (rows, 3)
+            Displacement after the longest of halved moves that lowers the energy by more than rounding; x where none
+            does.
+        """
+        system = self._system
+        step = system.rows_of(d if r @ d >= 0.0 else -d)
+        a = system.largest_share(d) * LONGEST * system.net.natural_length.min() / np.abs(step).max()
+        for _ in range(HALVINGS):
+            y = system.moved(x, a * step)
+            energy = system.energy(self._t, y)
+            stats["nfev"] += 1
+            if energy < self._energy - ROUNDING * abs(self._energy):
+                self._energy = energy
+                return y
+            a *= 0.5
+        return x

@@ -352,7 +352,9 @@ def test_a_resumed_run_is_the_same(method, tmp_path):
     """Bit for bit where steps are explicit; a run that starts from a folder goes on with the arms that it finds."""
     given = scene(solve=refweb.Dynamic(duration=0.05, method=method))
     whole, resumed = nets.whole_and_resumed(given, tmp_path)
-    np.testing.assert_allclose(resumed.state.x, whole.state.x, rtol=0, atol=0 if method != "cvode" else 1e-6)
+    # CVODE begins anew where it was stopped, and errors of its steps, rtol 1e-6 each, add up.
+    within = 1e-4 * np.abs(whole.state.x).max() if method == "cvode" else 0.0
+    np.testing.assert_allclose(resumed.state.x, whole.state.x, rtol=0, atol=within)
     ahead = given.replace(solve=refweb.Dynamic(duration=0.01, start=str(tmp_path / "whole"), method=method))
     np.testing.assert_array_equal(refweb.run(ahead).frames[0][1].x, whole.state.x)
 

@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 import refweb
 from validation.hard_cases.stability import RandomNet, word_on
+from validation.paper.example_3 import scene as bars_moved_in
 
 PIN = refweb.Supports(nodes="all", components=["z"])
 
@@ -19,6 +20,20 @@ def words(solution):
 
 def others(solution):
     return any("there may be other equilibria" in text for text in solution.warnings)
+
+
+# Webs of bars that buckle
+
+
+@pytest.mark.parametrize("inward, steps", [(0.055, (1.0,)), (0.05, (0.0, 0.25)), (0.03, (0.0, 0.2))])
+def test_buckled_bars_do_not_rest_at_a_saddle(inward, steps):
+    """Bars whose boundary moves in pass saddles of the energy, where the convex part of the tangent finds no way down.
+
+    The one load step ends at a saddle by this part alone, and the load steps from the moved boundary at none in 400
+    factorizations. That the equilibrium is a minimum is the sign of all pivots.
+    """
+    solution = refweb.run(bars_moved_in(inward, "linear", steps))
+    assert solution.solver["smallest_pivot"] == 1 and not words(solution)
 
 
 # A loop under pressure from outside

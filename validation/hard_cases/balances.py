@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.integrate import trapezoid
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 import refweb
 
@@ -21,8 +22,12 @@ def tensions(solution):
     own = solution.scene.cable
     groups = solution.scene.web.groups if own.groups else None
     moduli = [own.groups[name].modulus if name in own.groups else own.modulus for name in groups or ()]
-    stiffness = own.area * (np.array(moduli) if moduli else own.modulus)
-    if own.law == "tension-only" or own.smoothing == 0.0:
+    stiffness = own.area * np.array(moduli or own.modulus, dtype=float)
+    if own.law == "table":
+        curve = measured(own.stress)
+        force = own.area * np.where(strain > curve.x[0], curve(strain), 0.0)
+        stored = own.area * np.array([max(curve.integrate(curve.x[0], one), 0.0) for one in strain])
+    elif own.law == "tension-only" or own.smoothing == 0.0:
         taut = np.maximum(strain - (own.slackness or 0.0), 0.0)
         force, stored = stiffness * taut, 0.5 * stiffness * taut**2
     else:
@@ -42,6 +47,21 @@ def tensions(solution):
         broken += solution.scene.web.broken.tolist()
     force[broken] = stored[broken] = 0.0
     return force, vector / np.where(length > 0, length, 1.0)[:, None], (stored * natural).sum()
+
+
+def measured(points):
+    """Stress [Pa] over strain through points, by the slopes of PCHIP, at an end never below half that of the chord.
+
+    Beyond the last point the last slope goes on.
+    """
+    strain, stress = np.array(points, dtype=float).T
+    slope = PchipInterpolator(strain, stress).derivative()(strain)
+    chord = np.diff(stress) / np.diff(strain)
+    slope[[0, -1]] = np.where(slope[[0, -1]] > 0.0, slope[[0, -1]], 0.5 * chord[[0, -1]])
+    far = 1.0 + strain[-1]
+    return CubicHermiteSpline(
+        [*strain, far], [*stress, stress[-1] + slope[-1] * (far - strain[-1])], [*slope, slope[-1]]
+    )
 
 
 STEP = 1e-6

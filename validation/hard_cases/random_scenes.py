@@ -62,7 +62,7 @@ def outcome(scene):
     except refweb.SolverError as error:
         if REASON.match(str(error)):
             return "carried off"
-        if 'or method = "relaxation"' not in str(error):
+        if 'method = "relaxation"' not in str(error):
             return str(error)
         try:
             solution, found = refweb.run(scene.replace(solve=refweb.Static(method="relaxation"))), "relaxed"
