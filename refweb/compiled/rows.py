@@ -100,7 +100,10 @@ def numbers_at(typing, matrix, row, column):
     return types.CPointer(matrix.dtype)(matrix, types.intp, types.intp), build
 
 
-@intrinsic(prefer_literal=True)
+_of_literals: Any = intrinsic(prefer_literal=True)
+
+
+@_of_literals
 def numbers_aside(typing, count):
     """Space for a constant count of numbers, to the end of the kernel; nothing else has an address in it."""
 

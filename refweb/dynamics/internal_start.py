@@ -71,7 +71,8 @@ def _of_threads(system, given, name):
     of_folder: dict[str, Any] = json.loads(str(given["threads"])) if "threads" in given else {}
     for thread in sorted({row[7:].rpartition(".")[0] for row in _rows(given, r"\.slips\..*")[0]}):
         names, numbers = _rows(given, rf"\.slips\.{re.escape(thread)}\.\d+")
-        now, before = of_scene.get(thread), of_folder.get(thread)
+        now: Any = of_scene.get(thread)
+        before: Any = of_folder.get(thread)
         if before is None:  # an older folder has the number of rows alone
             rows = next((line.rows_of_slips for line in system.net.threads if line.name == thread), 0)
             before = now if len(names) == rows else {"slips": "other slips", "rings": numbers.size}

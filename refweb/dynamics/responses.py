@@ -152,7 +152,8 @@ def rates_of(observed, numbers, system, t, instant):
             sides[name][:, n] = pair
     sizes = np.array([number.size for number in numbers])
     return {
-        name: Rates(part, *sides[name], speeds.get(name, np.zeros_like(part)), sizes) for name, part in parts.items()
+        name: Rates(part, *sides[name], speeds=speeds.get(name, np.zeros_like(part)), sizes=sizes)
+        for name, part in parts.items()
     }
 
 
@@ -197,7 +198,7 @@ def _both_sides(observed, parts, number, system, t, instant, n):
         if names:
             wide, narrow = (ends(share * step, by_number, 1.0) for share in (1.0, 0.5))
         for name in names:
-            sides[name] = _sides(parts[name], *(end[name] for end in (*wide, *narrow)), step, sums[name])
+            sides[name] = _sides(parts[name], *(end[name] for end in (*wide, *narrow)), step=step, rate=sums[name])
     return sides
 
 

@@ -49,7 +49,7 @@ Tests: ``tests/statics/test_reused_factorization.py``, ``test_statics.py``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -242,7 +242,7 @@ class Newton:
         """Scale of the residual at an `Iterate` [N]."""
         return max(self.scale, force_scale(self.system, t, iterate.x, iterate.tension))
 
-    def _search(self, t, x):
+    def _search(self, t, x) -> Any:
         if not self.follows:
             return EnergySearch(self.system, t, x)
         from .residual_search import ResidualSearch

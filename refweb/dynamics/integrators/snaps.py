@@ -26,6 +26,8 @@ and `is_damped`, which `gradients` and `tangent` call as well. Tests: ``tests/dy
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...net.laws.law import evaluate
@@ -116,7 +118,8 @@ class Snaps:
 
     def __init__(self, system, numbers, x, v, dx):
         self._system, self._numbers, self._cells, self._law = system, numbers, system.net.cells, system.net.law
-        self.kinks, self.delays, self._known = {}, np.zeros((len(numbers), 0)), self._of(0.0, x)
+        self.kinks, self.delays = {}, np.zeros((len(numbers), 0))
+        self._known: Any = self._of(0.0, x)
         at = self._at_slackness(0.0)
         changes, (rates,) = self._changes(0.0, x, dx, at, True)[0], self._changes(0.0, x, v[None], at, False)[0]
         self._add_kinks(0.0, 0.0, at[rates > 0.0], changes[:, rates > 0.0])
@@ -159,7 +162,8 @@ class Snaps:
         pull = lines.reference[at] + x[b] - x[a]
         to = pull / np.linalg.norm(pull, axis=1)[:, None]
         changes = ((moves[:, b] - moves[:, a]) * to).sum(axis=2) / lines.natural_length[at]
-        for number, change in zip(self._numbers if explicit else (), changes, strict=False):
+        numbers: Any = self._numbers if explicit else ()
+        for number, change in zip(numbers, changes, strict=False):
             low, high = (gaps_of(beside, t, x)[at] for beside in number.systems)
             change += (high - low) / (2.0 * number.step)
         return changes, to

@@ -28,6 +28,8 @@ here; the name "drag", by which losses of drag are told from those of contact; n
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import types
 
@@ -200,7 +202,7 @@ class Tangent:
         self.before = None
         self._set_rates(t, x, v, f)
         self._shifts = sum(isinstance(number, Shift) for number in numbers)
-        self.snaps = Snaps(self.system, numbers, x, v, self.x) if is_damped(self.system) else None
+        self.snaps: Any = Snaps(self.system, numbers, x, v, self.x) if is_damped(self.system) else None
 
     def _rates(self, t, x, v, f):
         """∂(M⁻¹f)/∂p − M⁻¹K δx, shape (p, rows, 3)."""
