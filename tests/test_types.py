@@ -166,9 +166,9 @@ def test_mistakes_of_users_are_shown_and_nothing_else(said):
 
 
 @pytest.mark.slow
-def test_the_package_has_none_with_all_that_is_known_of_others(tmp_path):
+def test_the_package_has_none_with_the_types_that_others_declare(tmp_path):
+    """Types that a checker infers from the code of other libraries change with their versions, and are not asked."""
     assert not told(tmp_path, SCRIPT)
-    assert not told(tmp_path, SCRIPT, useLibraryCodeForTypes=True)
 
 
 @pytest.mark.slow
