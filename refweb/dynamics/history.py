@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..effects.base import STRAIN, pairs_of
+from ..effects.base import SNAPPED, STRAIN, pairs_of
 from ..results import probes
 from ..results.columns import FIRST, components, dynamic_energies, vectors
 from ..results.observables.balances import weights
@@ -79,6 +79,8 @@ def _probes_of_warnings(system, followed, step_size):
         from .half_turns import probe_of as probe_of_turns
 
         by_name |= {"half turns": probe} if (probe := probe_of_turns(net)) is not None else {}
+    if any(term.velocity.jumps for term in system.terms):
+        by_name["snaps"] = probes.Probe(probes.root_of_sum, [SNAPPED], np.zeros((0, 0)))
     if pairs_of(system):
         from ..results.observables.overlap import probe_of_speed, probes_between
 
@@ -395,8 +397,16 @@ class Watch:
         }
 
     def shares_of(self, history):
-        """Stress over its limits in the rows of a `History`, in the order of `shares`, shape (rows, shares)."""
-        return history.probes[:, list(self._shares.values())]
+        """Stress over its limits in the rows of a `History`, in the order of `shares`, shape (rows, shares).
+
+        Where damped lines may snap taut, two more columns have the energy of terms and motion, and what snaps have left
+        in doubt of it so far [J].
+        """
+        shares, at = history.probes[:, list(self._shares.values())], self._of_warning("snaps")
+        if at is None:
+            return shares
+        kept = np.append(self.system.working == 0, True)
+        return np.column_stack([shares, history.energies[:, kept].sum(axis=1), history.probes[:, at]])
 
     def share_corrections(self, course, relative=0.0):
         """Lower limits of ± of `shares`, by name, see `corrections`."""

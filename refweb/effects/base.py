@@ -53,6 +53,9 @@ LINE_OUT = np.dtype([(name, float) for name in ("tension", "strain", "damped_ten
 tension with it [N], its power [W] and that of changes of natural lengths against it [W]."""
 TENSION, STRAIN, DAMPED_TENSION, POWER, LENGTH_POWER = range(5)
 """Columns of these."""
+LAST_STRAIN, SNAPPED = range(5, 7)
+"""Columns that explicit steps write behind them, see `VelocityForce.jumps`: the strain at the last step [1], and the
+sum of the squared energies that jumps within steps leave in doubt [J²]."""
 
 
 TOUCH = np.dtype([("value", float), ("force", float, (3,))])
@@ -146,11 +149,14 @@ class VelocityForce(NamedTuple):
         Bound on the row sums of |−∂f/∂v|; None where kicks are solved by ``implicit``.
     implicit : ImplicitContactKernels, optional
         Kernels that solve explicit kicks of a force that may be stiff; None where kicks iterate it.
+    jumps : bool
+        True for a force over the lines that jumps where a line snaps taut within a step.
     """
 
     damping: Callable[..., Any] | None = None
     bound: Callable[..., Any] | None = None
     implicit: ImplicitContactKernels | None = None
+    jumps: bool = False
 
 
 class ContactForce(NamedTuple):
@@ -402,6 +408,8 @@ class ForceTerm:
         """Number of values per cell that ``force`` writes to its ``out``."""
         if self.contact.felt:
             return CONTACT_COLUMNS + self.contact.places
+        if self.velocity.jumps:
+            return SNAPPED + 1
         if self.adds_tension and self.balance.power is None:
             return DAMPED_TENSION + 1
         if self.observed:

@@ -277,7 +277,7 @@ class Damping(Table):
                     data=None,
                     force=force,
                     tangent=Tangent(stiffness, symmetric=False),
-                    velocity=VelocityForce(damping, bound),
+                    velocity=VelocityForce(damping, bound, jumps=True),
                     balance=Balance("dissipated_energy", POWER, internal=True),
                     timing=Timing(at_rest=False),
                     adds_tension=True,

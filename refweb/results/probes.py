@@ -369,6 +369,12 @@ def slack_fraction(t, x, v, f, lines, rows, data, where):
 
 
 @kernel(PROBE)
+def root_of_sum(t, x, v, f, lines, rows, data, where):
+    """Root of the sum of the column ``rows[0]`` of what lines show."""
+    return math.sqrt(lines[:, rows[0]].sum())
+
+
+@kernel(PROBE)
 def deepest(t, x, v, f, lines, rows, data, where):
     """Largest value of data, one column, over rows (first, last + 1); ``where[0]`` counts from ``first``.
 

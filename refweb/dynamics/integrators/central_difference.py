@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from ...compiled.kernel import prepare
+from ...effects.base import SNAPPED
 from ...errors import EnergyDriftError, InputError, IntegrationError, SolverError
 from ...kernels import CONTACT, CONTACTS, PART, PARTS, Arrays
 from .ccd import reset_checks
@@ -116,7 +117,8 @@ class CentralDifference(Integrator):
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
         self._outs = outs = tuple(system.per_cell())
-        self.model = Model.of(system, outs)
+        self.model, jump = Model.of(system, outs), any(term.velocity.jumps for term in system.terms)
+        self._snapped = outs[0][:, SNAPPED] if jump else np.zeros(0)
         self._observed = Observed.of(probes, sums, len(outs), outs, self.model.contacts)
         self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])
         self._events, self._least_energy = event_rows(events), least_energy(system)
@@ -179,7 +181,7 @@ class CentralDifference(Integrator):
     def start(self, x=None, v=None):
         """The `ExplicitState` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
         self.prepare()
-        system, self._taken = self.system, None
+        system, self._taken, self._snapped[...] = self.system, None, 0.0
         force = np.zeros((system.rows, 3))
         x = np.zeros_like(force) if x is None else np.array(x, dtype=float, order="C")
         v = system.initial_velocity() if v is None else np.array(v, dtype=float, order="C")
@@ -210,6 +212,7 @@ class CentralDifference(Integrator):
 
     def save(self, course):
         """The `ExplicitState` as arrays by name, for a checkpoint."""
+        course.snapped = self._snapped.copy()
         return course.arrays()
 
     def load(self, arrays):
@@ -217,6 +220,7 @@ class CentralDifference(Integrator):
         self.prepare()
         course, self._taken = ExplicitState.of_arrays(arrays), None
         self.system.forces(course.time, course.x, course.v, self._outs)
+        self._snapped[...] = course.snapped if course.snapped.size else 0.0
         return course
 
     def renew(self, course: ExplicitState, change):

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...compiled.rows import record_at
-from ...effects.line_kernels import LINE
+from ...effects.base import LAST_STRAIN, POWER, SNAPPED, STRAIN
+from ...effects.line_kernels import LINE, line_at
 from ...effects.mass_flow import exchange_by_slips, exchange_masses, set_masses_by_slips
 from ...effects.natural_lengths import NaturalLengths, set_growth, set_lengths
 from ...errors import EnergyDriftError
@@ -125,6 +126,8 @@ def begin_powers(t, x, v, extra, terms, solved, known, power):
             continue
         terms.forces[i](t, x, v, extra, terms.cells[i], terms.data[i], terms.outs[i])
         power[i] = sum_of(terms.outs[i][:, column])
+        if terms.powers[n, 2] > 1:
+            note_snaps(0.0, terms.data[i], terms.outs[i])
 
 
 @kernel(leaf=True, forceinline=True)
@@ -147,6 +150,23 @@ def book_powers(
         gained = sum_of(terms.outs[i][:, column])
         work[i] += 0.5 * h * (power[i] + gained)
         power[i] = gained
+        if powers[n, 2] > 1:
+            note_snaps(h, terms.data[i], terms.outs[i])
+
+
+@kernel(leaf=True, apart=("snaps",))
+def note_snaps(h: float, data: Matrix, out: Matrix) -> None:
+    """Note strains, and of lines that snap taut in a step h the square of the energy that this leaves in doubt.
+
+    The damping force, which jumps there, acts in half of the step, whatever the share of the step behind the jump. The
+    error is up to half of the power times the step, of either sign, and the mean of its square over all shares a
+    twelfth of the square of that product.
+    """
+    for c in range(out.shape[0]):
+        slackness = line_at(data, c).slackness
+        if out[c, LAST_STRAIN] <= slackness < out[c, STRAIN]:
+            out[c, SNAPPED] += (h * out[c, POWER]) ** 2 / 12.0
+        out[c, LAST_STRAIN] = out[c, STRAIN]
 
 
 @kernel(apart=("stages",))

@@ -31,6 +31,9 @@ class ExplicitState(IntegratorState):
         Power of each term with a power, at the last step [W].
     longest : float
         Largest approach of two rows in a step [m]; infinite if it is not known.
+    snapped : ndarray, shape (elements,)
+        Square of the energy that jumps of the damping of each element leave in doubt [J²], see
+        `refweb.dynamics.integrators.energy_balance.note_snaps`; empty without damping.
     before : ndarray, shape (3, rows, 3)
         Displacement, velocity and force at the row or the corner of a table before.
     """
@@ -38,6 +41,7 @@ class ExplicitState(IntegratorState):
     force: np.ndarray
     power: np.ndarray
     longest: float = 0.0
+    snapped: np.ndarray = field(default_factory=lambda: np.zeros(0))
     before: np.ndarray = field(init=False, metadata={"saved": False})
 
     def __post_init__(self):

@@ -18,7 +18,8 @@ def features(scheme, model, observed, events):
         ``stages`` or ``kicks`` (steps of one drift); ``watched`` (extremes), ``books`` (of energies), ``averages``,
         ``looks`` (any of these), ``events``; ``turning`` bodies and ``carried`` nodes; ``driven`` rows, ``lengths``
         that change, masses that ``follows`` them, their ``growth``, ``relaxing`` internal variables;
-        ``powers``, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped`` (integrated impulses),
+        ``powers``, ``snaps`` of forces that jump, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped``
+        (integrated impulses),
         ``booked`` (powers, lengths or pushing), ``angular`` momentum that is kept; ``near`` cells, ``pairs`` that are
         found; collision checks (``ccd``) of lines that push each other (``line_ccd``) and of bodies that push lines
         (``body_ccd``); ``contacts`` of bodies.
@@ -40,6 +41,7 @@ def features(scheme, model, observed, events):
         "growth": model.lengths.growth >= 0,
         "relaxing": len(model.relaxing.terms),
         "powers": len(terms.powers),
+        "snaps": (terms.powers[:, 2] > 1).sum(),
         "viscous": len(terms.viscous),
         "rubbing": len(model.implicit_contacts.terms),
         "pushing": len(outside.pushing),
