@@ -214,10 +214,10 @@ def with_errors(results, floors, twin, kept_rows, rows_refined, order=2.0, drift
 
     The damping force of a line jumps where it snaps taut. The balance closes there wherever in a step that is, so that
     it does not tell the error. Therefore the energy that jumps leave in doubt (``snaps``) is compared with the
-    difference of the energies of both runs, in the same way. Of 720 results of a mass on a damped line 21 are off by more than ±,
-    up to 2.2 times, without this, and with it the worst by 0.46 times ±; of 300 results of damped webs 2, up to 1.4
-    times, and the worst by 0.64 times ±, while the median of ± over the error grows from 9 to 18. Losses of contact
-    begin with the overlap, from zero, and need no such limit.
+    difference of the energies of both runs, in the same way. Of 720 results of a mass on a damped line 21 are off by
+    more than ±, up to 2.2 times, without this, and with it the worst by 0.46 times ±; of 300 results of damped webs 2,
+    up to 1.4 times, and the worst by 0.64 times ±, while the median of ± over the error grows from 9 to 18. Losses of
+    contact begin with the overlap, from zero, and need no such limit.
 
     Of 7452 results of 207 random impacts, 7 have an error above three times ± by the difference alone, and none with
     the factor of energy, ``drifts`` and ``floors``. Of 1992 results of explicit steps of 83 more impacts the numbers
