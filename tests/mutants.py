@@ -181,8 +181,8 @@ MIRRORS = {
     "dynamics/integrators/central_difference": "dynamics/test_agreement_by_chance.py dynamics/test_dynamics.py",
     "dynamics/integrators/explicit_loop": "dynamics/integrators/test_nearby.py dynamics/test_dynamics.py "
     "dynamics/test_impact.py",
-    "dynamics/integrators/energy_balance": "dynamics/test_agreement_by_chance.py test_readme.py dynamics/test_corners.py "
-    "dynamics/test_impact.py effects/test_moved_bodies.py",
+    "dynamics/integrators/energy_balance": "dynamics/test_agreement_by_chance.py test_readme.py "
+    "dynamics/test_corners.py dynamics/test_impact.py effects/test_moved_bodies.py",
     "dynamics/integrators/ida": "dynamics/integrators/test_ida.py",
     "dynamics/integrators/yielding": "effects/test_plastic.py",
     "dynamics/integrators/averages": "dynamics/test_averages.py",
