@@ -177,7 +177,8 @@ class ContactForce(NamedTuple):
         the elements, their rows, their data) of the pairs that may act soon. Such a term has no stiffness. None if the
         cells themselves act.
     foresee : kernel, optional
-        With ``finder``: writes to the data of pairs how near they may come in a span, and how fast they are then.
+        Writes to the data of pairs how near they may come in a span, and how fast they are then. None where steps are
+        planned for rows, and not for spans.
     crossing : Crossing, optional
         Penetration check of lines with lines, if the cells are lines that push each other.
     passing : kernel, optional

@@ -1147,7 +1147,7 @@ def test_rows_one_by_one_are_the_rows_of_one_call(monkeypatch):
 
 def test_a_chosen_stiffness_does_not_depend_on_the_machine(monkeypatch):
     """A contact that is too soft is found at the end of a block, whose rows are as many as the machine is fast."""
-    _, scene = next(trust.scenes("capture", 9))
+    _, scene = next(trust.scenes("capture", 6))
     scene = scene.replace(accuracy=refweb.Accuracy(error="none"))
     monkeypatch.setattr(schedule, "BLOCK", 1e9)
     found = []

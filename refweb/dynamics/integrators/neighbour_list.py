@@ -171,7 +171,7 @@ class NeighbourList(Record):
         """Make the record of a system."""
         near, skin = near_of(system), np.zeros(1, dtype=SKIN)
         skin["depth"], skin["outer"], skin["lasts"] = np.inf, np.inf, MANY
-        pairs = any(term.contact.finder is not None for term in system.terms)
+        pairs = any(term.contact.foresee is not None for term in system.terms)
         swaps = Functions(SWAP, [swap_for(system.terms[i]) for i in near])
         narrows = Functions(NARROW, [narrow_of(system.terms[i].contact.near) for i in near if pairs])
         aheads = Functions(AHEAD, [ahead_for(system.terms[i]) for i in near if pairs])
@@ -201,7 +201,10 @@ def swap_for(term):
 
 def ahead_for(term):
     """The kernel that takes the cells of a term for a bound on steps."""
-    return all_ahead if term.contact.finder is None else ahead_of(term.contact.finder, term.contact.foresee)
+    contact = term.contact
+    if contact.foresee is None:
+        return all_ahead
+    return ahead_of(contact.finder or listed_pairs_of(contact.near), contact.foresee)
 
 
 @kernel(AHEAD)
@@ -211,8 +214,22 @@ def all_ahead(i, m, reach, span, early, x, v, f, inverse, cells, data):
 
 
 @functools.cache
+def listed_pairs_of(near):
+    """Make a kernel with the answer of a `ContactForce.finder` for pairs that are cells, by their kernel ``near``."""
+
+    @kernel()
+    def listed_pairs(skin, x, cells, data):
+        touching = np.empty(cells.shape[0], dtype=np.int64)
+        chosen = touching[: near(skin, x, cells, data, touching)]
+        rows, numbers = rows_of(chosen, cells, data)
+        return chosen, rows, numbers
+
+    return listed_pairs
+
+
+@functools.cache
 def ahead_of(pairs, foresee):
-    """Make the kernel of `AHEAD` for the pairs that ``pairs`` finds; for all elements where the reach is far."""
+    """Make the kernel of `AHEAD` for the pairs that ``pairs`` finds; for all cells where the reach is far."""
 
     @kernel(AHEAD)
     def ahead(i, m, reach, span, early, x, v, f, inverse, cells, data):

@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 LISTED = 20_000
 """Largest number of pairs that are one list, which implicit methods need; above, pairs are found as they come near."""
+FORESEEN = 1000
+"""Number of pairs above which steps are planned for spans, by the speed of each pair near another."""
 BROKEN = column_of(ELEMENT, "scale")
 """Column of pairs and of elements that is 0 where one is broken."""
 ROUNDING = 1e-9
@@ -139,7 +141,7 @@ class SelfContact(Table):
         if chosen is not None and len(chosen) <= LISTED:
             rows, numbers = paired(chosen, cells, data)
             common: dict = dict(cells=rows, data=numbers, elements=CellElements(chosen, without(BROKEN)))
-            search = ContactForce(near=near)
+            search = ContactForce(near=near, foresee=foresee if len(chosen) > FORESEEN else None)
         else:
             if net.quasi_static:
                 raise InputError(

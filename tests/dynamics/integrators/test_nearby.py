@@ -84,9 +84,13 @@ def test_lists_change_no_bit(scene):
             np.testing.assert_array_equal(array, course.arrays()[name], err_msg=name)
 
 
-def test_lists_of_pairs_change_no_bit(monkeypatch):
-    """A heap of chains that fall on each other and on a crate is the same with all pairs looked at in every step."""
-    monkeypatch.setattr(table, "LISTED", 0)
+@pytest.mark.parametrize("threshold", ["LISTED", "FORESEEN"])
+def test_lists_of_pairs_change_no_bit(threshold, monkeypatch):
+    """A heap of chains that fall on each other and on a crate is the same with all pairs looked at in every step.
+
+    Pairs are found as they come near, or are all listed ahead.
+    """
+    monkeypatch.setattr(table, threshold, 0)
     rng, chains, courses = np.random.default_rng(5), 8, []
     points = np.array([(0.05 * n, 0.02 * m, 0.03 * m) for m in range(chains) for n in range(7)])
     points[7:, :2] = points[7:, :2] @ [[0.8, 0.6], [-0.6, 0.8]]  # the first lies across all others
@@ -105,7 +109,7 @@ def test_lists_of_pairs_change_no_bit(monkeypatch):
     for everything in (False, True):
         system = scene.build()
         if everything:
-            bare = {"near": None, "finder": None, "passing": None}
+            bare = {"near": None, "finder": None, "foresee": None, "passing": None}
             system.terms = [replace(term, contact=term.contact._replace(**bare)) for term in system.terms]
         solver = CentralDifference(system, step_size=2e-5)
         courses.append(solver.start(None, np.vstack([start, np.zeros((system.rows - 56, 3))])))
@@ -115,11 +119,13 @@ def test_lists_of_pairs_change_no_bit(monkeypatch):
     np.testing.assert_array_equal(courses[0].x, courses[1].x)
 
 
-def test_a_thrown_net_is_the_same_row_by_row():
-    """Pairs of lines are found as they come near, and a body is within reach of a row but not yet of the list."""
-    keys = {"web.layers": 8, "web.cell_area": 0.6, "accuracy.error": "none"}
-    system, times = refweb.Scene.load("capture-stage", keys).build(), np.linspace(0.02, 0.2, 10)
-    assert any(term.contact.finder is not None for term in system.terms)
+@pytest.mark.parametrize(("layers", "end"), [(8, 0.2), (3, 0.6)], ids=["found", "listed"])
+def test_a_thrown_net_is_the_same_row_by_row(layers, end):
+    """Pairs of lines are near each other, and a body is within reach of a row but not yet of the list."""
+    keys = {"web.layers": layers, "web.cell_area": 0.6, "accuracy.error": "none"}
+    system, times = refweb.Scene.load("capture-stage", keys).build(), np.linspace(0.1 * end, end, 10)
+    assert any(term.contact.finder is not None for term in system.terms) == (layers == 8)
+    assert any(term.contact.foresee is not None for term in system.terms)
     courses = []
     for rows in (times[None, :], times[:, None]):
         solver = CentralDifference(system)
