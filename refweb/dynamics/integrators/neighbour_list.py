@@ -147,7 +147,7 @@ class NeighbourList(Record):
     skin : ndarray of `SKIN`, shape (1,)
         State of the list.
     at : ndarray, shape (rows, 3)
-        Displacement at which pairs were found [m]; no rows where none are found.
+        Displacement at which near pairs were chosen [m]; no rows where steps are planned for rows, and not for spans.
     cells, data : table
         Space for the cells and numbers of each.
     chosen, wide_cells, wide_data : table
