@@ -1,11 +1,11 @@
 """Contact of lines with lines: its table and its terms.
 
 May change: private functions, messages, `ROUNDING`, `LISTED`, `FORESEEN`, `FAR` and `SOME`: with more than `LISTED`
-pairs explicit steps alone take a web, and with more than `FORESEEN` they take other steps. Must stay: the name "self_contact" of all terms, by which `system.unsupported_parts`,
-`dynamics.kinks` and `integrators.splitting` know them; keys and docstring of `SelfContact` (scene format and help;
-after a change write ``validation/REFERENCE.md`` anew); `with_stiffness`, which `scene` calls; `BROKEN`, the column that
-breaks set to 0; "self_contact_energy", a column of ``history.csv``. Tests: ``tests/effects/test_self_contact.py``,
-``tests/test_contract.py``.
+pairs explicit steps alone take a web, and with more than `FORESEEN` they take other steps. Must stay: the name
+"self_contact" of all terms, by which `system.unsupported_parts`, `dynamics.kinks` and `integrators.splitting` know
+them; keys and docstring of `SelfContact` (scene format and help; after a change write ``validation/REFERENCE.md``
+anew); `with_stiffness`, which `scene` calls; `BROKEN`, the column that breaks set to 0; "self_contact_energy", a column
+of ``history.csv``. Tests: ``tests/effects/test_self_contact.py``, ``tests/test_contract.py``.
 """
 
 from __future__ import annotations
