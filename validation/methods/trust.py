@@ -156,8 +156,11 @@ def inside(entry):
 
 
 def wrong(entry):
-    """True for a result that is called determined and is off by more than its digits allow."""
-    allowed = 10.0 ** -(entry["digits"] or 0) * abs(entry["value"])
+    """True for a result that is called determined and is off by more than its digits allow, or ± where it has none.
+
+    Without a digit is what hardly moves, as a web that is missed, whose speed is a rounding of its own.
+    """
+    allowed = 10.0 ** -entry["digits"] * abs(entry["value"]) if entry["digits"] else entry["error"]
     return entry["verdict"] == DETERMINED and off(entry) > allowed + entry["open"]
 
 
