@@ -237,6 +237,7 @@ MIRRORS = {
     "sweeps": "sweeps/test_sweep.py sweeps/test_chances.py",
     "sizing": "sizing/test_size.py",
     "results/case_rows": "sweeps/test_sweep.py",
+    "studies/form": "studies/test_form.py",
     "studies": "studies/test_cost.py",
     "reference/paths": "reference/test_paths.py",
     "reference": "reference/test_help.py reference/test_schema.py",
@@ -334,7 +335,7 @@ MUTANTS = [
     Mutant("net/cable", "web.natural_length / (1.0 + strain)", "web.natural_length * (1.0 - strain)"),
     Mutant("net/cable", 'density * values["natural_length"], force)', "density, force)"),
     Mutant("net/sag", "return np.sinh(u) / u", "return np.sinh(u) / u + u * u"),
-    Mutant("statics/bars", "np.where(forming, 0.0, self.natural * (1.0 + slackness))", "self.natural"),
+    Mutant("statics/bars", "np.maximum(strain + forming, 0.0)", "np.maximum(strain, 0.0)"),
     Mutant(
         "studies/form",
         "lengths, before = np.where(net.forming, natural, web.natural_length), change",

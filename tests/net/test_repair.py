@@ -115,7 +115,7 @@ def solid_of(path, faces, **keys):
     return Mesh(file=solids.write(path, *faces), **keys)
 
 
-@pytest.mark.ordinary("hole", "no lid", "overlapping, one inward, with a hole", "a fin")
+@pytest.mark.ordinary("hole", "no lid", "doubled", "overlapping, one inward, with a hole", "a fin")
 @pytest.mark.parametrize("name", CASES)
 def test_a_faulty_surface_is_the_solid_that_is_meant(name, tmp_path):
     """Volume, centre and inertia, in closed form; depth, against the exact one, where one face is the nearest."""

@@ -353,6 +353,9 @@ def test_sag():
         solution = refweb.run(scene)
         errors.append(abs(solution.results["low"].value + 0.1 * 3.0))
     assert abs(np.polyfit(np.log(counts), np.log(errors), 1)[0] + 2.0) < 0.1 and errors[-1] < 1e-3
+
+
+def test_length_of_a_catenary_by_its_sag():
     for sag in (1e-8, 1e-3, 0.5, 100.0):  # parameter a of a catenary over 1 m, by its sag
         parameter = brentq(lambda a: 2.0 * a * np.sinh(0.25 / a) ** 2 - sag, 1e-3, 1.0 + 1.0 / sag)  # noqa: B023
         np.testing.assert_allclose(over_chord(np.array([sag])), 2.0 * parameter * np.sinh(0.5 / parameter), rtol=1e-9)
