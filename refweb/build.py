@@ -34,41 +34,9 @@ MAX_WINDOWS = 1e4
 
 
 def build(web, cable, effects, supports, support, solve, output, accuracy, observables, events, folder):
-    """The system of the parts of a scene.
+    """The `refweb.system.system.System` of the parts of a `refweb.Scene`, whose fields they are.
 
-    Parameters
-    ----------
-    web : refweb.net.web.Web or a table that makes one
-        Nodes, lines and natural lengths.
-    cable : refweb.Cable
-        Material and section.
-    effects : sequence
-        Effects of the scene.
-    supports : refweb.Supports or None
-        Supported nodes; None for the web's own supports.
-    support : sequence of refweb.Supports
-        Additional supports.
-    solve : refweb.Static or refweb.Dynamic
-        Kind of solution and method.
-    output : refweb.Output
-        Output interval and frames of the result folder.
-    accuracy : refweb.Accuracy
-        How errors are found.
-    observables : sequence of refweb.Observe
-        Numbers to follow.
-    events : sequence of refweb.Event
-        Moments to find.
-    folder : pathlib.Path or None
-        Where relative paths start.
-
-    Returns
-    -------
-    refweb.system.system.System
-
-    Raises
-    ------
-    InputError
-        For whatever does not fit together.
+    Relative paths start at ``folder``, a `pathlib.Path` or None. Whatever does not fit together is an `InputError`.
     """
     web = _web(web, folder)
     _check_memory(len(web.lines), cable, effects, solve)

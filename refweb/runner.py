@@ -114,15 +114,11 @@ def trust(
 
     Parameters
     ----------
-    scene : Scene, path-like or str
-        A scene, a scene file or the name of a scene shipped with refweb.
     budget : float, optional
         CPU time that all runs may take [s], see `refweb.Accuracy`.
     out : path-like, optional
         Result folder of the run, with ``trust.json`` and ``trust.png``; without it nothing touches the disk.
-    force : bool
-        Replace the results of an earlier run in ``out``.
-    progress, announce : callable, optional
+    scene, force, progress, announce
         See `refweb.run`.
 
     Returns

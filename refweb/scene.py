@@ -302,13 +302,8 @@ class Scene:
         given["solve"] = self.solve.to_dict()
         if (folder := self.start_folder) is not None:
             given["solve"]["start"] = str(folder)
-        given["output"] = self.output.to_dict()
-        if self.accuracy is not None:
-            given["accuracy"] = self.accuracy.to_dict()
-        if self.throw is not None:
-            given["throw"] = self.throw.to_dict()
-        if self.gym is not None:
-            given["gym"] = self.gym.to_dict()
+        parts = {key: getattr(self, key) for key in ("output", "accuracy", "throw", "gym")}
+        given |= {key: part.to_dict() for key, part in parts.items() if part is not None}
         given["observe"] = [o.to_dict() for o in self.observables]
         if self.event:
             given["event"] = [event.to_dict() for event in self.event]

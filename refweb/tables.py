@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, dataclass_transf
 from .accepted import accepts, any_of, array, by_name, limits
 from .errors import InputError, refused_at
 from .messages import closest, nearest, quote, short
-from .registry import known, possible
+from .registry import known, load, possible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -122,6 +122,11 @@ def _rows_at_once(given, width, number):
     return list(zip(*[flat] * width, strict=True))
 
 
+def is_listed(value: Any) -> bool:
+    """Tell if a value is a list, a tuple or an array of one or more dimensions, and no single number."""
+    return isinstance(value, (list, tuple)) or getattr(value, "ndim", 0) > 0
+
+
 def _list(name, value, what):
     if hasattr(value, "tolist"):
         value = value.tolist()
@@ -139,6 +144,11 @@ def field(read: Callable[..., Any], *, default: Any = MISSING, default_factory: 
 def checked(name: str, value: Any, kind: Any) -> Any:
     """A value as a field reads it: ``checked("seed", 3, integer(at_least=0))``."""
     return kind.metadata["read"](name, value)
+
+
+def accepted_by(kind: Any) -> Any:
+    """Schema of the values that a field reads, see `refweb.accepted`."""
+    return kind.metadata["read"].accepts
 
 
 def real(
@@ -257,6 +267,17 @@ def rows(width: int, default: Any = MISSING, *, unit: str = "", increasing: bool
     return field(read, default=default, unit=unit)
 
 
+def real_or_rows(default: Any = MISSING, *, unit: str = "", **bounds: Any) -> Any:
+    """A number within bounds, as `real`, or points of a curve, such as a table over time: rows of two, increasing."""
+    number, points = real(unit=unit, **bounds), rows(2, increasing=True)
+
+    @accepts(any_of(accepted_by(number), accepted_by(points)))
+    def read(name, value):
+        return checked(name, value, points if is_listed(value) else number)
+
+    return field(read, default=default, unit=unit)
+
+
 @_at_once((int,), 0, _WHOLE)
 @accepts({"type": "integer", "minimum": 0})
 def node_number(name: str, value: Any) -> int:
@@ -342,13 +363,15 @@ def components(default: Any = MISSING) -> Any:
     return field(read, default=default)
 
 
-def by_group(kind: type[Table], where: str, *, default_factory: Callable[[], dict[str, Any]] = dict) -> Any:
-    """Tables of a class by group of lines, in the scene ``[where.groups.NAME]``."""
+def by_group(
+    kind: type[Table], where: str, *, members: str = "groups", default_factory: Callable[[], dict[str, Any]] = dict
+) -> Any:
+    """Tables of a class by group of lines, in the scene ``[where.groups.NAME]``, or by name of other ``members``."""
 
     @accepts(by_name(kind))
     def read(name, value):
         if not isinstance(value, dict):
-            raise InputError(f"{name} = {quote(value)} must be a table of groups, [{where}.groups.NAME]")
+            raise InputError(f"{name} = {quote(value)} must be a table of {members}, [{where}.{members}.NAME]")
         return {
             key: group if isinstance(group, kind) else kind.read(f"{name}.{short(key)}", group)
             for key, group in value.items()
@@ -370,12 +393,13 @@ def numbers_by_name() -> Any:
     return field(read, default=None)
 
 
-def part(kind: type[Any]) -> Any:
-    """A table of a class below another one, None without it."""
+def part(kind: type[Any] | str) -> Any:
+    """A table of a class, or of the ``"module:name"`` of one, below another one; None without it."""
 
-    @accepts(kind)
+    @accepts((lambda: load(kind)) if isinstance(kind, str) else kind)
     def read(name, value):
-        return value if isinstance(value, kind) else kind.read(name, value)
+        made = load(kind)
+        return value if isinstance(value, made) else made.read(name, value)
 
     return field(read, default=None)
 
@@ -409,6 +433,7 @@ def refuse_keys(cls: type, given: dict[str, Any]) -> None:
         text,
         vector,
         rows,
+        real_or_rows,
         numbers_list,
         texts,
         nodes,

@@ -6,17 +6,14 @@
 
 import contextlib
 import json
+import pathlib
 
 from ..errors import InputError
 
 
 def add_scene(parser):
-    """Declare the argument for the scene."""
+    """Declare the argument for the scene, and the option for values in place of those of the scene."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or the name of a scene shipped with refweb")
-
-
-def add_values(parser):
-    """Declare the option for values in place of those of the scene."""
     text = (
         "a value in place of the scene's, by its path, as solve.duration=0.5 or body.0.velocity=[0,0,2]; an effect is "
         "left out by false, as contact=false; repeatable"
@@ -25,7 +22,7 @@ def add_values(parser):
 
 
 def scene_of(arguments):
-    """The scene that `add_scene` and `add_values` ask for."""
+    """The scene that `add_scene` asks for."""
     from ..scene import Scene
 
     if not arguments.values:
@@ -33,6 +30,13 @@ def scene_of(arguments):
     from ..reference.paths import read_settings
 
     return Scene.load(arguments.scene, read_settings(arguments.values))
+
+
+def folder_of(arguments, title, kind=""):
+    """Result folder that ``--out`` names, by default a title and a kind in the current folder."""
+    from ..scene import slug
+
+    return pathlib.Path(arguments.out if arguments.out is not None else slug(title) + kind)
 
 
 def add_json(parser):
@@ -82,8 +86,6 @@ def resumable(folder):
     except KeyboardInterrupt:
         if folder is None:
             raise
-        import pathlib
-
         from ..results.folder import read_summary, remedy
 
         folder = pathlib.Path(folder)

@@ -5,13 +5,12 @@
 # belongs in the scene, `runner.notices` or `doubts`. Tests: tests/commands/test_cli.py, tests/commands/test_doubts.py.
 
 from ..errors import InputError
-from .arguments import add_scene, add_values, print_sizing, print_study, scene_of
+from .arguments import add_scene, print_sizing, print_study, scene_of
 
 
 def add_arguments(parser):
     """Declare the scene and its values."""
     add_scene(parser)
-    add_values(parser)
 
 
 def run(arguments):

@@ -92,24 +92,6 @@ def print_scene(scene, system):
     web = web_of(system)
     counts, sizes = on_web(web)
     sizes += "; " + " × ".join(f"{size:.4g}" for size in web["extent"]) + " m along x, y and z"
-    corners, steps = [], []
-    if solve.kind == "dynamic" and len(system.corners):
-        from ..dynamics.schedule import FEW_CORNERS
-
-        if len(system.corners) > FEW_CORNERS:
-            from ..dynamics.breakpoints import remarks_on_corners
-
-            corners = [("corners", finding.text) for finding in remarks_on_corners(scene.replace(solve=solve), system)]
-    rows = []
-    if solve.kind == "dynamic":
-        from ..dynamics.schedule import Counts
-
-        rows = [("rows", Counts.of(scene).text(scene))]
-    if solve.kind == "dynamic" and INTEGRATORS[solve.method].knob == "safety":
-        from ..dynamics.expected_cost import expected_cost
-
-        with contextlib.suppress(InputError):  # the run refuses it
-            steps = [("steps", expected_cost(scene.replace(solve=solve), system))]
     _box(
         scene.title,
         [
@@ -123,11 +105,25 @@ def print_scene(scene, system):
             *_stiffness(scene, system),
             *((f'control "{c.name}"', f"{c.law} sets {c.sets} each {c.period:g} s") for c in scene.control),
             ("solve", how),
-            *steps,
-            *rows,
-            *corners,
+            *(_on_steps(scene.replace(solve=solve), system) if solve.kind == "dynamic" else ()),
         ],
     )
+
+
+def _on_steps(scene, system):
+    """Rows of the box on steps, rows and corners of a dynamic scene."""
+    from ..dynamics.schedule import FEW_CORNERS, Counts
+
+    if INTEGRATORS[scene.solve.method].knob == "safety":
+        from ..dynamics.expected_cost import expected_cost
+
+        with contextlib.suppress(InputError):  # the run refuses it
+            yield "steps", expected_cost(scene, system)
+    yield "rows", Counts.of(scene).text(scene)
+    if len(system.corners) > FEW_CORNERS:
+        from ..dynamics.breakpoints import remarks_on_corners
+
+        yield from (("corners", finding.text) for finding in remarks_on_corners(scene, system))
 
 
 def _arms(cable):
@@ -154,15 +150,20 @@ def _stiffness(scene, system):
         yield "contact", text + readable(overlaps["radius"], None, "m")
 
 
+def _grid(columns, rows, left=(0,), unwrapped=()):
+    """Rows of texts below names of columns; by number, those that begin at the left, and those that are not wrapped."""
+    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
+    for number, name in enumerate(columns):
+        grid.add_column(Text(name), justify="left" if number in left else "right", no_wrap=number in unwrapped)
+    for row in rows:
+        grid.add_row(*map(Text, row))
+    return grid
+
+
 def _results_of_steps(steps):
     """A row for each load step, of results in columns of one unit each, and last where they stand."""
     table = rows_of_steps(steps)
-    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for name in table.columns:
-        grid.add_column(Text(name), justify="right")
-    for row in (*table.rows, *([table.last] if table.last else [])):
-        grid.add_row(*map(Text, row))
-    return grid
+    return _grid(table.columns, [*table.rows, *([table.last] if table.last else [])], left=())
 
 
 def _results(results, dynamic):
@@ -211,26 +212,21 @@ def print_modes(summary):
 
 def _modes(step):
     table = rows_of_modes(step)
-    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for name in table.columns:
-        grid.add_column(Text(name), justify="right" if name else "left", no_wrap=bool(name))
-    for row in table.rows:
-        grid.add_row(*map(Text, row))
-    return grid
+    nameless = [number for number, name in enumerate(table.columns) if not name]
+    return _grid(table.columns, table.rows, nameless, set(range(len(table.columns))).difference(nameless))
 
 
 def print_cost(summary):
     """Print the box of a work-precision diagram from the content of its ``run.json``."""
     unit, runs = summary["observable"]["unit"], summary["runs"]
-    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for name in ("method", "setting", f"error [{unit}]", "of state [m]", "CPU [s]", "nfev", "nsteps"):
-        grid.add_column(Text(name), justify="left" if name in ("method", "setting") else "right", no_wrap=True)
+    columns = ("method", "setting", f"error [{unit}]", "of state [m]", "CPU [s]", "nfev", "nsteps")
     number = lambda value, form: "unknown" if value is None else f"{value:{form}}"  # noqa: E731
+    solved = []
     for run in (run for run in runs if run["status"] == "solved"):
         errors = (number(run[key], ".1e") for key in ("error_observable", "error_state"))
         work = (str(run[key]) for key in ("nfev", "nsteps"))
-        grid.add_row(run["method"], run["setting"], *errors, number(run["cpu_s"], ".3f"), *work)
-    rows: list = [("runs", grid)] if grid.rows else []
+        solved.append([run["method"], run["setting"], *errors, number(run["cpu_s"], ".3f"), *work])
+    rows: list = [("runs", _grid(columns, solved, (0, 1), range(len(columns))))] if solved else []
     failures = {}
     for run in (run for run in runs if run["status"] != "solved"):
         failures.setdefault((run["status"], run["method"], run["message"]), []).append(run["setting"])
@@ -246,12 +242,9 @@ def print_trust(report):
     """Print the box of an error budget from the content of its ``trust.json``."""
     from ..results.error_budget import NONE, OPEN, PARTS, WORDS
 
-    results, grid = report["results"], Grid(box=None, padding=(0, 2), pad_edge=False)
+    results, lines = report["results"], []
     columns = [part for part in PARTS if any(result["parts"][part] != NONE for result in results.values())]
-    grid.add_column(Text("result"), no_wrap=True)
-    for name in ("value ±", *(part.partition("_")[0] for part in columns)):
-        grid.add_column(Text(name), justify="right", no_wrap=True)
-    grid.add_column(Text("verdict"))
+    head = ["result", "value ±", *(part.partition("_")[0] for part in columns)]
     for name, result in results.items():
         factor, _ = scale_of(larger(result["value"], result["error"]), result["unit"])
         parts = (result["parts"][part] for part in columns)
@@ -260,8 +253,8 @@ def print_trust(report):
             for part in parts
         ]
         value = readable(result["value"], result["error"], result["unit"])
-        grid.add_row(*map(Text, (name, value, *said, verdict_of(result))))
-    rows: list = [("errors", grid)]
+        lines.append([name, value, *said, verdict_of(result)])
+    rows: list = [("errors", _grid([*head, "verdict"], lines, (0, len(head)), range(len(head))))]
     reasons = {(part, text) for result in results.values() for part, text in result["reasons"].items()}
     rows += [("" if n else "none", f"{WORDS[part]}: {text}") for n, (part, text) in enumerate(sorted(reasons))]
     if any(OPEN in result["parts"].values() for result in results.values()):
@@ -278,10 +271,7 @@ def print_trust(report):
 
 def print_comparison(comparison):
     """Print results side by side, and what differs between their scenes, from what `compare` finds."""
-    folders, rows = comparison["folders"], []
-    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for name in ("result", *folders, "difference", ""):
-        grid.add_column(Text(name), justify="left" if name in ("result", "") else "right")
+    folders, lines = comparison["folders"], []
     for row in comparison["results"]:
         name = row["name"] + ("" if row["step"] is None else f", step {row['step']:g}")
         differing = [difference for difference in row["differences"] if difference is not None]
@@ -291,8 +281,8 @@ def print_comparison(comparison):
         if row["agree"] is None:
             said = "only in " + next(f for f, value in zip(folders, row["values"], strict=True) if value is not None)
         difference = "" if len(differing) < 2 else readable(apart, None, row["unit"])
-        grid.add_row(Text(name), *map(_compared, row["values"]), Text(difference), Text(said))
-    rows.append(("results", grid))
+        lines.append([name, *map(_compared, row["values"]), difference, said])
+    rows: list = [("results", _grid(["result", *folders, "difference", ""], lines, (0, len(folders) + 2)))]
     known = (value is None or value["error"] is not None for row in comparison["results"] for value in row["values"])
     if not all(known):
         rows.append(("", "a value without ± has no known error, and agrees with equal ones alone"))
@@ -301,15 +291,12 @@ def print_comparison(comparison):
             step = "" if row["step"] is None else f", step {row['step']:g}"
             rows.append(("", f"{row['name']}{step}: the comparison means nothing: {row['meaningless']}"))
     rows += [(s, f"is the run in {f}") for f, s in zip(folders, comparison["status"], strict=True) if s != "solved"]
-    if comparison["scene"]:
-        grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-        for name in ("key", *folders):
-            grid.add_column(Text(name))
-        for row in comparison["scene"]:
-            grid.add_row(Text(row["path"]), *(Text("" if value is None else quote(value)) for value in row["values"]))
-        rows.append(("scenes", grid))
-    else:
-        rows.append(("scenes", "are the same"))
+    differing = [
+        [row["path"], *("" if value is None else quote(value) for value in row["values"])]
+        for row in comparison["scene"]
+    ]
+    keys = _grid(["key", *folders], differing, range(len(folders) + 1))
+    rows.append(("scenes", keys if differing else "are the same"))
     some = " where they can be compared" * any(row["meaningless"] is not None for row in comparison["results"])
     _box(f"the results agree{some}" if comparison["agree"] else f"the results differ{some}", rows)
 
@@ -317,10 +304,10 @@ def print_comparison(comparison):
 def _compared(value):
     """A value of a comparison as text."""
     if value is None:
-        return Text("")
+        return ""
     if value["interval"] is not None:
-        return Text(between(value["interval"], value["unit"]))
-    return Text(readable(value["value"], value["error"], value["unit"]))
+        return between(value["interval"], value["unit"])
+    return readable(value["value"], value["error"], value["unit"])
 
 
 def print_sweep_begins(sweep):
@@ -426,13 +413,13 @@ def print_gradients(solution, result, gradients, refused, limit):
 
 def _of_numbers(gradients, unit):
     """Gradients by numbers of the scene, each with the change of the result by a hundredth of the number."""
-    grid = _headed(["number of the scene", "", "gradient", "±", f"+ 1 % changes [{unit}]"])
+    columns, rows = ("number of the scene", "", "gradient", "±", f"+ 1 % changes [{unit}]"), []
     for gradient in gradients:
         value = float(gradient)
         left = "" if gradient.left is None else f", {gradient.left[0]:.6g} where it falls"
         cells = [gradient.path, f"{gradient.number:g}", f"{value:.6g}{left}", f"{gradient.error[0]:.1e}"]
-        grid.add_row(*map(Text, [*cells, f"{0.01 * gradient.number * value + 0.0:.3g}"]))
-    return grid
+        rows.append([*cells, f"{0.01 * gradient.number * value + 0.0:.3g}"])
+    return _grid(columns, rows)
 
 
 def _entries(gradient, limit):
@@ -440,20 +427,12 @@ def _entries(gradient, limit):
     names, falls = [str(name) for name in gradient.names], [] if gradient.left is None else ["where it falls"]
     if gradient.value.ndim > 1:
         names = [f"{name} {axis}" for name in names for axis in "xyz"]
-    grid = _headed([gradient.by, f"gradient [{gradient.unit}]", "±", *falls])
+    columns, rows = [gradient.by, f"gradient [{gradient.unit}]", "±", *falls], []
     error, *sides = (v.ravel() for v in (gradient.error, gradient.value, gradient.left) if v is not None)
     for at in sorted(range(len(names)), key=lambda at: -max(abs(side[at]) for side in sides))[:limit]:
         value, *left = (f"{side[at]:.6g}" for side in sides)
-        grid.add_row(*map(Text, [names[at], value, f"{error[at]:.1e}", *left]))
-    return grid
-
-
-def _headed(names):
-    """An empty grid below names of columns."""
-    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for number, name in enumerate(names):
-        grid.add_column(Text(name), justify="right" if number else "left")
-    return grid
+        rows.append([names[at], value, f"{error[at]:.1e}", *left])
+    return _grid(columns, rows)
 
 
 def _columns(rows):
@@ -467,10 +446,8 @@ def _columns(rows):
         if name in rows.columns and spare() < 0:
             omitted.append(name)
             kept.remove(rows.columns.index(name))
-    grid = _headed([rows.columns[k] for k in kept])
+    grid = _grid([rows.columns[k] for k in kept], [[row[k] for k in kept] for row in rows.rows])
     for column, k in zip(grid.columns, kept, strict=True) if spare() >= 0 else ():
         widths[k] += min(spare(), max(len(row[k]) for row in table) - widths[k])
         column.width = widths[k]
-    for row in rows.rows:
-        grid.add_row(*(Text(row[k]) for k in kept))
     return Group(grid, Text(f"left out, see results.csv: {', '.join(omitted)}")) if omitted else grid

@@ -6,13 +6,12 @@
 
 import pathlib
 
-from .arguments import add_force, add_scene, add_values, scene_of
+from .arguments import add_force, add_scene, scene_of
 
 
 def add_arguments(parser):
     """Declare the scene, the folder, the budget of time and the observable of the errors."""
     add_scene(parser)
-    add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for cost.png and cost.csv (default: none is written)")
     parser.add_argument("--budget", type=float, default=120.0, metavar="SECONDS", help="for all of it (default: 120)")
     parser.add_argument("--observe", metavar="NAME", help="observable that errors are of (default: the first)")

@@ -26,19 +26,7 @@ TIMES, PAIRS = 200, 20_000_000
 
 
 def doubts_on(scene, system):
-    """Findings on what is seldom meant.
-
-    Parameters
-    ----------
-    scene : refweb.Scene
-        The scene.
-    system : refweb.system.system.System
-        That of the scene.
-
-    Yields
-    ------
-    Finding
-    """
+    """Yield findings on what is seldom meant in a `refweb.Scene`, whose system is given as well."""
     yield from _on_modulus(scene, system)
     yield from _on_cells(scene, system)
     yield from _on_sections(system)

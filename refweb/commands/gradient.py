@@ -5,7 +5,7 @@
 # Tests: tests/statics/test_gradients.py, tests/dynamics/test_dynamic_gradients.py.
 
 from ..errors import InputError
-from .arguments import add_json, add_scene, add_values, print_json, scene_of
+from .arguments import add_json, add_scene, print_json, scene_of
 
 SHOWN = 20
 """Largest number of lines in a table: those of the largest derivatives."""
@@ -14,7 +14,6 @@ SHOWN = 20
 def add_arguments(parser):
     """Declare the scene, the result, and the numbers by which it is differentiated."""
     add_scene(parser)
-    add_values(parser)
     parser.add_argument(
         "--of", metavar="RESULT", help="name of a result, or frequency_1 and so on (default: the first of the scene)"
     )
@@ -128,16 +127,7 @@ def _draw(solution, result, path, out):
 
 def _plain(gradient):
     """A gradient as a dict of plain values."""
-    left = None if gradient.left is None else gradient.left.tolist()
-    return {
-        "result": gradient.result,
-        "path": gradient.path,
-        "by": gradient.by,
-        "names": list(gradient.names),
-        "value": gradient.value.tolist(),
-        "error": gradient.error.tolist(),
-        "left": left,
-        "unit": gradient.unit,
-        "equal": list(gradient.equal),
-        "notes": list(gradient.notes),
-    }
+    keys = ("result", "path", "by", "names", "value", "error", "left", "unit", "equal", "notes")
+    values = {key: getattr(gradient, key) for key in keys}
+    values = {key: value.tolist() if hasattr(value, "tolist") else value for key, value in values.items()}
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}

@@ -4,15 +4,12 @@
 # `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` of this kind; names of options. Tests:
 # tests/studies/test_modes.py.
 
-import pathlib
-
-from .arguments import add_force, add_scene, add_values, scene_of
+from .arguments import add_force, add_scene, folder_of, scene_of
 
 
 def add_arguments(parser):
     """Declare the scene, the number of modes and the folder."""
     add_scene(parser)
-    add_values(parser)
     parser.add_argument("-n", dest="number", type=int, default=10, metavar="N", help="how many (default: 10)")
     parser.add_argument("--out", metavar="DIR", help="result folder (default: the title and -modes)")
     add_force(parser)
@@ -21,12 +18,11 @@ def add_arguments(parser):
 def run(arguments):
     """Print the scene, compute its modes, print the modes."""
     from ..results.progress import followed
-    from ..scene import slug
     from ..studies.modes import modes
     from .console import print_scene
 
     scene = scene_of(arguments)
-    out = pathlib.Path(arguments.out if arguments.out is not None else f"{slug(scene.title)}-modes")
+    out = folder_of(arguments, scene.title, "-modes")
     with followed(True) as tell:
         spectra = modes(scene, arguments.number, out=out, force=arguments.force, progress=tell, announce=print_scene)
     show(spectra.summary())

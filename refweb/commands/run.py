@@ -4,16 +4,13 @@
 # `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` without a kind; names of options.
 # Tests: tests/commands/test_cli.py.
 
-import pathlib
-
 from ..errors import InputError
-from .arguments import add_force, add_scene, add_values, resumable, scene_of
+from .arguments import add_force, add_scene, folder_of, resumable, scene_of
 
 
 def add_arguments(parser):
     """Declare the scene, the folder and the horizon."""
     add_scene(parser)
-    add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="result folder (default: the title, in the current folder)")
     add_force(parser)
     parser.add_argument("--horizon", action="store_true", help="find how long the motion is determined")
@@ -25,7 +22,6 @@ def run(arguments):
 
     from .. import runner
     from ..results.progress import followed
-    from ..scene import slug
     from .console import print_scene, print_solution
 
     scene = scene_of(arguments)
@@ -33,7 +29,7 @@ def run(arguments):
         if scene.solve.kind == "static":
             raise InputError(f"--horizon has no meaning for {arguments.scene}: it is static, leave it out")
         scene = scene.replace(accuracy=replace(scene.accuracy, horizon=True))
-    out = pathlib.Path(arguments.out if arguments.out is not None else slug(scene.title))
+    out = folder_of(arguments, scene.title)
     with resumable(out), followed(True) as tell:
         solution = runner.run(scene, out=out, force=arguments.force, progress=tell, announce=print_scene)
     print_solution(solution, out)

@@ -4,9 +4,7 @@
 # `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` of this kind; names of options; exit
 # status 1 where no design meets the requirements, for scripts. Tests: tests/sizing/test_size.py.
 
-import pathlib
-
-from .arguments import add_workers, workers_of
+from .arguments import add_workers, folder_of, workers_of
 
 
 def add_arguments(parser):
@@ -21,12 +19,11 @@ def add_arguments(parser):
 def run(arguments):
     """Print what is sized, size it, print the design; the exit status is 1 where no design meets the requirements."""
     from ..pictures.sizing import plot
-    from ..scene import slug
     from ..sizing import requirements, size
     from .console import print_size, print_size_begins
 
     asked = requirements.load(arguments.requirements)
-    out = pathlib.Path(arguments.out if arguments.out is not None else slug(asked.title))
+    out = folder_of(arguments, asked.title)
     with workers_of(arguments, "starting") as options:
         sized = size.size(asked, out=out, announce=print_size_begins, **options)
     print_size(sized.summary())

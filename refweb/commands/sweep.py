@@ -4,9 +4,7 @@
 # `refweb.__main__` calls, and `show`, which `refweb info` calls for a `run.json` of this kind; names of options. Tests:
 # tests/sweeps/test_sweep.py.
 
-import pathlib
-
-from .arguments import add_workers, workers_of
+from .arguments import add_workers, folder_of, workers_of
 
 
 def add_arguments(parser):
@@ -22,12 +20,11 @@ def run(arguments):
 
     from ..pages.study import report
     from ..pictures.studies import plot
-    from ..scene import slug
     from ..sweeps import study, sweep
     from .console import print_sweep, print_sweep_begins
 
     asked = study.load(arguments.study)
-    out = pathlib.Path(arguments.out if arguments.out is not None else slug(asked.title))
+    out = folder_of(arguments, asked.title)
     with workers_of(arguments, "starting workers") as options:
         outcome = sweep.sweep(asked, out=out, announce=print_sweep_begins, **options)
     print_sweep(outcome.summary())

@@ -6,13 +6,12 @@
 
 import pathlib
 
-from .arguments import add_force, add_scene, add_values, resumable, scene_of
+from .arguments import add_force, add_scene, resumable, scene_of
 
 
 def add_arguments(parser):
     """Declare the scene, the folder and the budget of time."""
     add_scene(parser)
-    add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for trust.json and trust.png (default: none is written)")
     parser.add_argument(
         "--budget", type=float, metavar="SECONDS", help="CPU time of all runs (default: 600, or 20 times the first)"

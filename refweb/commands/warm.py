@@ -10,6 +10,7 @@ all usual processors of this kind run is written into the package itself, for a 
 # which wheels are built, and its setting of processors before numba is imported. No test runs this file.
 
 import contextlib
+import dataclasses
 import os
 
 METHODS = ("cvode", "ida", "explicit")
@@ -32,13 +33,14 @@ def run(arguments):
     from ..scene import shipped
 
     scenes = {name: refweb.Scene.load(name) for name in shipped()}
-    scenes |= {f"square-impact, {method}": scenes["square-impact"].replace(solve=_by(method)) for method in METHODS}
+    square, solve = scenes["square-impact"], refweb.Dynamic
+    scenes |= {f"square-impact, {m}": square.replace(solve=solve(duration=1.0, method=m)) for m in METHODS}
     for name, scene in scenes.items():
         if scene.solve.kind == "dynamic":
             longest = max(
                 [ROWS * (scene.output.interval or 1e-3), *(observe.average or 0.0 for observe in scene.observe)]
             )
-            scene = scene.replace(solve=_for(scene.solve, longest))
+            scene = scene.replace(solve=dataclasses.replace(scene.solve, duration=longest))
             _foresee(scene)
         cost = refweb.run(scene).cost
         print(f"{name}: {cost['compile_s']:.1f} s of compiling")
@@ -53,18 +55,6 @@ def _foresee(scene):
     if INTEGRATORS[scene.solve.method].knob == "safety":
         with contextlib.suppress(InputError):
             expected_cost(scene, scene.build())
-
-
-def _by(method):
-    from ..settings import Dynamic
-
-    return Dynamic(duration=1.0, method=method)
-
-
-def _for(solve, duration):
-    from dataclasses import replace
-
-    return replace(solve, duration=duration)
 
 
 def _ship():

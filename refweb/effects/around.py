@@ -3,8 +3,8 @@
 May change: `INSIDE`, `EVEN` and the formulas in `Around.wrap` and `winding_length`, which must give the same length as
 the kernels of `winding`. Must stay: keys and docstring of `Around` (scene format and help; after a change write
 ``validation/REFERENCE.md`` anew), fields of `Wrap`, numbers in `KINDS` and of `STRAIGHT`, `SPHERE` and `CYLINDER`,
-which kernels of `winding` read, and `body_of`, `steady`, `check_route` and `refuse_free`, which `winding`,
-`half_turns`, `thread` and `system.static_system` call. Tests: ``tests/effects/test_around.py``.
+which kernels of `winding` read, and `steady`, `check_route` and `refuse_free`, which `winding`, `thread` and
+`system.static_system` call. Tests: ``tests/effects/test_around.py``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, quote
+from ..messages import quote
 from ..tables import Several, Table, integer, table, text, vector
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class Around(Table):
 
     def wrap(self, net: Net, segment: int, first: int, second: int) -> Wrap:
         """The thread from one node to another as it lies on the body in the web's position."""
-        body = body_of(net, self.body)
+        body = net.body_of(self.body, "around.body")
         name, centre = type(body.shape).__name__, net.points[body.row]
         if name not in KINDS:
             raise InputError(
@@ -149,13 +149,7 @@ class Wrap(NamedTuple):
 
 
 def check_route(listed: Sequence[int | str], around: Sequence[Around], closed: bool) -> None:
-    """Refuse bodies of a thread that do not stand between two nodes of its list, or are given twice.
-
-    Raises
-    ------
-    InputError
-        For these.
-    """
+    """Refuse bodies of a thread that do not stand between two nodes of its list, or are given twice."""
     names = [over.body for over in around]
     if isinstance(listed, str):
         raise InputError(f"nodes = {quote(listed)} must be a list, in which the bodies of around stand between nodes")
@@ -186,24 +180,12 @@ def winding_length(
     return math.hypot(tangents + radius * lies, up[1] - up[0])
 
 
-def body_of(net: Net, name: str) -> RigidBody:
-    """The body of a name."""
-    names = [body.name for body in net.bodies]
-    if name not in names:
-        hint = nearest(name, names) if names else "the scene has no [[body]]"
-        raise InputError(f"around.body = {quote(name)} is not a [[body]], {hint}")
-    return net.bodies[names.index(name)]
-
-
 def steady(net: Net, name: str) -> tuple[RigidBody, NDArray[np.float64]]:
     """(The body of a name, vector from its base to the middle of its shape [m]), which keeps its axis and this vector.
 
-    Raises
-    ------
-    InputError
-        For a body whose axis turns, or whose middle is not its centre of mass.
+    A body whose axis turns, or whose middle is not its centre of mass, is refused.
     """
-    body = body_of(net, name)
+    body = net.body_of(name)
     given: Any = body.shape
     shape, axis = type(given).__name__.lower(), body.axes[2]
     off = net.points[body.row] + body.offset @ body.axes - net.points[body.base]
@@ -223,16 +205,10 @@ def steady(net: Net, name: str) -> tuple[RigidBody, NDArray[np.float64]]:
 
 
 def refuse_free(net: Net) -> None:
-    """Refuse free bodies that threads run over, which statics does not place.
-
-    Raises
-    ------
-    InputError
-        For the first of them.
-    """
+    """Refuse free bodies that threads run over, which statics does not place."""
     for thread in net.threads:
         for wrap in thread.wraps:
-            body = body_of(net, wrap.body)
+            body = net.body_of(wrap.body)
             if not (body.prescribed or body.axle):
                 raise InputError(
                     f'body {quote(wrap.body)} is free, and statics does not place a free body under a thread, "'

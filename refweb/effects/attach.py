@@ -25,7 +25,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import FORCE, kernel
-from ..messages import nearest, quote
+from ..messages import quote
 from ..tables import Several, Table, nodes, table, text, vector
 from .base import PrescribedMotion, column
 
@@ -87,11 +87,8 @@ class Attach(Table):
 
     def extend(self, net: Net) -> Net:
         """The net with the nodes attached to the body."""
-        names = [body.name for body in net.bodies]
-        if self.body not in names:
-            raise InputError(f"body = {quote(self.body)} is not a [[body]], {nearest(self.body, names)}")
-        number = names.index(self.body)
-        body = net.bodies[number]
+        body = net.body_of(self.body)
+        number = net.bodies.index(body)
         if body.shape.planar and not body.fixed:
             raise InputError(
                 f"body = {quote(self.body)} is a {type(body.shape).__name__.lower()}, which keeps its plane: give it "
@@ -118,7 +115,7 @@ class Attach(Table):
 
     def on(self, net: Net) -> PrescribedMotion | list[Any]:
         """The nodes on a fixed body as supports; nothing for a free body."""
-        body = next(body for body in net.bodies if body.name == self.body)
+        body = net.body_of(self.body)
         carried = np.isin(body.carried, net.web.find(self.node))
         if not body.fixed:
             return []

@@ -10,20 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..accepted import accepts, any_of
 from ..kernels import ENERGY, FORCE, kernel
 from ..net.rigid_body import Axle, unit
-from ..tables import Several, Table, checked, field, real, rows, table, vector
+from ..tables import Several, Table, real_or_rows, table, vector
 from .base import Balance, ForceTerm, Timing
 from .time_tables import flattened, interpolate
-
-_number, _table = real(unit="N m"), rows(2, increasing=True)
-
-
-@accepts(any_of(_number.metadata["read"].accepts, _table.metadata["read"].accepts))
-def _torque(name, value):
-    """Read a torque, or a table of it over time."""
-    return checked(name, value, _table if isinstance(value, (list, tuple)) else _number)
 
 
 @table
@@ -56,7 +47,7 @@ class BodyAxle(Table):
 
     point: Several = vector(default=None, unit="m")
     direction: Several = vector()
-    torque: Several = field(_torque, default=None, unit="N m")
+    torque: Several = real_or_rows(default=None, unit="N m")
 
     def check(self):
         """Refuse a direction that is zero."""

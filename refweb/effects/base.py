@@ -435,13 +435,7 @@ def pairs_of(system: System) -> list[tuple[RigidBody, RigidBody]]:
 
 
 def refuse_found(terms: Iterable[ForceTerm], what: str) -> None:
-    """Refuse terms with a `ContactForce.finder`, which have no tangent, since ``what`` needs one.
-
-    Raises
-    ------
-    InputError
-        For the first of them.
-    """
+    """Refuse terms with a `ContactForce.finder`, which have no tangent, since ``what`` needs one."""
     for term in terms:
         if term.contact.finder is not None:
             raise InputError(

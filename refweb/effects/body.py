@@ -28,6 +28,7 @@ from ..tables import (
     choice,
     field,
     numbers_list,
+    part,
     real,
     refuse_keys,
     rows,
@@ -92,19 +93,6 @@ def _quaternion(name, value):
     if not any(quaternion):
         raise InputError(f"{name} = {quote(value)} must not be zero")
     return quaternion
-
-
-def _axle_table():
-    from .axle import BodyAxle
-
-    return BodyAxle
-
-
-@accepts(_axle_table)
-def _axle(name, value):
-    """Read the table of an axle."""
-    kind = _axle_table()
-    return value if isinstance(value, kind) else kind.read(name, value)
 
 
 @dataclass(frozen=True, kw_only=True, init=False)
@@ -215,7 +203,7 @@ class Body(Table):
     angular_velocity: Several = vector(default=(0.0, 0.0, 0.0), unit="rad/s")
     inertia: Several = field(_inertia, default=None, unit="kg m²")
     fixed: bool = boolean(default=False)
-    axle: Any = field(_axle, default=None)
+    axle: Any = part("refweb.effects.axle:BodyAxle")
 
     def __init__(self, **given: Any) -> None:
         form = given.pop("form", None)  # of the body that this one is a copy of

@@ -111,18 +111,8 @@ def terms_of(
 ) -> list[ForceTerm]:
     """The terms of a force [N] and of a torque [N m] on a body, which statics leaves out.
 
-    Parameters
-    ----------
-    net : refweb.net.net.Net
-        The net.
-    body : refweb.net.rigid_body.RigidBody
-        A free body.
-    force, torque : ndarray, shape (3,), or None
-        Values along the axes of space, at the start where they turn with the body.
-    turned : bool
-        True if they turn with the body.
-    factor : sequence of (t, factor) or None
-        Factor over time of both.
+    Both are along the axes of space, shape (3,), at the start where they turn with the body, ``turned``, or None;
+    ``factor`` is a table of (t, factor) of both, or None.
     """
     terms = []
     if force is not None and not turned:

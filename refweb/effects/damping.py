@@ -58,18 +58,12 @@ def kernels(law, record, tau, changing, gradients, weights):
 
     Parameters
     ----------
-    law : type or refweb.net.laws.law.Mixed
-        Law of the lines.
-    record : numpy.dtype
-        Numbers of an element that it reads, see `refweb.net.net.Net.law_record`.
+    law, record, gradients, weights
+        As of `refweb.effects.elasticity.kernels`.
     tau : int
         Column of τ in the numbers of the lines; that behind it has L'/L.
     changing : bool
         True if natural lengths change.
-    gradients : tuple of tuple of float
-        dN/dξ by quadrature point and node.
-    weights : tuple of float
-        Quadrature weights.
     """
     stress, tangent, curvature, above_floor = law.stress, law.tangent, law.curvature, law.above_floor
     points, nodes = len(gradients), len(gradients[0])

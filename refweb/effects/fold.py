@@ -119,13 +119,11 @@ class Fold(Table):
 
     def _star(self, web, length):
         """Positions of the nodes of a star, for these natural lengths [m]."""
-        hub_nodes = web.find("centre" if self.hub is None else self.hub, "hub")
-        if len(hub_nodes) != 1:
-            raise InputError(f"hub is {len(hub_nodes)} nodes, must be one")
+        hub = web.find_one("centre" if self.hub is None else self.hub, "hub")
         size = np.linalg.norm(web.points[web.lines[:, 1]] - web.points[web.lines[:, 0]], axis=1)
         ratio = 0.5 if self.ratio is None else self.ratio
         turns = turns_of(ratio, float((length / size).min())) if self.turns is None else self.turns
-        return wound(web.points, web.points[hub_nodes[0]], self.axis or (0.0, 0.0, 1.0), ratio, turns)
+        return wound(web.points, web.points[hub], self.axis or (0.0, 0.0, 1.0), ratio, turns)
 
     def _from_file(self, web):
         """Positions of the nodes in the file."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..kernels import kernel
-from .around import CYLINDER, body_of
+from .around import CYLINDER
 from .winding import segments_of
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def ends_of(net: Net) -> list[End]:
     for thread in net.threads:
         segments: Any = segments_of(net, thread)[0] if thread.wraps else None
         for wrap in thread.wraps:
-            body, segment = body_of(net, wrap.body), segments[wrap.segment]
+            body, segment = net.body_of(wrap.body), segments[wrap.segment]
             for n, key in enumerate(("first", "second") if segment["kind"] == CYLINDER else ()):
                 rows = int(thread.rows[wrap.segment + n]), body.base, int(segment["turns"][n])
                 numbers = [*segment[key], *segment["axes"][:6], segment["angles"][n], segment["sense"]]
@@ -81,16 +81,8 @@ def turns_of(x, node, base, turn, numbers):
 def refuse_half_turns(system: System, t: float, x: NDArray[np.float64], before: list[float]) -> list[float]:
     """Refuse an equilibrium in which an end is about half a turn from where turns are counted; these turns of all ends.
 
-    Parameters
-    ----------
-    system : refweb.system.system.System
-        The system.
-    t : float
-        Load step.
-    x : ndarray, shape (rows, 3)
-        Displacement of every row [m].
-    before : list of float
-        The turns that this returned at the load step before, or empty.
+    ``x`` are displacements [m], shape (rows, 3), at load step ``t``; ``before`` are the turns that this returned at the
+    load step before, or empty.
 
     Raises
     ------

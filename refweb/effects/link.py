@@ -54,16 +54,10 @@ class Link(Table):
 
     def on(self, net: Net) -> Constraint:
         """The pairs of rows, and their distances."""
-        ends = [self._node(net, i, node) for i, node in enumerate(self.nodes)]
+        ends = [net.web.find_one(node, f"nodes[{i}]") for i, node in enumerate(self.nodes)]
         cells = np.column_stack([ends[:-1], ends[1:]]).astype(np.int32)
         apart = net.points[cells[:, 1]] - net.points[cells[:, 0]]
         length = np.linalg.norm(apart, axis=1)
         for i in np.flatnonzero(length == 0.0)[:1]:
             raise InputError(f"nodes[{i}] = {ends[i]} and nodes[{i + 1}] = {ends[i + 1]} must not be at one place")
         return Constraint(cells=cells, data=np.column_stack([apart, length]))
-
-    def _node(self, net, i, node):
-        nodes_found = net.web.find(node, f"nodes[{i}]")
-        if len(nodes_found) != 1:
-            raise InputError(f"nodes[{i}] = {quote(node)} is {len(nodes_found)} nodes, must be one")
-        return int(nodes_found[0])

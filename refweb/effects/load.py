@@ -9,13 +9,12 @@ numbers of a cell. Kernels are in `outer_load` and `body_load`. Tests: ``tests/t
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, quote
+from ..messages import quote
 from ..tables import Several, Table, choice, nodes, rows, table, text, vector
 from .outer_load import nodal_load
 
@@ -99,16 +98,13 @@ class Load(Table):
         """The net whose body turns, unless a force in space leaves that alone."""
         if self.body is None:
             return net
-        names = [body.name for body in net.bodies]
-        if self.body not in names:
-            raise InputError(f"body = {quote(self.body)} is not a [[body]], {nearest(self.body, names)}")
-        body = net.bodies[names.index(self.body)]
+        body = net.body_of(self.body)
         if net.quasi_static:
             raise InputError(f"body = {quote(self.body)}: loads on bodies have no meaning in statics: load nodes")
         self._refuse(body)
         if self.torque is None and self.axes == "space":
             return net
-        return replace(net, bodies=tuple(replace(b, turns=b.turns or b is body) for b in net.bodies))
+        return net.with_turning(body)
 
     def _refuse(self, body: RigidBody) -> None:
         """Refuse a body on which the load has no meaning."""
@@ -135,7 +131,7 @@ class Load(Table):
             return nodal_load(net, "load", loaded, np.broadcast_to(self.force, (len(loaded), 3)), self.factor)
         from .body_load import terms_of
 
-        body = next(body for body in net.bodies if body.name == self.body)
+        body = net.body_of(self.body)
         turned = self.axes == "body"
         if turned and body.turn is None:
             raise InputError(f'axes = "body": body {quote(self.body)} has no orientation that is followed')

@@ -8,14 +8,13 @@ reads by position; that kernels write x and v, and no force; cells and shape of 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError
 from ..kernels import FORCE, kernel
-from ..messages import nearest, quote
+from ..messages import quote
 from ..net.quaternions import of_vector, product
 from ..tables import Several, Table, nodes, rows, table, text
 from .base import PrescribedMotion, column
@@ -120,7 +119,7 @@ class Motion(Table):
         """The net whose body is turned."""
         if self.body is None:
             return net
-        body = self._body(net)
+        body = net.body_of(self.body)
         if body.fixed:
             raise InputError(f"body = {quote(self.body)} has fixed = true, which holds it: leave that out")
         if not body.moved:
@@ -135,7 +134,7 @@ class Motion(Table):
             raise InputError(f"rotation = {quote(self.rotation)} has no meaning for a {name}: give displacement alone")
         if body.axle:
             self._refuse_across(body.axle)
-        return replace(net, bodies=tuple(replace(b, turns=b.turns or b is body) for b in net.bodies))
+        return net.with_turning(body)
 
     def _refuse_across(self, axle):
         """Refuse a rotation that is not about the axle, and a torque besides."""
@@ -150,21 +149,12 @@ class Motion(Table):
                 f"rotation = {quote(self.rotation)} must be along axle.direction = {direction}: give multiples of it"
             )
 
-    def _body(self, net):
-        names = [body.name for body in net.bodies]
-        if self.body not in names:
-            raise InputError(f"body = {quote(self.body)} is not a [[body]], {nearest(self.body, names)}")
-        return net.bodies[names.index(self.body)]
-
     def on(self, net: Net) -> PrescribedMotion | list[PrescribedMotion]:
         """The driven rows."""
         if self.body is None:
             return self._shift(net.find(self.node))
-        body = self._body(net)
-        parts = [self._shift([body.base])]
-        if body.turn is not None:
-            parts.append(self._turn(body))
-        return parts
+        body = net.body_of(self.body)
+        return [self._shift([body.base]), *([] if body.turn is None else [self._turn(body)])]
 
     def _shift(self, driven):
         table = self.displacement or ((0.0, 0.0, 0.0, 0.0),)

@@ -54,22 +54,10 @@ def outer_load(
 ) -> ForceTerm:
     """The `ForceTerm` of a load.
 
-    Parameters
-    ----------
-    net : refweb.net.net.Net
-        The net.
-    name : str
-        Name of the effect.
-    cells : ndarray of int32, shape (cells, arity)
-        Rows that each cell couples.
-    data : ndarray, shape (cells, columns)
-        Numbers of each cell; kernels get those of the factor as well, from ``columns`` on.
-    factor : sequence of (t, factor) or None
-        Table that is linear between its times, and constant before and after them.
-    impulse : kernel, optional
-        Impulse of the `Balance`.
-    **parts
-        ``force``, which writes its power [W] to ``out[c, 0]``, and other parts of a `ForceTerm`.
+    Kernels get the numbers of a cell, ``data (cells, columns)``, and those of the factor from ``columns`` on. The
+    factor is a table of (t, factor), linear between its times and constant before and after them, or None. ``impulse``
+    is that of the `Balance`; ``parts`` are ``force``, which writes its power [W] to ``out[c, 0]``, and other parts of a
+    `ForceTerm`.
     """
     table = factor or ()
     largest = max((abs(value) for _, value in table), default=1.0)

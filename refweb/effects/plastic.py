@@ -58,18 +58,12 @@ def kernels(law, record, first, corners, gradients, weights):
 
     Parameters
     ----------
-    law : type or refweb.net.laws.law.Mixed
-        Law of the lines.
-    record : numpy.dtype
-        Numbers of an element that it reads, see `refweb.net.net.Net.law_record`.
+    law, record, gradients, weights
+        As of `refweb.effects.elasticity.kernels`.
     first : int
         Number of the column `ROW`.
     corners : int
         Number of points of the curve of yield stress over plastic strain; its last slope goes on.
-    gradients : tuple of tuple of float
-        dN/dξ by quadrature point and node.
-    weights : tuple of float
-        Quadrature weights.
     """
     points, nodes = len(gradients), len(gradients[0])
     flat, stress = tuple(value for row in gradients for value in row), law.stress

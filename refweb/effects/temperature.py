@@ -12,21 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..accepted import accepts, any_of
 from ..errors import InputError
 from ..messages import short
 from ..net.groups import givers
-from ..tables import Several, Table, by_group, checked, field, real, rows, table
+from ..tables import Several, Table, by_group, real, real_or_rows, table
 from .natural_lengths import with_factor
 
 if TYPE_CHECKING:
     from ..net.net import Net
-
-
-@accepts(any_of(real().metadata["read"].accepts, rows(2).metadata["read"].accepts))
-def _change(name, value):
-    table = isinstance(value, (list, tuple)) or getattr(value, "ndim", 0) > 0
-    return checked(name, value, rows(2, increasing=True) if table else real(unit="K"))
 
 
 @table
@@ -41,7 +34,7 @@ class GroupTemperature(Table):
     """
 
     expansion: float | None = real(default=None, unit="1/K")
-    change: Several = field(_change, default=None)
+    change: Several = real_or_rows(default=None, unit="K")
 
 
 @table
@@ -72,7 +65,7 @@ class Temperature(Table):
     """
 
     expansion: float = real(unit="1/K")
-    change: Several = field(_change, unit="K")
+    change: Several = real_or_rows(unit="K")
     groups: dict[str, Any] = by_group(GroupTemperature, "temperature", default_factory=dict)
 
     def check(self) -> None:

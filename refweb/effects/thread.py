@@ -35,7 +35,7 @@ from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import quote
-from ..net.law_keys import points
+from ..net.law_keys import EITHER, points
 from ..net.materials import MATERIALS
 from ..net.threads import COLUMNS, TAUT, ThreadLine
 from ..registry import LAWS
@@ -231,12 +231,7 @@ class Thread(Table):
     """
 
     several = True
-    either: ClassVar[tuple[tuple[str, ...], ...]] = (
-        ("modulus", "density"),
-        ("material",),
-        ("stress", "density"),
-        ("tension", "density"),
-    )
+    either: ClassVar[tuple[tuple[str, ...], ...]] = EITHER
 
     name: str = text(limit=80)
     nodes: Several = nodes()
@@ -340,17 +335,14 @@ class Thread(Table):
             for i, node in enumerate(self.nodes):
                 if node in bodies:
                     over.append((len(rows) - 1, bodies[node]))
-                    continue
-                numbers = web.find(node, f"nodes[{i}]").tolist()
-                if len(numbers) != 1:
-                    raise InputError(f"nodes[{i}] = {quote(node)} is {len(numbers)} nodes, must be one")
-                rows += numbers
+                else:
+                    rows.append(web.find_one(node, f"nodes[{i}]"))
         self._refuse_repeated(rows)
         return np.array([*rows, rows[0]] if self.closed else rows, dtype=np.int32), over
 
     def add_internal(self, net: Net) -> Net:
         """The net with rows for the slips at rings with friction."""
-        if not self._in(net).rings:
+        if not net.thread_of(self.name).rings:
             return net
         from .thread_friction import with_slips
 
@@ -358,22 +350,19 @@ class Thread(Table):
 
     def settled(self, net: Net, x: Any) -> Any:
         """Displacement of all rows as a run begins from, None as it is given, with slips at rings with friction."""
-        if x is None or not self._in(net).rings:
+        thread = net.thread_of(self.name)
+        if x is None or not thread.rings:
             return x
         from .thread_friction import settled
 
-        return settled(self._in(net), net, x)
-
-    def _in(self, net):
-        """The `ThreadLine` of a net."""
-        return next(thread for thread in net.threads if thread.name == self.name)
+        return settled(thread, net, x)
 
     def on(self, net: Net) -> ForceTerm | list[ForceTerm]:
         """The terms of one cell; ``out`` of the first is tension, stress, strain and length.
 
         With friction tensions of segments and slips of rings follow these.
         """
-        thread = self._in(net)
+        thread = net.thread_of(self.name)
         if thread.wraps:
             from .winding import term
 

@@ -128,11 +128,9 @@ class Thrust(Table):
 
     def on(self, net: Net) -> ForceTerm:
         """The term of one element; ``out`` is the power [W]."""
-        nodes_found = net.web.find(self.node)
-        if len(nodes_found) != 1:
-            raise InputError(f"node = {quote(self.node)} is {len(nodes_found)} nodes, must be one")
-        line = self._line(net.web, nodes_found[0])
-        second = int(nodes_found[0] == net.web.lines[line, 1])
+        node = net.web.find_one(self.node)
+        line = self._line(net.web, node)
+        second = int(node == net.web.lines[line, 1])
         cell = np.flatnonzero(net.line == line)[-second]
         position, sign = float(second), 1.0 - 2.0 * second
         order = np.argsort(abs(net.places - position))

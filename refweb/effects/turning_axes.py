@@ -155,18 +155,10 @@ def kernels_of_velocity(nodes):
 
 
 def force_terms(net, frame, pull, **arguments):
-    """The terms of all rows with mass; with consistent mass also those of the lines.
+    """The terms of all rows of a net with mass; with consistent mass also those of the lines.
 
-    Parameters
-    ----------
-    net : refweb.net.net.Net
-        The net.
-    frame : refweb.effects.base.MovingFrame
-        Frame with Ω [rad/s].
-    pull : array_like, shape (3, 3)
-        G [1/s²].
-    **arguments
-        ``name`` and ``balance`` of the terms.
+    ``frame`` is a `MovingFrame` with Ω [rad/s], ``pull`` is G [1/s²], shape (3, 3), and ``arguments`` are ``name`` and
+    ``balance`` of the terms.
     """
     heavy = net.heavy
     turning = [body for body in net.bodies if body.spin is not None and not body.shape.planar]

@@ -71,18 +71,12 @@ def kernels(law, record, first, arms, gradients, weights):
 
     Parameters
     ----------
-    law : type or refweb.net.laws.law.Mixed
-        Law of the lines.
-    record : numpy.dtype
-        Numbers of an element that it reads, see `refweb.net.net.Net.law_record`.
+    law, record, gradients, weights
+        As of `refweb.effects.elasticity.kernels`.
     first : int
         Number of the column `ROW`.
     arms : int
         Number of arms.
-    gradients : tuple of tuple of float
-        dN/dξ by quadrature point and node.
-    weights : tuple of float
-        Quadrature weights.
     """
     points, nodes = len(gradients), len(gradients[0])
     flat = tuple(value for row in gradients for value in row)

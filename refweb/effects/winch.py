@@ -27,22 +27,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..accepted import accepts, any_of
 from ..errors import InputError
 from ..messages import nearest, quote
-from ..tables import Several, Table, checked, choice, field, nodes, real, rows, table, text
+from ..tables import Several, Table, choice, nodes, real, real_or_rows, table, text
 
 if TYPE_CHECKING:
     from ..net.net import Net
     from ..system.system import System
-
-_speed, _speeds = real(unit="m/s"), rows(2, increasing=True, unit="m/s")
-
-
-@accepts(any_of(_speed.metadata["read"].accepts, _speeds.metadata["read"].accepts))
-def _one_or_table(name, value):
-    """Read a speed, or a table of (t, speed)."""
-    return checked(name, value, _speeds if isinstance(value, list | tuple | np.ndarray) else _speed)
 
 
 @table
@@ -141,7 +132,7 @@ class Winch(Table):
     lines: Several = nodes(default=None, what="line")
     end: str | None = choice("first", "last", default=None)
     at: Several = nodes(default=None)
-    speed: Any = field(_one_or_table, default=None, unit="m/s")
+    speed: Any = real_or_rows(default=None, unit="m/s")
     limit: float | None = real(default=None, above=0.0, unit="N")
     tension: float | None = real(default=None, at_least=0.0, unit="N")
     power: float | None = real(default=None, unit="W")
@@ -254,10 +245,7 @@ class Winch(Table):
             return thread
         start = 0
         if self.at is not None:
-            drums = web.find(self.at, "at")
-            if len(drums) != 1:
-                raise InputError(f"at = {quote(self.at)} is {len(drums)} nodes, must be one")
-            passes = np.flatnonzero(thread.rows[:-1] == drums[0])
+            passes = np.flatnonzero(thread.rows[:-1] == web.find_one(self.at, "at"))
             if not len(passes):
                 raise InputError(f"at = {quote(self.at)} must be a node of {thread.title}, such as {thread.rows[0]}")
             start = int(passes[0])

@@ -247,13 +247,7 @@ def standing(net: Net) -> tuple[NDArray[np.bool_], Any]:
 
 
 def refuse_beside(net: Net) -> None:
-    """Refuse what changes natural lengths of lines on winches beside these, and other internal variables.
-
-    Raises
-    ------
-    InputError
-        For these.
-    """
+    """Refuse what changes natural lengths of lines on winches beside these, and other internal variables."""
     wound = elements_of(net)
     for elements, _ in net.factors:
         for element in np.intersect1d(elements, wound)[:1]:

@@ -75,9 +75,6 @@ class WoundFlow(NamedTuple):
     powered: bool
     wound = True
 
-    def _thread(self, net):
-        return next(thread for thread in net.threads if thread.name == self.thread)
-
     def _numbers(self, net):
         """(Cells, ½ρA of each cell [kg/m], law, dtype and width of `refweb.effects.thread_friction.kernels`)."""
         if self.thread is None:
@@ -86,7 +83,7 @@ class WoundFlow(NamedTuple):
             given, at = net, self.lines
             cells, width = net.cells[at], net.line_data.column(FIRST)
         else:
-            thread = self._thread(net)
+            thread = net.thread_of(self.thread)
             given, at = thread.line, [0]
             cells, width = thread.rows[None, :], given.line_data.matrix.shape[1]
         return cells, 0.5 * given.element_mass[at] / given.natural_length[at], (given.law, given.law_record, width)
@@ -119,7 +116,7 @@ class WoundFlow(NamedTuple):
             rows, drums, signs = cells, self._drums(system), -np.ones(cells.shape)
             slips = 3 * net.line_data.matrix[self.lines, net.line_data.column(FIRST) + 5].astype(int)
         else:
-            thread = self._thread(net)
+            thread = net.thread_of(self.thread)
             nodes = thread.rows
             ends = nodes[-2:] if thread.at_last else nodes[:2]
             rows = np.vstack([np.column_stack([nodes[:-2], nodes[2:]]), ends])
@@ -154,13 +151,12 @@ class WoundFlow(NamedTuple):
     def _term(self, net, name, acceleration, pull, frame, of_place):
         """A term of what depends on places, or on velocities, of the mass that is added."""
         cells, shares, kind = self._numbers(net)
-        thread = None if self.thread is None else self._thread(net)
-        if thread is None:
+        if self.thread is None:
             numbers = net.line_data.matrix[self.lines]
         else:
             from .thread_friction import numbers_of
 
-            numbers = numbers_of(thread)
+            numbers = numbers_of(net.thread_of(self.thread))
         field, nodes = np.zeros(len(cells), FIELD), np.zeros(cells.shape, NODE)
         field["acceleration"], field["pull"] = acceleration, pull
         field["speed"] = 0.0 if frame is None else frame.angular_velocity

@@ -21,7 +21,7 @@ from ..registry import LAWS
 from ..tables import LARGEST, Several, Table, by_group, choice, integer, nodes, numbers_by_name, part, real, rows, table
 from . import law_keys
 from .groups import givers
-from .law_keys import points
+from .law_keys import EITHER, points
 from .materials import FILLED, MATERIALS
 from .plastic_keys import LAW, check_yield, hardening_key, yield_curves
 from .tension_laws import law_of, names_in, strains_of
@@ -269,12 +269,7 @@ class Cable(Table):
         density = 200.0
     """
 
-    either: ClassVar[tuple[tuple[str, ...], ...]] = (
-        ("modulus", "density"),
-        ("material",),
-        ("stress", "density"),
-        ("tension", "density"),
-    )
+    either: ClassVar[tuple[tuple[str, ...], ...]] = EITHER
 
     law: str = choice(LAWS, default="smooth")
     material: str | None = choice(*MATERIALS, default=None)

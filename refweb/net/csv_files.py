@@ -32,20 +32,8 @@ ALIKE = 0.75
 def web_of(points, lines, columns=None, first=0):
     """The `Web` of the paths of its points and of its lines.
 
-    Parameters
-    ----------
-    points, lines : path-like
-        Both files.
-    columns : dict of str to str, optional
-        Columns in the files by the names in `NAMES`.
-    first : int
-        Number of the first point in the columns i and j.
-
-    Raises
-    ------
-    InputError
-        For missing files and files without rows; for wrong columns, cells and node numbers, whose first `LISTED` are in
-        the message.
+    ``columns`` are those in the files by the names in `NAMES`, and ``first`` is the number of the first point in the
+    columns i and j. Missing files, files without rows, and wrong columns, cells and node numbers are refused.
     """
     columns, problems = columns or {}, Problems()
     nodes, ends = (_table(path, known, columns, problems) for path, known in ((points, POINTS), (lines, LINES)))
@@ -156,7 +144,7 @@ def _check_ends(ends, pairs, count, first, problems):
         return
     numbers = np.column_stack(pairs)
     wrong = np.flatnonzero(((numbers < first) | (numbers >= first + count)).any(axis=1))
-    outside = [number for number in wrong if all(_is_whole(ends.columns[key][number]) for key in "ij")]
+    outside = [number for number in wrong if all(ends.columns[key][number].lstrip("+-").isdigit() for key in "ij")]
     for number in outside:
         problems.add(
             f"{ends.at(number)}: nodes {numbers[number].tolist()} must be {first} … {first + count - 1}, counted from "
@@ -164,10 +152,6 @@ def _check_ends(ends, pairs, count, first, problems):
         )
     if outside and first == 0 and numbers.min() == 1 and numbers.max() == count:
         problems.hint("first = 1 reads numbers that begin at 1")
-
-
-def _is_whole(text):
-    return text.lstrip("+-").isdigit()
 
 
 def _table(path, known, names, problems):

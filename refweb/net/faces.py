@@ -2,8 +2,8 @@
 
 May change: private functions, texts of findings and errors. Must stay: the edges as the last block of the mesh, where
 `mesh_file` finds them; each edge once; kinds of cells in `CORNERS`, which `mesh_file` takes for faces; the order of
-lines, by which scenes number them; `decided` and `group_names`, which `mesh_file` imports. Tests:
-``tests/net/test_faces.py``.
+lines, by which scenes number them; `counted`, `decided`, `group_names` and `pieces_of`, which `mesh_file` imports.
+Tests: ``tests/net/test_faces.py``.
 """
 
 from __future__ import annotations
@@ -29,29 +29,10 @@ CORNERS = {
 
 
 def decided(mesh, edges):
-    """The mesh without faces; their edges become lines if that is asked for or the file has no lines.
+    """(Mesh without faces, groups of edges by number of the edge, findings on automatic decisions), from a mesh.
 
-    Parameters
-    ----------
-    mesh : refweb.net.mesh_readers.Mesh
-        Content of the file.
-    edges : bool, optional
-        The key of that name.
-
-    Returns
-    -------
-    mesh : refweb.net.mesh_readers.Mesh
-        Without faces; the edges are its last block.
-    edge_groups : dict of str to ndarray of int
-        Edges of each group of faces, by their number among the edges.
-    notes : list of refweb.findings.Finding
-        Findings on automatic decisions.
-
-    Raises
-    ------
-    InputError
-        If the file lacks the kind of cells that ``edges`` needs, and if it has lines and faces and ``edges`` is not
-        given.
+    Edges of faces become lines, the last block, if the key ``edges`` asks for it, or if it is None and there are no
+    lines. An `InputError` where the file lacks what ``edges`` needs, or has lines and faces and ``edges`` is None.
     """
     faces = [block for block in mesh.blocks if block.kind in CORNERS and len(block.cells)]
     count, lines = sum(len(block.cells) for block in faces), bool(mesh.lines)
@@ -64,12 +45,13 @@ def decided(mesh, edges):
         return mesh._replace(blocks=others), {}, []
     if edges is None and lines:
         raise InputError(
-            f"it holds {_counted(mesh.blocks)} cells: a web has only lines; edges = false takes its lines alone, edges "
+            f"it holds {counted(mesh.blocks)} cells: a web has only lines; edges = false takes its lines alone, edges "
             f"= true the edges of its faces as well; or {mesh.remedy}"
         )
     pairs, of_face = _edges(faces, len(mesh.points))
     if lines:
-        fresh = ~np.isin(_keys(pairs, len(mesh.points)), _keys(_ends(mesh.lines), len(mesh.points)))
+        given = np.concatenate([pieces_of(block) for block in mesh.lines])
+        fresh = ~np.isin(_keys(pairs, len(mesh.points)), _keys(given, len(mesh.points)))
         number = np.where(fresh, np.cumsum(fresh) - 1, -1)
         pairs, of_face = pairs[fresh], [number[sides] for sides in of_face]
     edge_groups = _groups(faces, of_face)
@@ -81,7 +63,7 @@ def decided(mesh, edges):
     return mesh._replace(blocks=[*others, block]), edge_groups, notes
 
 
-def _counted(blocks):
+def counted(blocks):
     """Text of the numbers of cells: ``1 line, 2 triangle``."""
     counts = {}
     for block in blocks:
@@ -122,10 +104,10 @@ def _edges(faces, count):
     return pairs[real][first[order]], of_face
 
 
-def _ends(blocks):
-    """End nodes of each piece of the lines, shape (pieces, 2)."""
-    cells = [block.cells if block.kind == "polyline" else block.cells[:, :2] for block in blocks]
-    return np.concatenate([np.stack([c[:, :-1], c[:, 1:]], axis=2).reshape(-1, 2) for c in cells]).astype(np.int64)
+def pieces_of(block):
+    """End nodes of each piece of a block of lines, cell by cell, shape (pieces, 2)."""
+    cells = block.cells if block.kind == "polyline" else block.cells[:, :2]
+    return np.stack([cells[:, :-1], cells[:, 1:]], axis=2).reshape(-1, 2).astype(np.int64)
 
 
 def _keys(pairs, count):

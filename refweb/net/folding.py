@@ -95,16 +95,7 @@ def nearest_lines(points, lines, gap):
 def refuse_unfit(points, lines, length, gap):
     """Refuse positions with a taut line, a line without length, or two lines without common node within a gap.
 
-    Parameters
-    ----------
-    points : ndarray, shape (nodes, 3)
-        Positions [m].
-    lines : ndarray of int, shape (lines, 2)
-        Ends of the lines.
-    length : ndarray, shape (lines,)
-        Their natural lengths [m].
-    gap : float
-        Least distance of lines without a common node [m].
+    ``points (nodes, 3)`` and ``gap`` are in m, ``lines (lines, 2)`` are nodes, and ``length (lines,)`` is natural [m].
     """
     size = np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1)
     share = size / length

@@ -30,12 +30,7 @@ PLACES = ("inner", "anchors", "rim")
 def members(given, count):
     """Numbers of the lines of each group, a dict of increasing int64 arrays.
 
-    Parameters
-    ----------
-    given : None, sequence of str or dict of str to sequence of int
-        The group of each line, "" for none; or the lines of each group.
-    count : int
-        Number of lines.
+    ``given`` is None, the group of each of the ``count`` lines, "" for none, or a dict of the lines of each group.
     """
     if given is None:
         return {}
@@ -72,28 +67,11 @@ def by_place(lines, rim, nodes):
 
 
 def givers(groups, tables, count, where="groups"):
-    """Number of the table, by group, that sets each key on each line.
+    """Number of the table that sets a key on each line, shape (lines,), −1 for none, for each key that is set.
 
-    Parameters
-    ----------
-    groups : dict of str to ndarray of int
-        Lines of each group of a web.
-    tables : dict of str to refweb.tables.Table
-        Tables by name of the group; a key that is None is not given.
-    count : int
-        Number of lines.
-    where : str
-        Beginning of messages.
-
-    Returns
-    -------
-    dict of str to ndarray of int64, shape (lines,)
-        For each key that is set, the number of the table, −1 for none.
-
-    Raises
-    ------
-    InputError
-        For a group that the web does not have, and for a line with the same key from two groups.
+    ``groups`` are lines of each group of a web with ``count`` lines, ``tables`` by name of the group, of which a key
+    that is None is not given. A group that the web does not have, and a line with one key from two groups, are refused,
+    with a message that begins with ``where``.
     """
     owners, names = {}, list(tables)
     for number, (name, table) in enumerate(tables.items()):

@@ -20,6 +20,8 @@ from .tension_laws import law_of, names_in
 
 CURVES = {"stress": "Pa", "tension": "N"}
 """Keys of a curve over strain, and their units."""
+EITHER = (("modulus", "density"), ("material",), ("stress", "density"), ("tension", "density"))
+"""Sets of keys of which a cable or a thread has one at least."""
 
 
 def points(*, unit) -> Any:
@@ -68,14 +70,8 @@ def check(cable, own_modulus):
 def curves_of(cable, laws, given):
     """The `refweb.net.laws.curve.Curve` of each line of the law "table", None of others, an array of objects.
 
-    Parameters
-    ----------
-    cable : refweb.net.cable.Cable
-        The cable.
-    laws : ndarray of str, shape (lines,)
-        Name of the law of each line.
-    given : dict of str to ndarray
-        Number of the group that gives each key of a line, see `refweb.net.groups.givers`.
+    ``laws`` are names, shape (lines,), and ``given`` is the number of the group that gives each key of a line, see
+    `refweb.net.groups.givers`.
     """
     curves, tables = np.full(len(laws), None), [cable, *cable.groups.values()]
     names = ["", *(f".groups.{short(name)}" for name in cable.groups)]
@@ -132,10 +128,7 @@ def with_springs(values, modulus):
 def parameters_of(cable, laws, given):
     """Numbers of lines by the columns of laws of other packages, a dict of arrays of shape (lines,).
 
-    Raises
-    ------
-    InputError
-        For a parameter that the law of a line does not have, needs, or takes no such value of.
+    A parameter that the law of a line does not have, needs, or takes no such value of, is refused.
     """
     columns, owner = {}, given.get("parameters", np.full(len(laws), -1))
     tables = [("[cable]", cable), *((f"[cable.groups.{short(key)}]", group) for key, group in cable.groups.items())]

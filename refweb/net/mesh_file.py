@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..accepted import accepts, by_name
-from ..errors import InputError
+from ..errors import InputError, refused_at
 from ..findings import Finding
 from ..messages import nearest, quote
 from ..tables import Table, boolean, choice, field, integer, table, text
 from .csv_files import NAMES
-from .faces import CORNERS, decided, group_names
+from .faces import CORNERS, counted, decided, group_names, pieces_of
 from .groups import members
 from .web import Web
 
@@ -125,7 +125,7 @@ class File(Table):
             if (value := getattr(self, key)) is not None:
                 kinds = "of mesh files, not of CSV" if csv else "of CSV files"
                 raise InputError(f"{key} = {quote(value)} is a key {kinds}: leave it out beside {quote(self.path)}")
-        try:
+        with refused_at(f"path = {quote(self.path)}:"):
             if self.lines is not None:
                 from .csv_files import web_of
 
@@ -133,8 +133,6 @@ class File(Table):
             from .mesh_readers import read
 
             return _web_of(read(folder / self.path), self.edges)
-        except InputError as error:
-            raise InputError(f"path = {quote(self.path)}: {error}") from None
 
 
 def remarks(web):
@@ -237,25 +235,20 @@ def _kept(mesh, lines, rim, count, unused):
 
 def _check_cells(mesh):
     """Refuse cells that are no lines, with their kinds."""
-    counts = {}
-    for block in mesh.blocks:
-        counts[block.kind] = counts.get(block.kind, 0) + len(block.cells)
-    unsupported = set(counts) - set(INNER) - {"polyline", *HARMLESS, *CORNERS}
-    if unsupported or not (mesh.lines or any(counts.get(kind) for kind in CORNERS)):
-        text = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())) or "no"
-        raise InputError(f"it holds {text} cells: a web has only lines; {mesh.remedy}")
+    unsupported = {block.kind for block in mesh.blocks} - {*INNER, "polyline", *HARMLESS, *CORNERS}
+    if unsupported or not (mesh.lines or any(block.kind in CORNERS and len(block.cells) for block in mesh.blocks)):
+        raise InputError(f"it holds {counted(mesh.blocks) or 'no'} cells: a web has only lines; {mesh.remedy}")
 
 
 def _segments(blocks, points):
     """Lines (n, 2) of all blocks, the cell of each, and its share of the length of the cell."""
     lines, of, share, first = [], [], [], 0
     for block in blocks:
-        cells = block.cells if block.kind == "polyline" else block.cells[:, :2]
-        pieces = cells.shape[1] - 1
-        pairs = np.stack([cells[:, :-1], cells[:, 1:]], axis=2).reshape(-1, 2).astype(np.int64)
+        pairs = pieces_of(block)
+        pieces = len(pairs) // len(block.cells)
         lines.append(pairs)
-        of.append(first + np.repeat(np.arange(len(cells)), pieces))
-        first += len(cells)
+        of.append(first + np.repeat(np.arange(len(block.cells)), pieces))
+        first += len(block.cells)
         if pieces == 1:
             share.append(np.ones(len(pairs)))
             continue

@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import InputError
+from ..messages import nearest, quote
 from .laws.law import record_of, together
 
 if TYPE_CHECKING:
@@ -205,6 +207,22 @@ class Net:
         """Rows carried by bodies that are not fixed, a list: attached nodes, and bodies that are off their axles."""
         off_axle = [body.row for body in self.bodies if body.pivot is not None]
         return off_axle + [node for body in self.bodies if not body.fixed for node in body.carried]
+
+    def body_of(self, name: str, key: str = "body") -> RigidBody:
+        """The body of a name, which a key of a table gives; refuses one that none has."""
+        names = [body.name for body in self.bodies]
+        if name not in names:
+            hint = nearest(name, names) if names else "the scene has no [[body]]"
+            raise InputError(f"{key} = {quote(name)} is not a [[body]], {hint}")
+        return self.bodies[names.index(name)]
+
+    def thread_of(self, name: str) -> Any:
+        """The `refweb.net.threads.ThreadLine` of a name that one has."""
+        return next(thread for thread in self.threads if thread.name == name)
+
+    def with_turning(self, turning: RigidBody) -> Net:
+        """The net in which the rotation of a body is followed."""
+        return replace(self, bodies=tuple(replace(b, turns=b.turns or b is turning) for b in self.bodies))
 
     @property
     def order(self) -> int:

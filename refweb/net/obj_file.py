@@ -22,21 +22,10 @@ NO_GROUP = ("off", "default", "all")
 
 
 def read_obj(path):
-    """Read an OBJ file.
+    """Read (positions, shape (n, 3), lines, faces, group of each line, group of each face) of an OBJ file.
 
-    Returns
-    -------
-    points : ndarray, shape (n, 3)
-        Positions, in the unit of the file.
-    lines, faces : list of list of int
-        Points of each polyline and around each face, from 0.
-    line_groups, face_groups : list of str
-        Group of each, from the last row ``g NAME``; "" for none.
-
-    Raises
-    ------
-    InputError
-        For a file that is no text, a point without three numbers, and an element with unknown points.
+    Lines and faces are lists of points, from 0. A group is that of the last row ``g NAME``, "" for none. A file that is
+    no text, a point without three numbers, and an element with unknown points are refused.
     """
     points, group = [], ""
     cells, names = {kind: [] for kind in SIDES}, {kind: [] for kind in SIDES}

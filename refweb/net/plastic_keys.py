@@ -8,31 +8,20 @@ equally many points in the curves of all lines, which `effects.plastic` needs; `
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from ..accepted import accepts, any_of
 from ..errors import InputError
 from ..messages import short
-from ..tables import LARGEST, field, real, rows
+from ..tables import LARGEST, real_or_rows
 from .groups import givers
 
 LAW = "elastic-plastic"
 KEYS = ("yield_stress", "hardening")
 
 
-def hardening_key() -> Any:
+def hardening_key():
     """A modulus of hardening, or points (plastic strain, stress); None by default."""
-    number, listed = real(at_least=0, unit="Pa").metadata["read"], rows(2, increasing=True).metadata["read"]
-
-    @accepts(any_of(number.accepts, listed.accepts))
-    def read(name, value):
-        if not (isinstance(value, (list, tuple)) or getattr(value, "ndim", 0) > 0):
-            return number(name, value)
-        return listed(name, value)
-
-    return field(read, default=None)
+    return real_or_rows(default=None, at_least=0, unit="Pa")
 
 
 def _check_points(points, where):
@@ -71,17 +60,7 @@ def check_yield(cable):
 def plastic_strain_of(stress, curves):
     """Plastic strain at which each line yields at a stress [Pa], 0 below its yield stress; shape (lines,).
 
-    Parameters
-    ----------
-    stress : ndarray, shape (lines,)
-        The stresses [Pa].
-    curves : ndarray of ndarray, shape (lines,)
-        That of `yield_curves` of each line.
-
-    Raises
-    ------
-    InputError
-        For a stress that no hardening reaches.
+    ``curves`` are those of `yield_curves`. A stress that no hardening reaches is refused.
     """
     strain = np.zeros(len(stress))
     for line in np.flatnonzero([value > curve[0, 1] for value, curve in zip(stress, curves, strict=True)]):

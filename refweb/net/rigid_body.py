@@ -21,7 +21,7 @@ A shape is a class whose fields are its keys in ``[[body]]``. All that lies behi
         drawn: float = real(default=2.0, above=0, unit="m")  # one with a default: edge of the square that is drawn
         def check(self):  # raises `refweb.errors.InputError` for what cannot be, here a normal that is zero
             self.frame()
-        def frame(self):  # unit vectors of the axes; x, y and z where it is left out
+        def frame(self):  # unit vectors of the axes; where it is left out, by a key axis, normal or axes
             return axes_about("normal", self.normal)
         def grown(self):  # radius of growth, and half sizes of the core: of the box that it fills
             return Grown(0.0, (np.inf, np.inf, np.inf))
@@ -51,8 +51,8 @@ refuses a shape without one. An entry point of your package makes it known to sc
 # and kernels of effects.contact read; names of fields of `RigidBody`, which effects, system and results read; rows of
 # bodies behind the nodes and rows of rotation behind these, which checkpoints name by `row_names`. Other tests:
 # tests/effects/test_contact.py, tests/effects/test_tumbling.py. Must stay as well: `matrix_of`, which
-# `dynamics.initial_state` and `effects.body` import; `axes_of`, which `effects.orbit`, `shapes.box` and `shapes.filled`
-# import; `Axle`, which `effects.axle` imports; `with_rotations`, which `system.system` imports.
+# `dynamics.initial_state` and `effects.body` import; `axes_of`, which `effects.orbit` imports; `Axle`, which
+# `effects.axle` imports; `with_rotations`, which `system.system` imports.
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class Shape(Table):
     error : float, optional
         Largest distance of the surface of contact from the given surface [m], if they differ.
     directions : tuple of str
-        Keys of the directions of its axes.
+        Keys of the directions of its axes: of two, ``axes``, or of the third, ``axis`` or ``normal``.
     """
 
     free = False
@@ -140,9 +140,17 @@ class Shape(Table):
         radius, core, *_ = self.grown()
         return radius + float(np.linalg.norm(core))
 
+    def check(self) -> None:
+        """Refuse a direction that is zero, and axes that are not at right angles."""
+        if any(getattr(self, key, None) is not None for key in self.directions):
+            self.frame()
+
     def frame(self) -> NDArray[np.float64]:
-        """Unit vectors of its axes, right-handed, shape (3, 3)."""
-        return np.eye(3)
+        """Unit vectors of its axes, right-handed, shape (3, 3), by its key among ``directions``."""
+        for key in ("axis", "normal"):
+            if hasattr(self, key):
+                return axes_about(key, getattr(self, key))
+        return axes_of(getattr(self, "axes", None))
 
     def remarks(self) -> Iterable[str]:
         """Texts of warnings on its input."""

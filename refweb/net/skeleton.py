@@ -120,12 +120,7 @@ def of_cylinder(grown: Grown) -> NDArray[Any]:
 def of_surface(corners: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[Any]:
     """Parts of a surface of triangles (t, 3), outward, with corners (n, 3): its convex edges, by `FLAT`.
 
-    Edges of one triangle, at the intersection of parts of a solid, do not count.
-
-    Raises
-    ------
-    InputError
-        For more than `MOST` of them.
+    Edges of one triangle, at the intersection of parts of a solid, do not count. More than `MOST` of them are refused.
     """
     a, b, c = (corners[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)

@@ -29,13 +29,7 @@ if TYPE_CHECKING:
 
 
 def law_of(name) -> Any:
-    """Class of a law by its name.
-
-    Raises
-    ------
-    InputError
-        For an unknown name.
-    """
+    """Class of a law by its name; refuses an unknown one."""
     if not known(LAWS, name):
         raise InputError(f'law = "{name}" is unknown, {nearest(name, possible(LAWS))}')
     return load(LAWS[name])
@@ -139,7 +133,8 @@ def strains_of(values, tension):
         for line in np.flatnonzero(lines & (tension < 0.0))[:1] if not law.bar else ():
             raise InputError(f'line {line} pushes with {-tension[line]:g} N, and law = "{name}" does not: use "linear"')
         own_values = {key: value[lines] for key, value in values.items()}
-        axial, numbers = own_values["modulus"] * own_values["area"], law_numbers(law, own_values)
+        axial, smooth = own_values["modulus"] * own_values["area"], ("slackness", "smoothing")
+        numbers = {key: own_values[key] for key in smooth} | law.numbers(own_values)
         strain[lines] = law.strain_of(tension[lines], LineData.of_law(axial, **numbers))
         if law.plastic:
             strain += plastic_strain_of(np.where(lines, tension / values["area"], 0.0), values["yield_curve"])
@@ -150,8 +145,3 @@ def strains_of(values, tension):
     for line in np.flatnonzero(strain <= -1.0)[:1]:
         raise InputError(f"line {line} pushes with {-tension[line]:g} N, more than its EA: give it a larger area")
     return strain
-
-
-def law_numbers(law, values):
-    """Numbers of lines of a law by column: slackness, smoothing, and those that the law has besides."""
-    return {"slackness": values["slackness"], "smoothing": values["smoothing"], **law.numbers(values)}

@@ -187,10 +187,7 @@ def thread_line(
 ) -> ThreadLine:
     """The `ThreadLine` of a cable through nodes at some places [m], shape (nodes, 3), and over bodies by `wraps`.
 
-    Raises
-    ------
-    InputError
-        If all nodes are in one point, and for what the cable refuses.
+    All nodes in one point are refused, and what the cable refuses.
     """
     vectors = np.diff(places, axis=0)
     distances = np.linalg.norm(vectors, axis=1)

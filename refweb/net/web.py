@@ -203,6 +203,13 @@ class Web:
             numbers = [self._find_one(name, selection)]
         return np.array(list(dict.fromkeys(chain(*numbers))), dtype=np.int64)
 
+    def find_one(self, selection: Any, name: str = "node") -> int:
+        """Number of the one node of a selection; refuses several, and what `find` refuses."""
+        numbers = self.find(selection, name)
+        if len(numbers) != 1:
+            raise InputError(f"{name} = {quote(selection)} is {len(numbers)} nodes, must be one")
+        return int(numbers[0])
+
     def find_around(self, selection: Any) -> NDArray[np.int64]:
         """Find nodes, as `find`; nodes of one name in counterclockwise order around their middle."""
         numbers = self.find(selection)

@@ -15,7 +15,7 @@ from ..results.units import readable
 from .histories import bounds_of, clock_of, tick_steps
 from .limits import limit
 from .plot_data import unit_of
-from .sheet import COLOURS, DARK, LOW, STYLES, TALL, Ink, Panel, dot, label, legend, telling
+from .sheet import COLOURS, DARK, LOW, STYLES, TALL, Ink, Panel, curve, dot, label, legend, telling
 
 AXES = "xyz"
 FLOATING = ("potential_energy", "frame_energy", "orbit_energy")
@@ -136,9 +136,7 @@ def _drifts(runs, what, second, clock):
     def draw(axes):
         entries = []
         for s, drift in zip(runs, drifts, strict=True):
-            mask = telling(drift)
-            style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.2}
-            (line,) = axes.plot(s.along[mask] / second, drift[mask] / factor, marker=dot(mask), **style)
+            line = curve(axes, s.ink, s.along / second, drift / factor, 1.2)
             said = s.said(_share(s, "energy_drift", what))
             entries += [(line, said)] if said else []
         label(axes, "drift", unit)
@@ -166,9 +164,7 @@ def _energies_beside(runs):
 
         def draw(axes):
             for s in having:
-                mask = telling(s.history[name])
-                style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.4}
-                axes.plot(s.along[mask] / second, s.history[name][mask] / factor, marker=dot(mask), **style)
+                curve(axes, s.ink, s.along / second, s.history[name] / factor)
             values = np.concatenate([s.history[name] for s in having]) / factor
             limit(axes, values, bounds=bounds_of(having, name, factor))
             label(axes, name.removesuffix("_energy").replace("_", " "), unit)
@@ -276,17 +272,11 @@ def _momenta(axes, s, book, second, factor, several):
     at, entries = s.along / second, []
     curves = {"momentum of all that is free": book.momentum, **book.impulses}
     for number, (words, values) in enumerate(curves.items()):
-        ink = Ink.of(number)
-        style = {"color": s.ink.colour if several else ink.colour, "linestyle": ink.style}
-        mask = telling(values)
-        (line,) = axes.plot(
-            at[mask], values[mask] / factor, marker=dot(mask), linewidth=1.6 if number == 0 else 1.1, **style
-        )
+        ink, colour = Ink.of(number), s.ink.colour if several else Ink.of(number).colour
+        line = curve(axes, ink, at, values / factor, 1.6 if number == 0 else 1.1, color=colour)
         handle = line if not several else axes.plot([], [], color=DARK, linestyle=ink.style)[0]
         entries.append((handle, words))
-    mask = telling(book.given)
-    style = {"color": DARK, "linestyle": STYLES[3], "linewidth": 2.2}
-    (line,) = axes.plot(at[mask], book.given[mask] / factor, **style, zorder=3)
+    line = curve(axes, Ink(DARK, STYLES[3], ""), at, book.given / factor, 2.2, marker="", zorder=3)
     return [*entries, (line, "at the start + impulses")]
 
 
@@ -298,9 +288,9 @@ def _momentum_drifts(runs, books, second, clock):
     def draw(axes):
         entries = []
         for s, axis, drift in drifts:
-            mask, ink = telling(drift), Ink.of(AXES.index(axis))
-            style = {"color": s.ink.colour if s.name else ink.colour, "linestyle": ink.style, "linewidth": 1.2}
-            (line,) = axes.plot(s.along[mask] / second, drift[mask] / factor, marker=dot(mask), **style)
+            ink = Ink.of(AXES.index(axis))
+            colour = s.ink.colour if s.name else ink.colour
+            line = curve(axes, ink, s.along / second, drift / factor, 1.2, color=colour)
             if s is runs[0]:
                 handle = line if not s.name else axes.plot([], [], color=DARK, linestyle=ink.style)[0]
                 entries.append((handle, f"along {axis}"))

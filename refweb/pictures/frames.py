@@ -86,26 +86,17 @@ class Frame(NamedTuple):
         """The frame with displacements times a factor; a mode is also multiplied by its phase −1…1."""
         if self.swing is not None:
             further = scale * phase - 1.0
-            swung = {
-                name: body._replace(points=body.points + further * body.swing) for name, body in self.bodies.items()
-            }
-            return self._replace(paths=self.paths + further * self.swing, bodies=swung)
+            bodies = {name: body.shifted(further * body.swing) for name, body in self.bodies.items()}
+            return self._replace(paths=self.paths + further * self.swing, bodies=bodies)
         if scale == 1.0:
             return self
-        bodies = {
-            name: body._replace(points=body.points + (scale - 1.0) * body.displacement)
-            for name, body in self.bodies.items()
-        }
-        paths = self.origin + scale * (self.paths - self.origin)
-        supports = self.supports + (scale - 1.0) * self.lifted
-        return self._replace(paths=paths, supports=supports, bodies=bodies, masses=self._masses_posed(scale))
-
-    def _masses_posed(self, scale):
-        """Point masses with displacements times a factor."""
-        masses = self.masses
-        if masses is None:
-            return None
-        return masses._replace(points=masses.points + (scale - 1.0) * masses.displacement)
+        further, masses = scale - 1.0, self.masses
+        return self._replace(
+            paths=self.origin + scale * (self.paths - self.origin),
+            supports=self.supports + further * self.lifted,
+            bodies={name: body.shifted(further * body.displacement) for name, body in self.bodies.items()},
+            masses=masses and masses._replace(points=masses.points + further * masses.displacement),
+        )
 
 
 class Body(NamedTuple):
@@ -118,6 +109,10 @@ class Body(NamedTuple):
     triangles: np.ndarray
     displacement: np.ndarray
     swing: np.ndarray
+
+    def shifted(self, by):
+        """The body with its points moved by vectors [m]."""
+        return self._replace(points=self.points + by)
 
 
 class Masses(NamedTuple):
@@ -136,17 +131,9 @@ class Listed(NamedTuple):
 
 
 def listed(folder):
-    """Read the list of frames in ``web.pvd``.
+    """Read ``web.pvd``: frames by number, ascending, each a `Listed` with the mesh ``web``.
 
-    Returns
-    -------
-    dict of int to Listed
-        Frames by number, ascending; each has the mesh ``web``.
-
-    Raises
-    ------
-    InputError
-        If ``web.pvd`` cannot be read or lists no web.
+    A file that cannot be read or lists no web is refused.
     """
     if not Path(folder).is_dir():
         raise InputError(f"{folder} is not a folder")
@@ -179,13 +166,7 @@ def number_of(frame, known):
 
 
 def read(folder, number, known_paths=None):
-    """Read one frame of a result folder, whose `listed` frames may be given.
-
-    Raises
-    ------
-    InputError
-        If the frame cannot be read or has positions that are not finite.
-    """
+    """Read one frame of a result folder, whose `listed` frames may be given; refuses positions that are not finite."""
     time, paths = (known_paths or listed(folder))[number]
     web = _mesh(paths["web"])
     if not np.isfinite(web.points).all():
@@ -197,20 +178,9 @@ def read(folder, number, known_paths=None):
 
 
 def frame_of(number, time, meshes, supported, point_mass=None):
-    """Make a frame from meshes.
+    """Make a frame from meshes by name, the ``web`` and bodies, as `refweb.results.vtu.meshes` makes them.
 
-    Parameters
-    ----------
-    number : int
-        Its number.
-    time : float
-        Its time [s], or load step.
-    meshes : dict of str to meshio.Mesh
-        ``web``, and bodies by name, as `refweb.results.vtu.meshes` makes them.
-    supported : ndarray of bool, shape (points,)
-        True for supported points of the web.
-    point_mass : ndarray, shape (points,), optional
-        Point mass on each point of the web [kg].
+    ``supported (points,)`` is True for supported points of the web, and ``point_mass (points,)`` is in kg.
     """
     web = meshes["web"]
     origin = web.points - web.point_data.get("displacement", 0.0)
@@ -226,16 +196,13 @@ def frame_of(number, time, meshes, supported, point_mass=None):
     amplitude = _amplitude(web.points, web.point_data["shape"]) if "shape" in web.point_data else 0.0
     bodies = {name: _surface(mesh, amplitude) for name, mesh in meshes.items() if name != "web"}
     ends = np.concatenate([cells[:, :2] for _, cells in blocks])
-    lifted = np.broadcast_to(web.points - origin, web.points.shape)[supported]
-    swing = None
+    moved, swing, masses = np.broadcast_to(web.points - origin, web.points.shape), None, None
     if "shape" in web.point_data:
         mode = amplitude * web.point_data["shape"]
         swing = np.concatenate([_curves(mode[cells], samples) for _, cells in blocks])
-    fixed = web.points[supported]
-    masses = None
     if point_mass is not None and len(at := np.flatnonzero(point_mass[: len(web.points)] > 0.0)):
-        moved = np.broadcast_to(web.points - origin, web.points.shape)
         masses = Masses(web.points[at], moved[at], point_mass[at])
+    fixed, lifted = web.points[supported], moved[supported]
     return Frame(number, time, paths, start, tree, fields, slack, fixed, bodies, ends, lifted, swing, masses)
 
 

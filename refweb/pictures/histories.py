@@ -13,7 +13,7 @@ import numpy as np
 from ..results.units import scale_of
 from .limits import Bar, bar_of, limit
 from .plot_data import bar, text_of, unit_of
-from .sheet import COLOURS, DARK, LETTERS, MARKERS, PALE, STYLES, Panel, dot, label, legend, telling
+from .sheet import COLOURS, DARK, LETTERS, MARKERS, PALE, STYLES, Panel, curve, label, legend
 
 OF_ALL = "Points: results of all steps, with ± where it is known. Lines: rows of the history."
 MOST_TICKS = 12
@@ -31,10 +31,7 @@ def history(runs, name):
     def draw(axes):
         entries, bars = [], []
         for s in having:
-            mask = telling(s.history[name])
-            style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.4}
-            style["marker"] = dot(mask)
-            (line,) = axes.plot(s.along[mask] / second, s.history[name][mask] / factor, **style)
+            line = curve(axes, s.ink, s.along / second, s.history[name] / factor)
             result = s.results.get(name)
             if result is None or not np.isfinite(result.value):
                 entries += [(line, s.name or "")] if s.name else []
@@ -43,7 +40,7 @@ def history(runs, name):
             ink = {"color": s.ink.colour, "markeredgecolor": DARK, "capsize": 5.0, "elinewidth": 2.0, "markersize": 6.0}
             point = axes.errorbar(result.time / second, result.value / factor, error, fmt=s.ink.marker, **ink, zorder=3)
             bars.append(bar_of(result.time / second, result, factor, error))
-            entries.append((point, s.said(f"{text_of(result)} at t = {_time(result.time, second, clock)}")))
+            entries.append((point, s.said(f"{text_of(result)} at t = {result.time / second:.6g} {clock}")))
         marks(axes, having, second)
         values = np.concatenate([s.history[name] for s in having]) / factor
         limit(axes, values, bars, bounds_of(having, name, factor), called)
@@ -85,10 +82,6 @@ def clock_of(runs):
     """Factor and name of the unit of time of some runs: s, with a prefix for runs below 0.1 s."""
     longest = max((float(np.abs(s.along).max(initial=0.0)) for s in runs), default=0.0)
     return (1.0, "s") if longest >= 0.1 else scale_of(longest, "s")
-
-
-def _time(value, factor, name):
-    return f"{value / factor:.6g} {name}"
 
 
 def marks(axes, runs, second):
@@ -139,9 +132,7 @@ def tick_steps(axes, steps):
 def of_modes(runs, name):
     """The panel of a column of the table of modes over the number of the mode, at the last load step."""
     last = [s.history["step"] == s.history["step"][-1] for s in runs]
-    pairs = [
-        (s.history["mode"][rows_here], s.history[name][rows_here]) for s, rows_here in zip(runs, last, strict=True)
-    ]
+    pairs = [(s.history["mode"][rows], s.history[name][rows]) for s, rows in zip(runs, last, strict=True)]
     return _columns(runs, name, "mode", pairs)
 
 
@@ -176,17 +167,18 @@ def frequencies(runs):
             table = s.history
             table_of = {"step": table["step"], "mode": table["mode"], "frequency": table["frequency"] / factor}
             errors = table["error"] / factor
-            count = (max(errors, default=0.0), len(np.unique(table_of["mode"])))
-            draw_one = _over_steps if several else _over_modes
-            handle = draw_one(axes, table_of, errors, s)
-            entries.append((handle, s.said(f"{count[1]} modes, ± at most {count[0]:.2g} {called}")))
-            columns = (table_of["step" if several else "mode"], table_of["frequency"], errors, errors)
-            bars += [Bar(*row) for row in zip(*columns, strict=True)]
+            at, count = table_of["step" if several else "mode"], len(np.unique(table_of["mode"]))
+            if several:
+                handle = _over_steps(axes, table_of, errors, s)
+            else:
+                ink = {"color": s.ink.colour, "capsize": 5.0, "elinewidth": 2.0, "markersize": 7.0}
+                handle = axes.errorbar(at, table_of["frequency"], errors, fmt=s.ink.marker, **ink)
+            entries.append((handle, s.said(f"{count} modes, ± at most {max(errors, default=0.0):.2g} {called}")))
+            bars += [Bar(*row) for row in zip(at, table_of["frequency"], errors, errors, strict=True)]
             unstable = table_of["frequency"] < 0
             if unstable.any():
-                at = table_of["step" if several else "mode"][unstable]
                 style = {"color": DARK, "marker": "x", "linestyle": "", "markersize": 10, "markeredgewidth": 2.5}
-                (cross,) = axes.plot(at, table_of["frequency"][unstable], **style, zorder=4)
+                (cross,) = axes.plot(at[unstable], table_of["frequency"][unstable], **style, zorder=4)
                 entries.append((cross, "below zero: imaginary, unstable"))
             if several and not s.name:
                 _number_modes(axes, table_of)
@@ -199,11 +191,6 @@ def frequencies(runs):
         legend(axes, entries)
 
     return [Panel(draw, "load step" if several else "mode", 3.6)]
-
-
-def _over_modes(axes, table, errors, s):
-    ink = {"color": s.ink.colour, "fmt": s.ink.marker, "capsize": 5.0, "elinewidth": 2.0, "markersize": 7.0}
-    return axes.errorbar(table["mode"], table["frequency"], errors, **ink)
 
 
 def _over_steps(axes, table, errors, s):

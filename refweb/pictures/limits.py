@@ -76,17 +76,7 @@ def window(values, bars=(), bounds=(-np.inf, np.inf)):
 
 
 def limit(axes, values, bars=(), bounds=(-np.inf, np.inf), unit=""):
-    """Set the vertical axis to the `window` of some values, and mark the bars that it cuts.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        The axes.
-    values, bars, bounds
-        As for `window`.
-    unit : str
-        Unit of the axis, which is printed with ±.
-    """
+    """Set the vertical axis to the `window` of some values, and mark the bars that it cuts, with ± in the unit."""
     ends = window(values, bars, bounds)
     if ends is None:
         return

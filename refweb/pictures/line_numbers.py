@@ -19,21 +19,8 @@ MOST, LOOKED_AT = 200, 20_000
 def number_lines(page, views, frame, field):
     """Write numbers of lines on a page, in its view in perspective if there is one, else in its first.
 
-    Parameters
-    ----------
-    page : matplotlib.figure.Figure
-        The page, with an axes for each view.
-    views : list of refweb.pictures.camera.View
-        Its views.
-    frame : refweb.pictures.frames.Frame
-        The frame that is drawn.
-    field : str
-        The field whose largest values come first.
-
-    Returns
-    -------
-    str
-        Remark on lines without a number; empty if all have one.
+    The page is a figure with an axes for each of its ``views``. Lines with the largest values of a field of the frame
+    come first. Returns a remark on lines without a number; empty if all have one.
     """
     from matplotlib.patheffects import withStroke
 

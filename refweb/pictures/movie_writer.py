@@ -21,20 +21,11 @@ ALMOST_WHITE = 247
 
 
 def write(path, images, seconds, samples, certain):
-    """Write images to a ``.gif`` or an ``.mp4``.
+    """Write images of pillow, RGB, from an iterator to a ``.gif`` or an ``.mp4``.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file.
-    images : iterator of PIL.Image.Image
-        Images, RGB. A GIF needs 1 byte of memory for each pixel of all images, an MP4 the memory of one image.
-    seconds : list of float
-        Duration of each image [s]; the first is the shortest.
-    samples : list of PIL.Image.Image
-        Images from which the palette of a GIF is made.
-    certain : ndarray of int, shape (colours, 3)
-        Colours that the palette contains in any case, 0 to 255.
+    A GIF needs 1 byte of memory for each pixel of all images, an MP4 the memory of one image. Each image has a duration
+    in ``seconds``, of which the first is the shortest. The palette of a GIF is made from images ``samples``, and has
+    the colours ``certain (colours, 3)``, 0 to 255, in any case.
     """
     if path.suffix.lower() == ".gif":
         palette = _palette(samples, certain)

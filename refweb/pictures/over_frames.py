@@ -23,16 +23,7 @@ MISSED = 1e-3
 def with_largest(record, field):
     """A record whose frames have the field ``largest_NAME``: the largest NAME of each line over all frames.
 
-    Parameters
-    ----------
-    record : refweb.pictures.record.Record
-        The record.
-    field : str or None
-        The field to draw; for other fields the record is returned unchanged.
-
-    Returns
-    -------
-    refweb.pictures.record.Record
+    For another field to draw, or None, it is the given `refweb.pictures.record.Record`.
     """
     base = field.removeprefix(LARGEST) if isinstance(field, str) and field.startswith(LARGEST) else ""
     if not base or not record.times or base not in record.frame(next(iter(record.times))).fields:
@@ -82,17 +73,7 @@ def on_frames(record, field):
 
 
 def on_peak(record, field, high):
-    """Sentence on the peak of a field over the run, if all frames are below it; else empty.
-
-    Parameters
-    ----------
-    record : refweb.pictures.record.Record
-        The run.
-    field : str
-        The field that is drawn.
-    high : float
-        Its largest value in all frames [SI].
-    """
+    """Sentence on the peak of a field over the run, if it is above the largest in all frames [SI]; else empty."""
     name = field.removeprefix(LARGEST)
     peak = _peak(record, name)
     if peak is None or not peak.value > high + MISSED * abs(high):

@@ -24,27 +24,11 @@ SIZE = (1600, 1000)
 
 
 def script(folder, field=None, out=None):
-    """Write a script for ``paraview --script=FILE`` or ``pvpython FILE``.
+    """Write a script for ``paraview --script=FILE`` or ``pvpython FILE`` into a result folder; returns its path.
 
-    Parameters
-    ----------
-    folder : path-like
-        A result folder.
-    field : str, optional
-        Field of the colours, as in `refweb.picture`.
-    out : path-like, optional
-        A ``.py`` to write; default ``web_in_paraview.py`` in the folder. The script looks for the result folder beside
-        itself, then at the path at which it was written.
-
-    Returns
-    -------
-    pathlib.Path
-        The file written.
-
-    Raises
-    ------
-    InputError
-        If the folder is no result folder or has no such field, and if the file cannot be written.
+    The field of the colours is that of `refweb.picture`. ``out`` is another ``.py`` to write. The script looks for the
+    result folder beside itself, then at the path at which it was written. A folder or field that there is not, and a
+    file that cannot be written, are refused.
     """
     folder = Path(folder)
     record = of_folder(folder)

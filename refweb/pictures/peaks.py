@@ -47,21 +47,9 @@ class Largest(NamedTuple):
 
 
 def largest_tension(summary, scene, of_frames=None):
-    """The `Largest` tension of a run.
+    """The `Largest` tension of a run, from the content of ``run.json`` and of the scene file; None if it is not known.
 
-    Parameters
-    ----------
-    summary : dict
-        The content of ``run.json``.
-    scene : dict
-        The tables of the scene file.
-    of_frames : callable, optional
-        Returns the `Largest` of the frames, or None; called if no other value is known.
-
-    Returns
-    -------
-    Largest or None
-        None if it is not known.
+    ``of_frames`` returns the `Largest` of the frames, or None; it is called if no other value is known.
     """
     if (largest := observed(summary, scene, "tension")) is not None:
         return largest

@@ -226,27 +226,11 @@ class Plotted(NamedTuple):
 
 
 def plot(folders, quantity=None, out=None, against=None):
-    """Draw result folders in the same panels, and write the figure.
+    """Draw result folders in the same panels, and write the figure; returns a `Plotted`.
 
-    Parameters
-    ----------
-    folders : sequence of path-like
-        Result folders.
-    quantity : str or sequence of str, optional
-        As ``what`` of `draw`.
-    out : path-like, optional
-        A ``.png``, ``.svg`` or ``.pdf``; default ``plot.png`` in the first folder.
-    against : str, optional
-        As for `draw`.
-
-    Returns
-    -------
-    Plotted
-
-    Raises
-    ------
-    InputError
-        As for `draw`; also for a folder without results, and a file or format that cannot be written.
+    ``quantity`` and ``against`` are ``what`` and ``against`` of `draw`. ``out`` is a ``.png``, ``.svg`` or ``.pdf``, by
+    default ``plot.png`` in the first folder. A folder without results, and a file or format that cannot be written, are
+    refused as well.
     """
     folders = [Path(folder) for folder in folders]
     records = [of_folder(folder, with_frames=False) for folder in folders]

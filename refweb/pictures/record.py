@@ -148,20 +148,9 @@ class Record(NamedTuple):
 
 
 def of_folder(folder, with_frames=True):
-    """The record of a result folder.
+    """The record of a result folder; refuses what is none, and one without frames unless ``with_frames`` is False.
 
-    Parameters
-    ----------
-    folder : path-like
-        The folder.
-    with_frames : bool
-        True if frames are required: a run that failed at once has none, but may have a history.
-
-    Raises
-    ------
-    InputError
-        If the folder is no result folder or lists no frames. ``frame`` and ``table`` raise it if their files cannot be
-        read.
+    A run that failed at once has none, but may have a history. ``frame`` and ``table`` refuse a file that is spoilt.
     """
     folder = Path(folder)
     summary = read_summary(folder) or {}

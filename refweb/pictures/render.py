@@ -12,6 +12,7 @@ as `pictures`, `film` and `gym.images` then draw by `polygons`; the child proces
 
 from __future__ import annotations
 
+import itertools
 import logging
 import os
 import sys
@@ -32,39 +33,20 @@ def windows():
 
 
 def images(models, views, sizes):
-    """Each model in each view.
+    """Each model, a list of `Tubes`, `Balls` and `Surface`, in each view: lists as `Renderer.images` gives them.
 
-    Parameters
-    ----------
-    models : list of lists of `Tubes`, `Balls` and `Surface`
-        One list per instant.
-    views : list of `refweb.pictures.camera.View`
-    sizes : list of (width, height)
-        Size of each view [pixel].
-
-    Returns
-    -------
-    list of lists of ndarray, or None
-        RGB, shape (height, width, 3), uint8, of each view of each model; None where OpenGL is not to be had.
+    None where OpenGL is not to be had.
     """
     with Renderer(views, sizes) as renderer:
-        drawn_images = []
-        for model in models:
-            drawn_images.append(renderer.images(model))
-            if drawn_images[-1] is None:
-                return None
-    return drawn_images
+        drawn = list(itertools.takewhile(lambda images: images is not None, map(renderer.images, models)))
+    return drawn if len(drawn) == len(models) else None
 
 
 class Renderer:
     """A child process with one window, which renders one model after the other.
 
-    Parameters
-    ----------
-    views, sizes
-        As for `images`.
-    sides : int
-        Sides of a tube.
+    ``views`` are each a `refweb.pictures.camera.View`, ``sizes`` their (width, height) [pixel], and a tube has so many
+    ``sides``.
     """
 
     def __init__(self, views, sizes, sides=FINE):

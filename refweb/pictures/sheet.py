@@ -135,6 +135,13 @@ def label(axes, name, unit=""):
     axes.set_ylabel(f"{name} [{unit}]" if unit else name, size=LETTERS, color=DARK, parse_math=False)
 
 
+def curve(axes, ink, along, values, width=1.4, **style):
+    """Draw a history, shape (rows,), by its `telling` rows, in an `Ink` or another ``style``; returns the line."""
+    rows = telling(values)
+    style = {"color": ink.colour, "linestyle": ink.style, "linewidth": width, "marker": dot(rows)} | style
+    return axes.plot(along[rows], values[rows], **style)[0]
+
+
 def dot(rows):
     """The marker of a line through some rows: a dot for a single row, else none."""
     return "." if len(rows) == 1 else ""

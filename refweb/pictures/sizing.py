@@ -34,13 +34,7 @@ def front(designs):
 
 
 def plot(folder):
-    """Write the trade-off of the folder of a sizing; returns the file.
-
-    Raises
-    ------
-    InputError
-        If the folder contains no sizing.
-    """
+    """Write the trade-off of the folder of a sizing; returns the file; refuses one without a sizing."""
     folder = Path(folder)
     summary = read_summary(folder)
     if summary is None or summary.get("kind") != "size":

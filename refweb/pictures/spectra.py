@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..results.units import scale_of, with_error
 from .plot_data import unit_of
-from .sheet import DARK, Panel, label, legend, telling
+from .sheet import DARK, Panel, curve, label, legend
 
 FEWEST = 32
 """Least number of rows; with fewer a spectrum would have a dozen frequencies."""
@@ -52,21 +52,10 @@ class Spectrum(NamedTuple):
 
 
 def spectrum_of(time, values, name="history"):
-    """The spectrum of a history about its mean, by a Hann window.
+    """The spectrum of a history about its mean, by a Hann window; ``time (rows,)`` is in s.
 
-    Parameters
-    ----------
-    time : ndarray, shape (rows,)
-        Times [s]. The last row, at the end or at an event, may have a shorter interval and is then left out.
-    values : ndarray, shape (rows,)
-        Values at these times.
-    name : str
-        Name in messages.
-
-    Raises
-    ------
-    InputError
-        For fewer than `FEWEST` rows, unequal intervals, and values that are not finite.
+    The last row, at the end or at an event, may have a shorter interval and is then left out. Fewer rows than `FEWEST`,
+    unequal intervals and values that are not finite are refused.
     """
     if len(time) > 2 and time[-1] - time[-2] < (1.0 - EVEN) * (time[1] - time[0]):
         time, values = time[:-1], values[:-1]
@@ -109,9 +98,7 @@ def spectrum(runs, name):
         entries = []
         largest = max(float(item.amplitude.max()) for item in spectra) / factor
         for s, item in zip(having, spectra, strict=True):
-            style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.2}
-            mask = telling(item.amplitude)
-            (line,) = axes.plot(item.frequency[mask] / cycle, item.amplitude[mask] / factor, **style)
+            line = curve(axes, s.ink, item.frequency / cycle, item.amplitude / factor, 1.2)
             if item.peak is not None:
                 point_style = {"color": s.ink.colour, "marker": "v", "markeredgecolor": DARK, "markersize": 8}
                 axes.plot(item.frequency[item.peak] / cycle, item.amplitude[item.peak] / factor, **point_style)

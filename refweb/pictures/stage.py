@@ -321,8 +321,8 @@ def marked_pixels(lines, extent, width, height):
     return image
 
 
-def _cut(name, limit=14):
-    return name if len(name) <= limit else name[: limit - 1] + "…"
+def _cut(name):
+    return name if len(name) <= 14 else name[:13] + "…"
 
 
 def _grey(frame, field):

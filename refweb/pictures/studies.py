@@ -83,18 +83,9 @@ def of_folder(folder):
 
 
 def draw(study, result):
-    """Draw a result of a study over each varying number, and for samples its cumulative distribution.
+    """Draw a result, a `refweb.results.case_rows.Named`, of `Rows` over each varying number; returns a figure.
 
-    Parameters
-    ----------
-    study : Rows
-        Rows of the study.
-    result : refweb.results.case_rows.Named
-        The result.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    For samples its cumulative distribution is drawn as well.
     """
     column = f"{result.name} [{result.unit}]"
     values = [row[column] for row in study.rows if row.get(column) is not None]

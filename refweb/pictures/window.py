@@ -23,19 +23,9 @@ SIZE = (1400, 900)
 
 
 def window(folder, field=None):
-    """Show a result folder in a window until it is closed.
+    """Show a result folder in a window until it is closed, with colours by a field as in `refweb.picture`.
 
-    Parameters
-    ----------
-    folder : path-like
-        A result folder.
-    field : str, optional
-        Field of the colours, as in `refweb.picture`.
-
-    Raises
-    ------
-    InputError
-        If the folder is no result folder or has no such field, and if there is no display.
+    A folder or field that there is not is refused, and where there is no display.
     """
     record = of_folder(folder)
     record.chosen()
@@ -49,15 +39,7 @@ def window(folder, field=None):
 
 
 def prepared(record, field=None, off_screen=False):
-    """The plotter of a record, and a function that shows one of its frames.
-
-    Returns
-    -------
-    plotter : pyvista.Plotter
-        Plotter with the frame of `refweb.pictures.record.Record.chosen`.
-    show : callable
-        Called with the index of a frame.
-    """
+    """(Plotter of pyvista with the frame that a record has `chosen`, function that shows the frame of an index)."""
     from . import opengl
 
     numbers = list(record.times)

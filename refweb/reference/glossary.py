@@ -187,10 +187,10 @@ GLOSSARY = {
 """Terms with their meanings, by subject; codes are those of ``findings`` in ``run.json``."""
 
 
-def explained(name, width=100):
+def explained(name):
     """The whole glossary for the name "glossary", the meaning of a term for its name, None for any other name."""
     if name == "glossary":
-        return "\n\n".join(_section(subject, width) for subject in GLOSSARY)
+        return "\n\n".join(map(_section, GLOSSARY))
     terms = {term.lower(): (term, meaning) for entries in GLOSSARY.values() for term, meaning in entries.items()}
     if name.lower() not in terms:
         return None
@@ -198,8 +198,8 @@ def explained(name, width=100):
     return f"{term}: {meaning}"
 
 
-def _section(subject, width):
-    wrap = {"width": width, "initial_indent": "  ", "subsequent_indent": "      "}
+def _section(subject):
+    wrap: dict = {"width": 100, "initial_indent": "  ", "subsequent_indent": "      "}
     return "\n".join([subject, *(textwrap.fill(f"{term}: {text}", **wrap) for term, text in GLOSSARY[subject].items())])
 
 

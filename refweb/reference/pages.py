@@ -98,13 +98,7 @@ def names():
 
 
 def pages_of(name):
-    """The pages of a table, or of one kind of it: ``web``, ``web.cable``, ``[[body]]``.
-
-    Raises
-    ------
-    InputError
-        For a name that is none, with the nearest that is.
-    """
+    """The pages of a table, or of one kind of it: ``web``, ``web.cable``, ``[[body]]``; refuses other names."""
     table, known = name.strip().strip("[]").strip(), names()
     table = "scene" if table in (f.name for f in dataclasses.fields(Head)) else table
     head = table.partition(".")[0]

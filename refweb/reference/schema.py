@@ -62,20 +62,10 @@ def _plain(given, like) -> Any:
 
 
 def _table(kind, *more, fixed=None, without=(), optional=(), like=None) -> dict:
-    """The schema of a table with the keys of some classes.
+    """The schema of a table with the keys of some classes, of which the first describes it.
 
-    Parameters
-    ----------
-    kind, more : class
-        Classes of tables: the first one describes the table, the keys are those of all.
-    fixed : dict, optional
-        Values of keys that make the table what it is.
-    without : collection of str
-        Keys that it does not have.
-    optional : collection of str
-        Keys of ``fixed`` that may be left out.
-    like : class, optional
-        Describes keys of which the class itself says nothing.
+    Values of ``fixed`` keys make the table what it is, and those in ``optional`` may be left out. It does not have keys
+    in ``without``; the class ``like`` describes keys of which the others say nothing.
     """
     fixed, properties, required = fixed or {}, {}, [key for key in fixed or {} if key not in optional]
     for owner in (kind, *more):

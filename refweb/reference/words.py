@@ -86,14 +86,14 @@ def how_to(title, module):
     return "\n\n".join(parts)
 
 
-def as_text(name, width=100):
+def as_text(name):
     """The pages of a table for a terminal."""
-    return "\n\n".join(_text(page, width) for page in pages_of(name))
+    return "\n\n".join(map(_text, pages_of(name)))
 
 
-def _text(page, width):
+def _text(page):
     wrapped = lambda text, indent="": textwrap.fill(  # noqa: E731
-        text, width, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False
+        text, 100, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False
     )
     parts = [page.header, wrapped(page.summary, "  ")]
     parts += [text if "\n" in text else wrapped(text, "  ") for text in page.prose]
@@ -136,7 +136,8 @@ def _markdown(page):
     yield page.summary
     for text in page.prose:
         yield f"```\n{text}\n```" if "\n" in text else text
-    cells = [[f"`{key.name}`", key.takes, key.unit, _quoted(key.default), key.meaning] for key in page.keys]
+    defaults = [key.default if key.default in ("", "required") else f"`{key.default}`" for key in page.keys]
+    cells = [[f"`{k.name}`", k.takes, k.unit, d, k.meaning] for k, d in zip(page.keys, defaults, strict=True)]
     yield _grid(("key", "takes", "unit", "default", "what it is"), cells)
     if page.listing is not None:
         yield _grid(*page.listing)
@@ -144,10 +145,6 @@ def _markdown(page):
         yield f"Refused: {page.refused}"
     if page.example:
         yield f"```toml\n{page.example}\n```"
-
-
-def _quoted(default):
-    return default if default in ("", "required") else f"`{default}`"
 
 
 def _grid(columns, rows):

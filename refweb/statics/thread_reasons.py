@@ -68,7 +68,7 @@ def _pulled_to(system, thread: ThreadLine, x, end, ring, near):
     node, segment = position[thread.rows[end]], 0 if end == 0 else len(thread.distances) - 1
     for wrap in thread.wraps:
         if wrap.segment == segment:
-            body = next(body for body in system.net.bodies if body.name == wrap.body)
+            body = system.net.body_of(wrap.body)
             away = node - position[body.row]
             if type(body.shape).__name__ != "Sphere":
                 away = away - (away @ body.axes[2]) * body.axes[2]

@@ -154,7 +154,7 @@ def test_positions_of_a_file(tmp_path):
         (dict(kind="positions", file="a.csv", turns=1.0), "turns has no meaning"),
         (dict(kind="positions", file="/nowhere/a.csv"), "there is no file"),
         (dict(ratio=0.3, axis=(0, 0, 0)), "must have a direction"),
-        (dict(ratio=0.3, hub="rim"), "hub is 28 nodes, must be one"),
+        (dict(ratio=0.3, hub="rim"), 'hub = "rim" is 28 nodes, must be one'),
     ],
 )
 def test_what_cannot_be_folded(fold, words):

@@ -53,12 +53,7 @@ def skeleton_of(body):
 def force_terms(net, law_of):
     """The terms of all pairs of bodies of a net, of one kind each.
 
-    Parameters
-    ----------
-    net : refweb.net.net.Net
-        Net with bodies.
-    law_of : callable
-        Function of two bodies that returns (stiffness, exponent, damping, friction, slip velocity).
+    ``law_of`` is a function of two bodies that returns (stiffness, exponent, damping, friction, slip velocity).
     """
     if not (pairs := pairs_of(net)):
         raise InputError(
@@ -146,15 +141,9 @@ def _side(body, spins, law, parts, begin, more):
     """Data of one body of a pair for `refweb.effects.contact.body_body_detection`; the other is ``more`` thick."""
     (radius, core, round_, *field), (stiffness, *losses) = body.shape.touched(more), law
     mobility = body.mobility[np.triu_indices(3)] if spins == 2 else (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-    numbers = [*body.axes.ravel(), *body.offset, spins, body.shape.planar, *mobility, _lever(body, spins), body.extent]
+    longest = lever(body) if spins == 2 else body.radius  # √(I (y × g)·J⁻¹(y × g)) of any point y, at most [m]
+    numbers = [*body.axes.ravel(), *body.offset, spins, body.shape.planar, *mobility, longest, body.extent]
     numbers += [not body.prescribed, body.thickness, parts, begin]
     pair = [body.shape.extent, stiffness, *np.zeros(6), *losses, radius, *core, round_, False, False]
     pair += [*np.eye(3).ravel(), *field]
     return np.array([*numbers, *pair], dtype=float)
-
-
-def _lever(body, spins):
-    """√(I (y × g)·J⁻¹(y × g)) for any point y of a body, at most [m]."""
-    if spins < 2:
-        return body.radius
-    return lever(body)

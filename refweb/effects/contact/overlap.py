@@ -454,18 +454,7 @@ def first_stiffness(system, body, exponent, load_steps=()):
     mass of the body if the web has supports, else the reduced mass of both; for a body that is fixed or moved by tables
     it is that of all free nodes. The push is the resultant of outer forces on the body, or, for such a one, on the web.
     Statics knows no energy: there contact is at least as stiff as the stiffest line, which costs no steps; so it is, as
-    the softest line, where nothing moves and nothing pushes.
-
-    Parameters
-    ----------
-    system : refweb.system.system.System
-        With any stiffness of contact.
-    body : refweb.net.rigid_body.RigidBody
-        One of its bodies.
-    exponent : float
-        p of its contact.
-    load_steps : sequence of float
-        Those of statics.
+    the softest line, where nothing moves and nothing pushes. The ``system`` has any stiffness, ``exponent`` is p.
 
     Raises
     ------
@@ -505,8 +494,7 @@ def first_between(system, bodies, exponent):
     gap = _distances(net, first, net.points[[second.row]])[0] - sum(map(_reach, bodies))
     square = float(((v[bodies[0].row] - v[bodies[1].row]) ** 2).sum())
     square += 2.0 * float(np.linalg.norm(falls[0] - falls[1])) * max(float(gap), 0.0)
-    turns = [body for body in free if body.turn is not None]
-    turning = sum(0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v)) for body in turns)
+    turning = sum(_turning(body, v) for body in free)
     push = sum(float(np.linalg.norm(force[body.row])) for body in net.bodies if not body.prescribed)
     stored = (exponent + 1.0) * (0.5 * mass * square + turning)
     return max(push / deep**exponent, stored / deep ** (exponent + 1.0))
@@ -562,7 +550,9 @@ def _energy(system, body):
     along = np.zeros(3) if carried or not web > 0.0 else force[free].sum(axis=0) / web
     gained = 2.0 * float(np.linalg.norm(falls - along)) * max(float(distance[nearest]) - _reach(body), 0.0)
     mass = web if body.prescribed else body_mass if fixed.any() else body_mass * web / (body_mass + web)
-    turning = 0.0
-    if body.turn is not None:
-        turning = 0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v))
-    return 0.5 * mass * ((v0 + fastest) ** 2 + gained) + turning
+    return 0.5 * mass * ((v0 + fastest) ** 2 + gained) + _turning(body, v)
+
+
+def _turning(body, v):
+    """Energy by which a body tumbles at the start [J]."""
+    return 0.0 if body.turn is None else 0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v))

@@ -67,18 +67,7 @@ def sharpest_edge(state, body, overlap, limit):
     """The `Edge` of the largest share of a body, None if no share is above the ``limit``.
 
     Only elements count whose overlap and tension are not far below the largest: a slack line that lies about an edge is
-    not pushed along.
-
-    Parameters
-    ----------
-    state : refweb.results.state.State
-        The state.
-    body : refweb.net.rigid_body.RigidBody
-        The body.
-    overlap : ndarray, shape (cells,)
-        Depth of each element in it [m].
-    limit : float
-        Share up to which it tells nothing.
+    not pushed along. ``overlap`` is the depth of each element in the body [m], shape (cells,).
     """
     net, position = state.system.net, state.position
     if net.cells.shape[1] > 2:

@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...accepted import accepts, by_name
+from ...accepted import accepts
 from ...errors import InputError
 from ...messages import nearest, quote
-from ...tables import Table, boolean, field, real, table
+from ...tables import Table, boolean, by_group, field, real, table
 from ..base import OWN, Balance, CellElements, ContactForce, ForceTerm, Tangent, Timing, VelocityForce
 from .line_body_ccd import passing
 from .nearest_point import in_sphere, near
@@ -64,13 +64,6 @@ class BodyContact(Table):
     damping: float | None = real(default=None, at_least=0, unit="s/m")
     friction: float | None = real(default=None, at_least=0)
     slip_velocity: float | None = real(default=None, above=0, unit="m/s")
-
-
-@accepts(by_name(BodyContact))
-def _bodies(name, value):
-    if not isinstance(value, dict):
-        raise InputError(f"{name} must be a table by body, [contact.bodies.NAME]")
-    return {k: b if isinstance(b, BodyContact) else BodyContact.read(f"{name}.{k}", b) for k, b in value.items()}
 
 
 def rotations(body):
@@ -148,7 +141,7 @@ class Contact(Table):
     friction: float = real(default=0.0, at_least=0)
     slip_velocity: float = real(default=1e-2, above=0, unit="m/s")
     between_bodies: bool = boolean(default=False)
-    bodies: dict[str, Any] = field(_bodies, default_factory=dict)
+    bodies: dict[str, Any] = by_group(BodyContact, "contact", members="bodies", default_factory=dict)
 
     def _of(self, body, key):
         given = getattr(self.bodies.get(body.name), key, None)

@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...accepted import accepts, by_name
 from ...compiled.rows import matrix_of
 from ...errors import InputError
 from ...messages import nearest
-from ...tables import Several, Table, field, real, table, vector
+from ...tables import Several, Table, by_group, real, table, vector
 from ..base import Balance, CellElements, ForceTerm, Tangent, Timing, VelocityForce, without
 from .force import end_of, kernels
 from .implicit_drag import implicit_drag
@@ -53,13 +52,6 @@ class BodyDrag(Table):
 
     coefficient: float | None = real(default=None, at_least=0)
     area: float | None = real(default=None, above=0, unit="m²")
-
-
-@accepts(by_name(BodyDrag))
-def _bodies(name, value):
-    if not isinstance(value, dict):
-        raise InputError(f"{name} must be a table by body, [drag.bodies.NAME]")
-    return {k: b if isinstance(b, BodyDrag) else BodyDrag.read(f"{name}.{k}", b) for k, b in value.items()}
 
 
 @table
@@ -116,7 +108,7 @@ class Drag(Table):
     tangential: float = real(default=0.01, at_least=0)
     diameter: float | None = real(default=None, above=0, unit="m")
     wind: Several = vector(default=(0.0, 0.0, 0.0), unit="m/s")
-    bodies: dict[str, Any] = field(_bodies, default_factory=dict)
+    bodies: dict[str, Any] = by_group(BodyDrag, "drag", members="bodies", default_factory=dict)
 
     def on(self, net: Net) -> list[ForceTerm]:
         """The terms of the nodes of elements and of free bodies; ``out`` is the power [W]."""

@@ -20,17 +20,7 @@ from ... import memory
 from ...compiled.rows import column_of, records_of
 from ...errors import InputError
 from ...tables import Table, boolean, real, table
-from ..base import (
-    Balance,
-    CellElements,
-    ContactForce,
-    Crossing,
-    ForceTerm,
-    Tangent,
-    Timing,
-    VelocityForce,
-    without,
-)
+from ..base import Balance, CellElements, ContactForce, Crossing, ForceTerm, Tangent, Timing, VelocityForce, without
 from ..natural_lengths import shortest_of
 from .pair import APART, ELEMENT
 from .search import distances, foresee, near, near_pairs, paired

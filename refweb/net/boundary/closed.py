@@ -133,13 +133,7 @@ def moments(points, triangles):
 
 
 def convex_hull(points, triangles):
-    """Corners and triangles of the convex hull of a surface, outward.
-
-    Raises
-    ------
-    InputError
-        For a surface in a plane.
-    """
+    """Corners and triangles of the convex hull of a surface, outward; refuses a plane surface."""
     if not (np.abs(points) <= LARGEST).all():
         raise InputError(f"coordinates of corners must be numbers ≤ {LARGEST:g} [m] in size")
     points = points[np.unique(triangles)]

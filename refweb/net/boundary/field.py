@@ -31,11 +31,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from ... import memory
+from ...compiled.rows import number_at
 from ...kernels import kernel
 
 ORIGIN, FINE, COUNTS, MARGIN, HEAD = 0, 3, 4, 7, 8
@@ -50,18 +48,6 @@ GAP = 0.02
 LOOKS, OPPOSITE, BEYOND, THINNER = 4000, -0.8, 1.5, 0.01
 """Number of surface points from which thickness is measured; rate of decrease of depth beyond the middle of a wall, and
 cells behind it at which it is measured; share of the surface that may be thinner."""
-
-
-def _number_at(typing, address, index):
-    def generate(context, builder, signature, args):
-        pointer = builder.inttoptr(args[0], ir.DoubleType().as_pointer())
-        return builder.load(builder.gep(pointer, [args[1]]))
-
-    return types.float64(types.int64, types.int64), generate
-
-
-number_at: Any = intrinsic(_number_at)
-"""In kernels, ``number_at(address, index)``: the number at an index from an address."""
 
 
 @kernel(forceinline=True)
@@ -184,12 +170,8 @@ def field_of(points, triangles, cells, around=AROUND, known=None, winding=None, 
 
     ``around`` is the number of grid points on each side of the solid. A wider field takes error, thickness and offset
     from the field ``known``. For the boundary of a `refweb.net.boundary.repair.Repaired` solid ``winding`` decides
-    which points are inside. The solid is thickened by ``offset`` [m] on each side.
-
-    Raises
-    ------
-    InputError
-        For a grid that does not fit into memory.
+    which points are inside. The solid is thickened by ``offset`` [m] on each side. A grid that does not fit into memory
+    is refused.
     """
     low, size = points.min(axis=0), np.ptp(points, axis=0)
     h = float(size.max()) / cells

@@ -22,10 +22,7 @@ UPRIGHT = 1e-6
 def places_of(path):
     """Points, shape (n, 3), in the unit of a file of heights, and triangles, shape (t, 3), that face up.
 
-    Raises
-    ------
-    InputError
-        For a file without a surface, and for two heights at one position.
+    A file without a surface, and two heights at one position, are refused.
     """
     if path.suffix.lower() == ".csv":
         points = columns_of(path, "xyz")

@@ -79,16 +79,15 @@ class Repaired(NamedTuple):
 def repaired(points, triangles, cells):
     """The `Repaired` solid of some triangles, for a grid of depth with a number of cells along the longest side.
 
-    Raises
-    ------
-    InputError
-        For a surface that encloses nothing.
+    A surface that encloses nothing is refused.
     """
     points, triangles = joined(points, triangles)
     if not len(triangles):
         raise InputError(EMPTY)
     single, doubled = _single(triangles)
-    single, sheets = _without_sheets(points, single)
+    pieces = _pieces(points, single)
+    sheet = (pieces.flat & pieces.open)[pieces.piece]
+    single, sheets = single[~sheet], pieces.area[sheet]
     if not len(single):
         raise InputError(EMPTY)
     pieces = _pieces(points, single)
@@ -205,13 +204,6 @@ def _pieces(points, triangles):
     flat = np.abs(volume) <= FLAT * np.bincount(piece, area) ** 1.5
     is_open = np.bincount(piece, (count[edges] == 1).any(axis=1)) > 0
     return _Pieces(faces, piece, area, as_given, volume, flat, ends[count == 1], is_open, int((count > 2).sum()))
-
-
-def _without_sheets(points, triangles):
-    """Triangles without flat pieces with an open edge, and areas of the removed triangles [m²]."""
-    pieces = _pieces(points, triangles)
-    sheet = (pieces.flat & pieces.open)[pieces.piece]
-    return triangles[~sheet], pieces.area[sheet]
 
 
 def _outward(points, triangles, pieces):

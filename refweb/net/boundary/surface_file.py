@@ -28,10 +28,7 @@ HARMLESS = ("vertex", "poly_vertex", "line", "polyline")
 def read(path):
     """Points, shape (n, 3), in the unit of a file, and triangles, shape (t, 3).
 
-    Raises
-    ------
-    InputError
-        For a file that is not there, cannot be read or has another format, and for one without a surface.
+    A file that is not there, cannot be read, has another format or no surface is refused.
     """
     if not path.is_file():
         raise InputError(f"there is no file {path}")

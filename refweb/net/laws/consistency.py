@@ -42,21 +42,8 @@ def refuse_inconsistent(law, lines, numbers):
     """Refuse a law whose energy is not the integral of its stress, or whose tangent is not the slope of that.
 
     As well one whose tangent is above EA or that has no number at a strain, and a stress that falls where the law says
-    that it is convex.
-
-    Parameters
-    ----------
-    law : type
-        The law, see `refweb.net.laws.law.TensionLaw`.
-    lines : refweb.net.laws.line_data.LineData
-        Numbers of elements of this law.
-    numbers : ndarray of int, shape (elements,)
-        Line of each.
-
-    Raises
-    ------
-    InputError
-        With the law, a line, a strain and both numbers.
+    that it is convex. ``lines`` is the `refweb.net.laws.line_data.LineData` of elements of this law, and ``numbers`` is
+    the line of each. The `InputError` has the law, a line, a strain and both numbers.
     """
     read = np.column_stack([lines[name] for name in ("ea", "slackness", "smoothing", *law.columns)])
     for first in np.sort(np.unique(read, axis=0, return_index=True)[1])[:MOST]:

@@ -218,18 +218,9 @@ def _over_lines(scalar, record):
 
 
 def evaluate(scalar, strain, lines, columns=()):
-    """A scalar kernel at the strain of each line, shape (lines,).
+    """A scalar kernel of a law with some columns at the strain of each line [1], shape (lines,).
 
-    Parameters
-    ----------
-    scalar : refweb.compiled.kernel.Kernel
-        One of a law.
-    strain : ndarray, shape (lines,)
-        Strain of each line [1].
-    lines : refweb.net.laws.line_data.LineData
-        Numbers of the lines.
-    columns : tuple of str
-        Those of the law.
+    ``lines`` is a `refweb.net.laws.line_data.LineData`.
     """
     strain, out = np.ascontiguousarray(strain, dtype=float), np.empty(len(lines))
     if len(lines):

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError
 from ...tables import Several, real, rows, table, vector
-from ..rigid_body import Grown, Shape, axes_of
+from ..rigid_body import Grown, Shape
 from .rounding import check_rounding, edge_radius, shrunk
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -52,7 +51,7 @@ class Box(Shape):
         """Refuse sizes that are not > 0, axes that are not at right angles, and a rounding that is too large."""
         if min(self.size) <= 0.0:
             raise InputError(f"size = {list(self.size)} must be > 0 [m]")
-        self.frame()
+        super().check()
         check_rounding(self.rounding, self.size)
 
     def grown(self) -> Grown:
@@ -65,7 +64,3 @@ class Box(Shape):
         from ..skeleton import of_box
 
         return of_box(self.grown())
-
-    def frame(self) -> NDArray[np.float64]:
-        """Unit vectors of its edges."""
-        return axes_of(self.axes)

@@ -10,10 +10,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ...tables import Several, real, table, vector
-from ..rigid_body import Grown, Shape, axes_about
+from ..rigid_body import Grown, Shape
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -48,11 +47,6 @@ class Capsule(Shape):
     length: float = real(above=0, unit="m")
     axis: Several = vector(default=None)
 
-    def check(self) -> None:
-        """Refuse an axis that is zero."""
-        if self.axis is not None:
-            self.frame()
-
     def grown(self) -> Grown:
         """Its axis, grown by the radius."""
         return Grown(self.radius, (0.0, 0.0, 0.5 * self.length))
@@ -62,7 +56,3 @@ class Capsule(Shape):
         from ..skeleton import of_box
 
         return of_box(self.grown())
-
-    def frame(self) -> NDArray[np.float64]:
-        """Unit vectors of its axes; its own axis is third."""
-        return axes_about("axis", self.axis)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...tables import Several, real, table, vector
-from ..rigid_body import Grown, Shape, axes_about
+from ..rigid_body import Grown, Shape
 from .rounding import check_rounding, edge_radius, shrunk
 
 if TYPE_CHECKING:
@@ -56,8 +56,7 @@ class Cylinder(Shape):
 
     def check(self) -> None:
         """Refuse an axis that is zero and a rounding that is too large."""
-        if self.axis is not None:
-            self.frame()
+        super().check()
         check_rounding(self.rounding, self._sizes())
 
     def _sizes(self):
@@ -73,10 +72,6 @@ class Cylinder(Shape):
         from ..skeleton import of_cylinder
 
         return of_cylinder(self.grown())
-
-    def frame(self) -> NDArray[np.float64]:
-        """Unit vectors of its axes; its own axis is third."""
-        return axes_about("axis", self.axis)
 
     def farthest(self, normals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points of the core, on the circles at its ends."""

@@ -1,21 +1,26 @@
 """Bodies with depth on a grid: solids inside a surface of triangles.
 
 May change: texts of errors, and `MOST`, a limit of what is accepted. Must stay: fields of `Solid`, which `mesh` and
-`terrain` fill; ``solid`` and ``axes`` as what a subclass gives, and the life of ``solid``, since kernels read its field
-by address. `GRID`, `WIDE` and `WALL` change depth, so contact of all meshes and terrains. Must stay as well: `Filled`
-and `field_in`, which `mesh` and `terrain` import. Tests: ``tests/effects/test_mesh_bodies.py``,
+`terrain` fill; ``file_key``, ``made`` and ``axes`` as what a subclass gives, and the life of ``solid``, since kernels
+read its field by address. `GRID`, `WIDE` and `WALL` change depth, so contact of all meshes and terrains. Must stay as
+well: `Filled` and `field_in`, which `mesh` and `terrain` import. Tests: ``tests/effects/test_mesh_bodies.py``,
 ``tests/net/test_boundary.py``.
 """
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from ...errors import InputError, refused_at
+from ...messages import quote
 from ...tables import Several
-from ..rigid_body import Grown, Shape, axes_of
+from ..rigid_body import Grown, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -75,10 +80,36 @@ class Solid(NamedTuple):
 
 
 class Filled(Shape):
-    """Shape of a body whose `Solid` is in ``solid``, with ``axes`` of its file."""
+    """Shape of a body whose solid stands in the file that the key ``file_key`` names, with ``axes`` of the file.
 
-    solid: Any
+    A subclass gives ``made``, which makes the `Solid` of a path; ``content`` tells files of one path apart in a cache.
+    """
+
+    file_key: ClassVar[str]
     axes: Several
+
+    def made(self, path: Path, content: str) -> Solid:
+        """The `Solid` of a file."""
+        raise NotImplementedError
+
+    @functools.cached_property
+    def solid(self) -> Solid:
+        """The `Solid`; refuses a file that cannot be read, and what ``made`` refuses."""
+        given = getattr(self, self.file_key)
+        path = Path(given)
+        with refused_at(f"{self.file_key} = {quote(given)}:"):
+            try:
+                return self.made(path, hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "")
+            except OSError as error:
+                raise InputError(f"cannot be read: {error.strerror or error}") from None
+
+    def settle(self) -> None:
+        """Read the file."""
+        _ = self.solid
+
+    def to_dict(self) -> dict[str, Any]:
+        """The table as plain TOML values, the file with its folder."""
+        return {**super().to_dict(), self.file_key: str(Path(getattr(self, self.file_key)).absolute())}
 
     def grown(self) -> Grown:
         """Half sizes of the box around it, within its error, as core, and the address of its field."""
@@ -92,10 +123,6 @@ class Filled(Shape):
     def extent(self) -> float:
         """Largest distance from its centre to its surface, within its error [m]."""
         return float(np.linalg.norm(self.solid.points, axis=1).max()) + self.solid.field.error
-
-    def frame(self) -> NDArray[np.float64]:
-        """Unit vectors of the axes of the file."""
-        return axes_of(self.axes)
 
     def volume(self) -> float:
         """Its volume [m³]."""

@@ -9,16 +9,16 @@ of `Mesh` (scene format and help; after a change write ``validation/REFERENCE.md
 from __future__ import annotations
 
 import functools
-import hashlib
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import InputError
-from ...messages import quote
 from ...tables import Several, choice, integer, real, rows, table, text
 from .filled import GRID, Filled, Solid, field_in
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 SIZES = 1e-6, 1e6
 """Smallest and largest size of a body [m]."""
@@ -57,6 +57,7 @@ class Mesh(Filled):
     """
 
     free = True
+    file_key = "file"
 
     file: str = text()
     scale: float = real(default=1.0, above=0)
@@ -64,42 +65,19 @@ class Mesh(Filled):
     axes: Several = rows(3, default=None)
     grid: int | None = integer(default=None, at_least=8, at_most=4096)
 
-    def check(self) -> None:
-        """Refuse axes that are not at right angles."""
-        self.frame()
+    def made(self, path: Path, content: str) -> Solid:
+        """The `Solid` of a file.
 
-    def to_dict(self) -> dict[str, Any]:
-        """The table as plain TOML values, the file with its folder."""
-        return {**super().to_dict(), "file": str(Path(self.file).absolute())}
-
-    @functools.cached_property
-    def solid(self) -> Any:
-        """The `Solid`.
-
-        Raises
-        ------
-        InputError
-            For a file that cannot be read, a surface that encloses nothing, a size below 1e-6 or above 1e6 m, and a
-            grid that does not fit into memory.
+        Refuses a surface that encloses nothing, a size out of `SIZES`, and a grid that does not fit into memory.
         """
-        path = Path(self.file)
-        try:
-            content = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
-            return _solid(path, content, self.scale, self.grid, self.surface == "hull")
-        except InputError as error:
-            raise InputError(f"file = {quote(self.file)}: {error}") from None
-        except OSError as error:
-            raise InputError(f"file = {quote(self.file)}: cannot be read: {error.strerror or error}") from None
-
-    def settle(self) -> None:
-        """Read the file."""
-        _ = self.solid
+        return _solid(path, content, self.scale, self.grid, self.surface == "hull")
 
 
 @functools.lru_cache(maxsize=16)
 def _solid(path, content, scale, grid, hull):
     """The `Solid` of the content of a file, or its convex hull."""
     from ..boundary.closed import NotClosedError, closed, convex_hull, is_convex, moments
+    from ..boundary.repair import touches_itself
     from ..boundary.surface_file import read
 
     points, triangles = read(path)
@@ -110,7 +88,7 @@ def _solid(path, content, scale, grid, hull):
         _refuse_size(points[triangles], scale)
         return _repaired(points, triangles, grid)
     _refuse_size(surface.points, scale)
-    if surface.pieces > 1 and _touches_itself(surface, grid):
+    if surface.pieces > 1 and touches_itself(surface.points, surface.triangles, grid or GRID):
         return _repaired(surface.points, surface.triangles, grid)
     volume, centre, inertia = moments(surface.points, surface.triangles)
     centred = surface._replace(points=surface.points - centre)
@@ -129,12 +107,6 @@ def _solid(path, content, scale, grid, hull):
         is_convex(centred.points, volume),
         tuple(mended),
     )
-
-
-def _touches_itself(surface, grid):
-    from ..boundary.repair import touches_itself
-
-    return touches_itself(surface.points, surface.triangles, grid or GRID)
 
 
 def _refuse_size(points, scale):

@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import InputError
 from ...kernels import kernel
 from ...tables import Several, real, table, vector
-from ..rigid_body import Grown, Shape, axes_about
+from ..rigid_body import Grown, Shape
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,15 +55,6 @@ class Plane(Shape):
 
     normal: Several = vector(default=None)
     drawn: float = real(default=2.0, above=0, unit="m")
-
-    def check(self) -> None:
-        """Refuse a normal that is zero."""
-        if self.normal is not None:
-            self.frame()
-
-    def frame(self) -> NDArray[np.float64]:
-        """Unit vectors of its axes, the normal third."""
-        return axes_about("normal", self.normal)
 
     def grown(self) -> Grown:
         """An infinite box."""

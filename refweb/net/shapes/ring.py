@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...tables import Several, real, table, vector
-from ..rigid_body import Grown, Shape, axes_about
+from ..rigid_body import Grown, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,10 +53,6 @@ class Ring(Shape):
     radius: float = real(above=0, unit="m")
     normal: Several = vector()
 
-    def check(self) -> None:
-        """Refuse a normal that is zero."""
-        self.frame()
-
     def grown(self) -> Grown:
         """Its axis, grown by the radius."""
         return Grown(self.radius, (0.0, 0.0, math.inf))
@@ -66,10 +62,6 @@ class Ring(Shape):
         from ..skeleton import rim
 
         return rim(self.radius, 0.0, 0.0)
-
-    def frame(self) -> NDArray[np.float64]:
-        """Unit vectors of its axes, the normal third."""
-        return axes_about("normal", self.normal)
 
     def volume(self) -> None:
         """None: it has no thickness."""

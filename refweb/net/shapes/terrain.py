@@ -9,8 +9,6 @@ ground. Tests: ``tests/effects/test_ground.py``.
 from __future__ import annotations
 
 import functools
-import hashlib
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +19,8 @@ from ...tables import Several, integer, real, rows, table, text
 from .filled import GRID, MOST, Filled, Solid, field_in
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
 DEEP = 0.25
@@ -63,6 +63,7 @@ class Terrain(Filled):
     """
 
     ground = True
+    file_key = "heights"
 
     heights: str = text()
     scale: float = real(default=1.0, above=0)
@@ -70,35 +71,16 @@ class Terrain(Filled):
     axes: Several = rows(3, default=None)
     grid: int | None = integer(default=None, at_least=8, at_most=4096)
 
-    def check(self) -> None:
-        """Refuse axes that are not at right angles."""
-        self.frame()
+    def made(self, path: Path, content: str) -> Solid:
+        """The `Solid` of a file, about its origin.
 
-    def to_dict(self) -> dict[str, Any]:
-        """The table as plain TOML values, the file with its folder."""
-        return {**super().to_dict(), "heights": str(Path(self.heights).absolute())}
-
-    @functools.cached_property
-    def solid(self) -> Any:
-        """The `Solid`, about the origin of the file.
-
-        Raises
-        ------
-        InputError
-            For a file that cannot be read, two heights at one position, and a grid that does not fit into memory.
+        Refuses another format, two heights at one position, and a grid that does not fit into memory.
         """
-        path = Path(self.heights)
-        try:
-            if path.suffix.lower() not in FORMATS:
-                raise InputError(f"format {quote(path.suffix)} must be one of {', '.join(FORMATS)}")
-            if not path.is_file():
-                raise InputError(f"there is no file {path}")
-            content = hashlib.sha256(path.read_bytes()).hexdigest()
-            return _solid(path, content, self.scale, self.thickness, self.grid)
-        except InputError as error:
-            raise InputError(f"heights = {quote(self.heights)}: {error}") from None
-        except OSError as error:
-            raise InputError(f"heights = {quote(self.heights)}: cannot be read: {error.strerror or error}") from None
+        if path.suffix.lower() not in FORMATS:
+            raise InputError(f"format {quote(path.suffix)} must be one of {', '.join(FORMATS)}")
+        if not path.is_file():
+            raise InputError(f"there is no file {path}")
+        return _solid(path, content, self.scale, self.thickness, self.grid)
 
     def skeleton(self) -> NDArray[Any] | None:
         """Its convex edges, or none if there are too many: other bodies touch it with their parts."""
@@ -108,10 +90,6 @@ class Terrain(Filled):
             return super().skeleton()
         except InputError:
             return np.zeros(0, PART)
-
-    def settle(self) -> None:
-        """Read the file."""
-        _ = self.solid
 
 
 @functools.lru_cache(maxsize=16)
