@@ -423,3 +423,43 @@ def test_a_second_process_compiles_the_same_and_none_is_left(tmp_path, what, wor
     *told, count = done.stdout.split()[:-10]
     assert told == words and int(count) <= most and done.stderr == ""
     assert done.stdout.split()[-10:] == [str(2.0 * n) for n in range(10)]
+
+
+@pytest.mark.parametrize("what", ["range(3)", "[k for k in range(3)]"], ids=["plain", "comprehension"])
+def test_faster_ways_to_compile_give_the_machine_code_of_numba(tmp_path, what):
+    lines = f"""
+import sys
+from refweb.compiled import numba_internals
+if sys.argv[1] == "numba":
+    numba_internals._ways = ()
+    numba_internals._FOR_FUNCTIONS_INSIDE = ()
+from refweb.kernels import Indices, Matrix, Vector, kernel
+import hashlib, math
+
+@kernel()
+def size(x, n):
+    return math.sqrt(x[n, 0] ** 2 + x[n, 1] ** 2) if n >= 0 else float(n)
+
+@kernel(apart=())
+def force(h: float, x: Matrix, cells: Indices, out: Vector) -> int:
+    number = 0
+    for k in {what}:
+        for c in range(cells.shape[0]):
+            first, second = cells[c, 0], cells[c, 1]
+            if first != second and not (size(x, first) > 1.0 or k == 2):
+                out[c] += h * size(x, second) - 2 * k / 3 + max(h, x[c, 1])
+                number += 1 + cells[c, 0] // 2
+            x[c, 0] = -x[c, 1] + h
+    return number
+
+address = force.address()
+code = force._body.overloads[tuple(force.signature.args)].library._get_compiled_object()
+print(hashlib.sha256(code).hexdigest())
+"""
+    (tmp_path / "own.py").write_text(lines)
+    codes = []
+    for way in ("numba", "faster"):
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "REFWEB_CACHE": str(tmp_path / way)}
+        command = [sys.executable, str(tmp_path / "own.py"), way]
+        codes.append(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert codes[0] == codes[1] != ""

@@ -55,8 +55,10 @@ def boxes_of(width, buffer):
     for c in range(buffer.shape[0]):
         for k in range(3):
             low[k], high[k] = min(low[k], buffer[c, k]), max(high[k], buffer[c, k])
-    size = (high - low).max()
-    if not (math.isfinite(size) and math.isfinite(width) and width > 0.0):
+    size, finite = 0.0, True
+    for k in range(3):  # numba's ``max`` of an array takes half a second to compile
+        size, finite = max(size, high[k] - low[k]), finite and math.isfinite(high[k] - low[k])
+    if not (finite and math.isfinite(width) and width > 0.0):
         count[0] = 0
         return low, width, count
     width = max(width, size / 1e6)
