@@ -17,8 +17,6 @@ call by address        a caller that links its callees optimizes all that is   k
 operators of types     kernels read records and tables as Python does         none: what `records` and `tables`
 of one's own                                                                   need of numba beside its
                                                                                ``extending`` stands here
-`_ways`                parts of numba's front end that take a tenth of the     numba's own
-                       time to compile find the same in shorter ways
 =====================  ======================================================  ====================================
 
 ``REFWEB_PLAIN=1`` uses the right column. Tables of kernels need addresses of functions and the calling convention of
@@ -32,31 +30,25 @@ before the bound in ``pyproject.toml`` is raised. Tests: ``tests/compiled/test_k
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import functools
-import gc
 import importlib
 import os
 import pickle
-from types import CodeType
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, config, event, sigutils, targetconfig
-from numba.core import ir as numba_ir
+from numba.core import cgutils, config, sigutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.imputils import lower_builtin, lower_constant
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
-from numba.core.types.functions import BaseFunction
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, Signature, infer_global
-from numba.core.untyped_passes import InlineClosureLikes, MakeFunctionToJitFunction
 from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import make_array, populate_array
 
@@ -179,10 +171,6 @@ class _Library(JITCodeLibrary):
         super()._finalize_final_module()
 
 
-_FOR_FUNCTIONS_INSIDE = InlineClosureLikes, MakeFunctionToJitFunction
-"""Passes of numba for functions and comprehensions inside of a function, which few kernels have."""
-
-
 def _compiler_of(cache):
     """Compiler of numba that makes a `_Library`."""
 
@@ -190,129 +178,9 @@ def _compiler_of(cache):
         def define_pipelines(self):
             state = self.state
             state.library = _Library(state.targetctx.codegen(), state.func_id.func_qualname, cache)
-            pipelines = super().define_pipelines()
-            if not any(isinstance(value, CodeType) for value in state.func_id.code.co_consts):
-                for pipeline in pipelines:
-                    pipeline.passes = [step for step in pipeline.passes if step[0] not in _FOR_FUNCTIONS_INSIDE]
-            return pipelines
+            return super().define_pipelines()
 
     return KernelCompiler
-
-
-_SCALARS_AND_ARRAYS = types.Number, types.Boolean, types.Array
-_roles: dict[type, int] = {}
-_VARIABLE, _INSTRUCTION, _SEQUENCE, _MAPPING, _NEITHER = range(5)
-
-
-def _role(kind):
-    """Tell how `_add_variables` reads a value of a Python type."""
-    for role, kinds in enumerate((numba_ir.Var, numba_ir.Inst, (list, tuple), dict)):
-        if issubclass(kind, kinds):
-            return _roles.setdefault(kind, role)
-    return _roles.setdefault(kind, _NEITHER)
-
-
-def _add_variables(value, variables):
-    """Add to a list all variables in a part of an instruction of numba's intermediate code."""
-    role = _roles.get(type(value))
-    if role is None:
-        role = _role(type(value))
-    if role == _VARIABLE:
-        variables.append(value)
-    elif role == _INSTRUCTION:
-        variables += value.list_vars()
-    elif role != _NEITHER:
-        for part in value if role == _SEQUENCE else value.values():
-            _add_variables(part, variables)
-
-
-def _variables_in(instruction, value):
-    """All variables in a part of an instruction, by one look-up of the type of each value."""
-    variables: list[Any] = []
-    _add_variables(value, variables)
-    return variables
-
-
-def _call_type(original):
-    """Return ``BaseFunction.get_call_type`` that remembers the signatures of operators of scalars and arrays.
-
-    Without that numba tries all meanings of an operator, up to one of strings and of sets, for each occurrence. Only
-    a meaning that is lowered by the name of the operator is remembered; others are functions to be compiled.
-    """
-
-    def get_call_type(self, context, args, kws):
-        known = self.__dict__.setdefault("_refweb_signatures", {})
-        signature = None if kws else known.get((context, args))
-        if signature is None:
-            signature = original(self, context, args, kws)
-            simple = not kws and all(isinstance(kind, _SCALARS_AND_ARRAYS) for kind in args)
-            if simple and self._impl_keys[signature.args] is self.typing_key:
-                known[context, args] = signature
-        return signature
-
-    return get_call_type
-
-
-@functools.cache
-def _defaults(kind):
-    return {name: option.default for name, option in kind.options.items()}
-
-
-def _values(flags):
-    """Values of all options of a compilation, without a call for each."""
-    return {**_defaults(type(flags)), **flags._values}
-
-
-def _equal(flags, second):
-    """Tell if options of two compilations are equal."""
-    if flags is second:
-        return True
-    return _values(flags) == _values(second) if isinstance(second, targetconfig.TargetConfig) else NotImplemented
-
-
-@functools.cache
-def _hash_of(kind):
-    return hash(tuple(sorted(kind.options)))
-
-
-def _heard(original):
-    """Return a function that announces an event of numba, and does nothing if nobody listens."""
-    return lambda kind, *data, **named: original(kind, *data, **named) if event._registered.get(kind) else None
-
-
-@contextlib.contextmanager
-def _no_timer(kind, callback):
-    """Stand in for a timer of the locks of numba and LLVM, which are taken 200 000 times for a capture."""
-    yield
-
-
-_ways = (
-    (numba_ir.Inst, "_rec_list_vars", _variables_in),
-    (BaseFunction, "get_call_type", _call_type(BaseFunction.get_call_type)),
-    (targetconfig.TargetConfig, "values", _values),
-    (targetconfig.TargetConfig, "__eq__", _equal),
-    (targetconfig.TargetConfig, "__hash__", lambda flags: _hash_of(type(flags))),
-    (event, "start_event", _heard(event.start_event)),
-    (event, "end_event", _heard(event.end_event)),
-    (event, "install_timer", _no_timer),
-)
-"""Faster functions for those of numba, with the same results, while kernels are compiled."""
-
-
-@contextlib.contextmanager
-def _faster():
-    """Compile in the block, whose thread has the lock, by `_ways` and without collection of garbage."""
-    before, collected = [getattr(where, name) for where, name, _ in _ways], gc.isenabled()
-    try:
-        gc.disable()
-        for where, name, replacement in _ways:
-            setattr(where, name, replacement)
-        yield
-    finally:
-        for (where, name, _), original in zip(_ways, before, strict=True):
-            setattr(where, name, original)
-        if collected:
-            gc.enable()
 
 
 def without_literals(signature):
@@ -344,7 +212,7 @@ def dispatcher(function, given, cache) -> Any:
                 made.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
                 made.add_overload(result)
                 return result.entry_point
-            with store.alone(cache.file(signature)), _faster():
+            with store.alone(cache.file(signature)):
                 return compile_one(signature)
 
     made.compile = compile_alone
