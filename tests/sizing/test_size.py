@@ -4,6 +4,7 @@ Two bars to a loaded point, of which the least mass is a formula with finite str
 """
 
 import concurrent.futures
+import itertools
 import json
 import math
 import os
@@ -628,6 +629,25 @@ def test_reserves_of_intervals():
     first, second = formula.reserves({"x": Interval(3.0, 5.0), "y": Interval(0.5, 1.5)})
     assert first == (0.0, 4.0) and second == (2.5 / 4.0, 3.5 / 4.0)
     assert formula({"x": Interval(3.0, 5.0), "y": Interval(0.5, 1.6)}) is None
+
+
+@pytest.mark.parametrize(
+    "text, count",
+    [
+        ("x > 1 or y > 1", 2),
+        ("not (x > 1 and y > 1)", 2),
+        ("not (x > 1 or y > 1)", 1),
+        ("x > 1 and not (y > 1 and not (x > 3 or y < 2))", 3),
+    ],
+)
+def test_a_condition_holds_where_one_of_its_sides_does(text, count):
+    """By De Morgan's laws the denial of a conjunction has a side for each of its parts, that of a disjunction one."""
+    formula = Criterion(text, ["x", "y"], True)
+    assert formula.count == count
+    for x, y in itertools.product((0.5, 1.5, 2.5, 3.5), repeat=2):
+        values = {"x": Interval(x, x), "y": Interval(y, y)}
+        sides = [all(r.low > 0.0 for r in formula.side(n).reserves(values)) for n in range(count)]
+        assert formula({"x": x, "y": y}) == any(sides)
 
 
 @pytest.mark.parametrize(
