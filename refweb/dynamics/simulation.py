@@ -305,7 +305,7 @@ class Simulation:
     @property
     def share_rows(self):
         """Stress over its limits in the rows of `compared`, shape (rows, shares), see `Watch.shares_of`."""
-        return np.concatenate(self._share_rows)
+        return np.concatenate(self._share_rows) if self._share_rows else np.zeros((0, 0))
 
     def again(self, folder):
         """Discard the run, for a run with the knob of ``standing``."""
