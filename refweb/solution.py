@@ -19,7 +19,7 @@ from .errors import InputError
 from .findings import read_findings
 from .messages import nearest, short
 from .results.folder import read_summary
-from .results.solution import OTHER_ERRORS, SolutionData, read_results
+from .results.solution import OPTIONAL, OTHER_ERRORS, SolutionData, read_results
 from .results.strength import read_utilisation
 from .scene import Scene
 
@@ -383,17 +383,11 @@ def load(folder: str | PathLike[str]) -> Solution:
         solution = Solution(scene, path=folder)
         for key in ("status", "message", "web", "events", "solver", "cost", "versions"):
             setattr(solution, key, summary[key])
+        for key in (*OPTIONAL, "breaks"):
+            setattr(solution, key, summary.get(key, getattr(solution, key)))
         solution.findings = read_findings(summary)
-        solution.bodies, solution.horizon = summary.get("bodies", {}), summary.get("horizon", {})
-        solution.pairs, solution.lines, solution.passage = (
-            summary.get(key, {}) for key in ("pairs", "lines", "passage")
-        )
-        solution.broken_before, solution.commands = summary.get("broken_before", []), summary.get("commands", [])
-        solution.controls = summary.get("controls", [])
-        solution.breaks, solution.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
             solution.utilisation = read_utilisation(used)
-        solution.margin = summary.get("margin")
         solution.steps = [{**step, "results": read_results(step["results"])} for step in summary["steps"]]
         solution.reduced = {} if solution.steps else read_results(summary["results"])
     except (KeyError, TypeError, ValueError, AttributeError):

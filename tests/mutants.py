@@ -927,7 +927,7 @@ MUTANTS = [
         "return proven.strain / 2.0",
     ),
     Mutant("results/observables/observable", "changes[0] + 3.0 * max(changes[1:])", "changes[0]"),
-    Mutant("results/state", "self.element_strain <= self._slack_below", "self.element_strain <= 0.0"),
+    Mutant("results/state", "self.element_strain <= slack_below", "self.element_strain <= 0.0"),
     # Studies and modes
     Mutant("sizing/sqp", "penalty = max(penalty, 2.0 *", "penalty = min(penalty, 2.0 *"),
     Mutant("sizing/formulas", "_less(a.low, b.high) / scale", "_less(a.low, b.low) / scale"),
@@ -997,7 +997,7 @@ MUTANTS = [
     Mutant("pages/packed", "size = written.nbytes + -written.nbytes % 4", "size = written.nbytes"),
     Mutant("pages/space", "Rotation.align_vectors(after, before)", "Rotation.align_vectors(before, after)"),
     Mutant("pages/markup", 'written.replace("<", "\\\\u003c")', "written"),
-    Mutant("pages/page", "hashlib.sha256(script.encode())", "hashlib.sha256(script[1:].encode())"),
+    Mutant("pages/page", r'hashlib.sha256(f"\n{script}".encode())', "hashlib.sha256(script.encode())"),
     Mutant("pages/page", "if not len(next(iter(history.values()), [])):", "if history is None:"),
     Mutant("pages/markup", "zip(columns, cells, strict=True)", "zip(columns[::-1], cells, strict=True)"),
     Mutant("pictures/paraview", '"vector": points.get(options.field, 1) > 1', '"vector": options.field in points'),

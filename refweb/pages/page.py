@@ -155,8 +155,7 @@ def page_of(record, frames=None, progress=None, unread=""):
 def filled(title, status, parts, script):
     """A page as text, from its title, status, sections and script."""
     contents = [re.match(r'<section id="([^"]*)"><h2>(.*?)</h2>', part) for part in parts]
-    script = "\n" + script
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    digest = base64.b64encode(hashlib.sha256(f"\n{script}".encode()).digest()).decode()
     return string.Template(_read("page.html")).substitute(
         title=html(title),
         version=html(__version__),
@@ -164,7 +163,7 @@ def filled(title, status, parts, script):
         style=_read("page.css"),
         contents=html([tag("a", Html(section[2]), href=f"#{section[1]}") for section in contents if section]),
         main="\n".join(parts),
-        script=script[1:],
+        script=script,
         script_hash=f"sha256-{digest}",
     )
 

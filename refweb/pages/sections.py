@@ -21,7 +21,7 @@ from ..results.summary_text import (
     rows_of_results,
     rows_of_steps,
 )
-from .markup import Html, html, listing, pairs, section, table, tag
+from .markup import Html, listing, pairs, section, table, tag
 
 LONGEST = 1000
 """Largest number of characters of a line of the scene."""
@@ -62,19 +62,17 @@ def simulated(record):
         return section("simulated", "What was simulated", tag("p", "This folder holds no scene.toml that can be read."))
     present = [name for name in possible(EFFECTS) if scene.get(name)]
     absent = [name for name in EFFECTS if name not in present]
-    rows: list = [("web", [_keys(scene.get("web", {})), _sizes(record.summary.get("web") or {})])]
+    web = record.summary.get("web")
+    rows: list = [("web", [_keys(scene.get("web", {})), tag("div", "; ".join(on_web(web))) if web else ""])]
     rows.append(("cable", _cable(scene.get("cable", {}))))
     supports = [_keys(entry) for name in ("supports", "support") for entry in _several(scene.get(name))]
     rows.append(("supports", [tag("div", entry) for entry in supports] or "the web's own"))
-    for name in present:
-        several = isinstance(scene[name], list)
-        rows.append(
-            (f"[[{name}]]" if several else f"[{name}]", [tag("div", _keys(entry)) for entry in _several(scene[name])])
-        )
     effects = ", ".join(present) or "none but the tension of its lines"
-    rows.insert(
-        3, ("effects", [tag("div", ["present: ", tag("b", effects)]), tag("div", f"absent: {', '.join(absent)}")])
-    )
+    said = [tag("div", ["present: ", tag("b", effects)]), tag("div", f"absent: {', '.join(absent)}")]
+    rows.append(("effects", said))
+    for name in present:
+        head = f"[[{name}]]" if isinstance(scene[name], list) else f"[{name}]"
+        rows.append((head, [tag("div", _keys(entry)) for entry in _several(scene[name])]))
     rows += [(name, _keys(scene[name])) for name in ("solve", "accuracy", "output") if scene.get(name)]
     for name in ("observe", "event"):
         if scene.get(name):
@@ -130,12 +128,7 @@ def _keys(given):
 
 def _listed(words):
     """Names and their values, in one line."""
-    return html(
-        [
-            [", " if i else "", tag("span", f"{key} = {value}", class_="key")]
-            for i, (key, value) in enumerate(words.items())
-        ]
-    )
+    return Html(", ".join(tag("span", f"{key} = {value}", class_="key") for key, value in words.items()))
 
 
 def _value(value):
@@ -146,13 +139,6 @@ def _value(value):
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
     return quote(value)
-
-
-def _sizes(web):
-    """Sizes of a web, a text."""
-    if not web:
-        return ""
-    return tag("div", "; ".join(on_web(web)))
 
 
 def _cable(cable):

@@ -168,9 +168,7 @@ def _space(record, frames, missing):
 
 def _once(origin, steps):
     """Numbers of the different points, and the index of each point among them, in the order of the lines."""
-    rows = np.concatenate(
-        [origin.view(np.int32).astype(int), steps.transpose(1, 0, 2).reshape(len(origin), -1)], axis=1
-    )
+    rows = np.hstack([origin.view(np.int32).astype(int), steps.transpose(1, 0, 2).reshape(len(origin), -1)])
     _, first, inverse_order = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty(len(order), dtype=int)
@@ -231,11 +229,8 @@ def _bodies(frames, arrays):
     rows = []
     for i, (name, body) in enumerate(frames[0].bodies.items()):
         points_of = [frame.bodies[name].points for frame in frames if name in frame.bodies]
-        if (
-            len(points_of) < len(frames)
-            or any(points.shape != body.points.shape for points in points_of)
-            or not len(body[1])
-        ):
+        alike = len(points_of) == len(frames) and all(points.shape == body.points.shape for points in points_of)
+        if not alike or not len(body.triangles):
             continue
         middle = body.points.mean(axis=0)
         arrays[f"points of body {i}"] = (body.points - middle).astype(np.float32)

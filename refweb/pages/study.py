@@ -19,6 +19,7 @@ from ..results.folder import so_far
 from ..results.summary_text import on_cost
 from . import page
 from .markup import figure, html, image, listing, pairs, section, table, tag
+from .sections import warnings
 
 MOST_ROWS = 500
 """Largest number of rows on a page."""
@@ -45,7 +46,7 @@ def page_of(study, rows):
     """The page of a study, as text; ``rows`` are all of its rows."""
     summary = study.summary
     status = tag("span", summary["status"], class_="status" + " bad" * (summary["status"] != "solved"))
-    parts = [_together(summary), _warnings(summary), _plots(study), _rows(study, rows), _study(summary)]
+    parts = [_together(summary), warnings(study), _plots(study), _rows(study, rows), _study(summary)]
     return page.filled(
         summary["title"],
         html([status, f" {words.on_count(summary)}. ", summary["message"] or ""]),
@@ -69,11 +70,6 @@ def _together(summary):
     return section("results", "Results", *said)
 
 
-def _warnings(summary):
-    texts = summary["warnings"]
-    return section("warnings", "Warnings", tag("div", listing(texts), class_="warned") if texts else tag("p", "None."))
-
-
 def _plots(study):
     """A plot of each result."""
     drawn = []
@@ -86,15 +82,13 @@ def _plots(study):
 
 def _rows(study, rows):
     """The rows, numbers to six digits."""
-    hidden = ("statistical",)
-    columns = [name for name in study.columns if name not in hidden]
+    columns = [name for name in study.columns if name != "statistical"]
+    columns.sort(key=lambda name: name in (*FIRST, *LAST))
     cells = [[_cell(row.get(name)) for name in columns] for row in rows[:MOST_ROWS]]
     remark = f"All digits are in {NAME}."
     if len(rows) > MOST_ROWS:
         remark += f" The first {MOST_ROWS} of {len(rows)} rows are here."
-    order = sorted(range(len(columns)), key=lambda n: (columns[n] in (*FIRST, *LAST), n))
-    ordered = [[row[n] for n in order] for row in cells]
-    body = table([columns[n] for n in order], ordered) if rows else tag("p", "There are no rows.")
+    body = table(columns, cells) if rows else tag("p", "There are no rows.")
     return section("rows", "Rows", tag("details", [tag("summary", f"{len(rows)} rows"), body]), tag("p", remark))
 
 

@@ -16,17 +16,14 @@ same floats; all names that `sweeps.sweep`, `sizing.runs` and other files import
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
 import json
-import os
 import pathlib
 from typing import Any, NamedTuple
 
-from ..errors import SolverError
 from ..messages import one_line, short
-from .files import number, write_atomically
+from . import files
 from .folder import hold
 
 NAME, ASIDE = "results.csv", "set-aside.csv"
@@ -51,12 +48,10 @@ def results_among(columns):
 
 def result_cells(row):
     """The cells of a row that its case determines: all but parameters, whose names may have changed."""
-    names = {result.name for result in results_among(row)}
-    ends = (" ±", " least", " most", " mean", " deviation", " verdict")
-    mine = {f"{result.name} [{result.unit}]" for result in results_among(row)} | {
-        f"{n}{end}" for n in names for end in ends
-    }
-    return {column: value for column, value in row.items() if column in mine or column in (*FIRST, *LAST)}
+    mine = {*FIRST, *LAST}
+    for name, unit in results_among(row):
+        mine |= {f"{name}{end}" for end in (f" [{unit}]", " ±", " least", " most", " mean", " deviation", " verdict")}
+    return {column: value for column, value in row.items() if column in mine}
 
 
 def read(path):
@@ -93,7 +88,7 @@ def _cell(value):
     if value is None:
         return ""
     if isinstance(value, float):
-        return number(value)
+        return files.number(value)
     if isinstance(value, str):
         return one_line(value)
     return json.dumps(value, ensure_ascii=False)
@@ -105,16 +100,16 @@ def _line(cells):
     return text.getvalue().encode()
 
 
-def _ordered(columns):
+def ordered(columns):
     """Columns in their order."""
     return [*FIRST, *(c for c in columns if c not in FIRST and c not in LAST), *LAST]
 
 
 def write(path, rows, columns=()):
     """Write a table anew, atomically; columns are those given and those of the rows."""
-    columns = _ordered(dict.fromkeys([*columns, *(name for row in rows for name in row)]))
+    columns = ordered(dict.fromkeys([*columns, *(name for row in rows for name in row)]))
     content = b"".join(_line(map(_cell, line)) for line in (columns, *([row.get(c) for c in columns] for row in rows)))
-    write_atomically(pathlib.Path(path), lambda name: pathlib.Path(name).write_bytes(content))
+    files.write_atomically(pathlib.Path(path), lambda name: pathlib.Path(name).write_bytes(content))
     return columns
 
 
@@ -143,15 +138,12 @@ class CaseRows:
         self._write(columns)
 
     def _write(self, columns):
-        with self._written():
+        with written(self.path.parent):
             self._columns = write(self.path, self.rows, columns)
             if self._file is not None:
                 self._file.close()
             self._file = open(self.path, "ab", buffering=0)
             hold(self._file)
-
-    def _written(self):
-        return written(self.path.parent)
 
     def add(self, *rows):
         """Append some rows at once."""
@@ -160,14 +152,8 @@ class CaseRows:
             self._write(dict.fromkeys([*self._columns, *(name for row in rows for name in row)]))
             return
         lines = b"".join(_line([_cell(row.get(name)) for name in self._columns]) for row in rows)
-        with self._written():
-            size = os.fstat(self._file.fileno()).st_size
-            try:
-                while lines:
-                    lines = lines[self._file.write(lines) :]
-            except OSError:
-                self._file.truncate(size)
-                raise
+        with written(self.path.parent):
+            files.append(self._file, lines)
 
     def order(self, rows):
         """Write the table with the given rows in their order."""
@@ -179,13 +165,7 @@ class CaseRows:
         self._file.close()
 
 
-@contextlib.contextmanager
 def written(folder):
     """Turn an error of writing into a `SolverError` that names the folder of the study."""
-    try:
-        yield
-    except OSError as error:
-        raise SolverError(
-            f"folder of the study {short(str(folder))}: cannot be written any more: {error.strerror or error}; "
-            "rows that were written are whole, and the study goes on with what is missing"
-        ) from None
+    left = "rows that were written are whole, and the study goes on with what is missing"
+    return files.written(f"folder of the study {short(str(folder))}", left)

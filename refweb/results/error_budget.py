@@ -39,13 +39,8 @@ PARTS = ("time", "elements", "contact_stiffness", "smoothing", "chance", "roundi
 MODELS = ("elements", "contact_stiffness", "smoothing")
 """Parts that belong to the model and not to its solution."""
 NONE, OPEN = "none", "not estimated"
-DETERMINED, WIDE, STATISTICAL, MODEL, NO_LIMIT = VERDICTS = (
-    "determined",
-    "wide",
-    "statistical",
-    "depends on the model",
-    "no limit",
-)
+VERDICTS = ("determined", "wide", "statistical", "depends on the model", "no limit")
+DETERMINED, WIDE, STATISTICAL, MODEL, NO_LIMIT = VERDICTS
 ALLOWED = 0.1
 """± over the value above which a result is not determined."""
 SMOOTHING_SHARE = 0.1
@@ -187,9 +182,8 @@ def with_verdict(result, remedies, mesh_only=False, scales=None):
     missing = [WORDS[part] for part, state in result.parts.items() if state == OPEN]
     numbers = {part: state for part, state in result.parts.items() if isinstance(state, float)}
     if mesh_only:
-        return _judged(
-            result, NO_LIMIT, "it falls with the size of elements, and grows with the stiffness of contact", remedies
-        )
+        cause = "it falls with the size of elements, and grows with the stiffness of contact"
+        return _judged(result, NO_LIMIT, cause, remedies)
     if error is None or not math.isfinite(error):
         return result._replace(verdict=None, verdict_text="its error is not known")
     if error > 0.0 and value + error <= ZERO * (scales or {}).get(result.unit, 0.0):
@@ -306,21 +300,7 @@ def judge(solution, scene, system, price=None, asked=None):
 
 
 def _judge_utilisation(solution, scene, system, reasons, further):
-    """Set ± of the utilisation and of the margin of safety of a solution.
-
-    Parameters
-    ----------
-    solution : refweb.solution.Solution
-        Solution with judged results; its ``utilisation`` and ``margin`` are replaced.
-    scene : refweb.Scene
-        As it was solved.
-    system : refweb.system.system.System
-        That of the scene.
-    reasons : dict of str to str
-        Reasons why parts of the error do not exist, by part.
-    further : dict
-        ``parts`` and ``reasons`` by further runs, as for results.
-    """
+    """Set ± of the utilisation and of the margin of safety of a solution with judged results."""
     used, margin = solution.utilisation, solution.margin
     if used is None:
         return
@@ -345,13 +325,8 @@ def _remedies(result, solution, price):
     if price is not None and 1.0 < share < math.inf:
         cost = f", for some {price(share):.2g} s of CPU time"
     if solution.scene.solve.kind == "static":
-        wide = "that is what the residual and rounding leave of it"
-        return {
-            WIDE: wide,
-            STATISTICAL: "",
-            NO_LIMIT: "",
-            MODEL: _of_model(result, solution.scene.cable).partition(", or ask")[0],
-        }
+        of_model = _of_model(result, solution.scene.cable).partition(", or ask")[0]
+        return {WIDE: "that is what the residual and rounding leave of it", MODEL: of_model}
     zero = abs(result.value) <= FAR_WITHIN * (result.error or 0.0)
     return {
         WIDE: "the value is zero within ±" if zero else f"[accuracy] digits = 1 makes it smaller{cost}",
@@ -409,7 +384,5 @@ def _warnings(solution, named, known):
         text = listed([f"{name} ({100.0 * share:.2g} %)" for name, share in wide.items()])
         yield Finding("wide-error", f"± is above a tenth of the peak: {text}; {remedy}", "accuracy")
     if solution.divergence is not None:
-        text = (
-            f"the motion may be chaotic: run and step refinement grow apart with {solution.divergence.growth:.3g} 1/s; "
-        )
-        yield Finding("chaotic", text + remedy, "accuracy")
+        growth = f"run and step refinement grow apart with {solution.divergence.growth:.3g} 1/s"
+        yield Finding("chaotic", f"the motion may be chaotic: {growth}; {remedy}", "accuracy")

@@ -9,9 +9,13 @@ which `commands.new`, `pages.page` and other files import. Tests: ``tests/test_s
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+import json
 import os
 import pathlib
+
+from ..errors import SolverError
 
 _numbers = itertools.count()
 
@@ -30,6 +34,31 @@ def write_atomically(path, write):
 def write_text(path, text):
     """Write a text file atomically, as UTF-8."""
     write_atomically(path, lambda name: pathlib.Path(name).write_text(text, encoding="utf-8"))
+
+
+def write_json(path, content):
+    """Write plain values atomically as JSON."""
+    write_text(path, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def append(file, content):
+    """Append bytes to an open file without a buffer, or nothing if the disk is full."""
+    size = os.fstat(file.fileno()).st_size
+    try:
+        while content:
+            content = content[file.write(content) :]
+    except OSError:
+        file.truncate(size)
+        raise
+
+
+@contextlib.contextmanager
+def written(folder, left):
+    """Turn an error of writing into a `SolverError` that says which folder it is, and what is left in it."""
+    try:
+        yield
+    except OSError as error:
+        raise SolverError(f"{folder}: cannot be written any more: {error.strerror or error}; {left}") from None
 
 
 def number(value):

@@ -27,10 +27,10 @@ from collections import Counter
 
 import numpy as np
 
-from ..errors import InputError, SolverError
+from ..errors import InputError
 from ..messages import short
 from ..net.rigid_body import row_names
-from .files import as_toml, number, write_atomically, write_text
+from .files import append, as_toml, number, write_atomically, write_json, write_text, written
 from .vtu import meshes, write_mesh
 
 RESULT_FILES = re.compile(
@@ -93,36 +93,31 @@ def so_far(folder, summary):
     alive, at = is_alive(folder), reached(folder)
     text = f"it has reached {at}" if at else "it has written no row"
     if summary.get("kind") in ("sweep", "size"):
-        text = _rows(folder)
-        if summary["kind"] == "sweep":
-            summary = {**summary, "count": _counted(folder, summary["count"])}
+        statuses = _statuses(folder)
+        text = f"it has written {len(statuses)} row{'s' * (len(statuses) != 1)}"
+        if summary["kind"] == "sweep" and statuses:
+            summary = {**summary, "count": _counted(statuses, summary["count"])}
     if alive is False:
         return {**summary, "status": "killed", "message": f"its process is dead; {text}; {remedy(folder)}"}
     return {**summary, "message": f"{text}; {'its process is alive' if alive else 'whether it is alive is not known'}"}
 
 
-def _rows(folder):
-    """Number of rows of the table of a study, in words."""
-    try:
-        with open(folder / "results.csv", "rb") as lines:
-            count = sum(line.endswith(b"\n") for line in lines) - 1
-    except OSError:
-        count = 0
-    return f"it has written {max(count, 0)} row{'s' * (count != 1)}"
-
-
-def _counted(folder, count):
-    """Number of cases of each status by the table of a study; ``count`` is that at its start."""
+def _statuses(folder):
+    """Status of each whole row of the table of a study."""
     try:
         text = (folder / "results.csv").read_text(encoding="utf-8")
     except OSError:
-        return count
-    lines = io.StringIO(text[: text.rfind("\n") + 1], newline="")
-    written = Counter(row["status"] for row in csv.DictReader(lines))
-    for status in ("skipped", "waiting"):  # which have no rows before the end
-        written[status] = written[status] or count.get(status, 0)
-    written["waiting"] = sum(count.values()) - sum(number for key, number in written.items() if key != "waiting")
-    return {status: number for status, number in written.items() if number > 0}
+        return []
+    return [row["status"] for row in csv.DictReader(io.StringIO(text[: text.rfind("\n") + 1], newline=""))]
+
+
+def _counted(statuses, count):
+    """Number of cases of each status by rows of a study; ``count`` is that at its start."""
+    total = Counter(statuses)
+    total["skipped"] = total["skipped"] or count.get("skipped", 0)  # which have no rows before the end
+    total["waiting"] = 0
+    total["waiting"] = sum(count.values()) - total.total()
+    return {status: number for status, number in total.items() if number > 0}
 
 
 def remedy(folder):
@@ -243,16 +238,9 @@ class Folder:
             self._scene = fingerprint(self.path)
         self._start()
 
-    @contextlib.contextmanager
     def _written(self):
         """Turn an error of writing into a `SolverError` that names the folder."""
-        try:
-            yield
-        except OSError as error:
-            raise SolverError(
-                f"result folder {short(str(self.path))}: cannot be written any more: {error.strerror or error}; "
-                "what was written is whole"
-            ) from None
+        return written(f"result folder {short(str(self.path))}", "what was written is whole")
 
     def _start(self):
         with self._written():
@@ -277,9 +265,8 @@ class Folder:
         with self._written():
             self._history = open(self.path / self._table, "r+b", buffering=0)
             hold(self._history)
-            kept = sum(kept)
-            self._history.truncate(kept)
-            self._history.seek(kept)
+            self._history.seek(sum(kept))
+            self._history.truncate()
             for path in [*self.path.glob(".refweb-*"), *(self.path / "frames").iterdir()]:
                 number = re.search(r"_(\d{6,})\.vtu$", path.name)
                 if RESULT_FILES.fullmatch(path.relative_to(self.path).as_posix()) and not (
@@ -301,15 +288,9 @@ class Folder:
 
     def row(self, values):
         """Append a row to the history, or nothing if the disk is full."""
-        line = (",".join(v if isinstance(v, str) else number(v) for v in values) + "\n").encode()
-        length = self._history.tell()
+        line = ",".join(v if isinstance(v, str) else number(v) for v in values) + "\n"
         with self._written():
-            try:
-                while line:
-                    line = line[self._history.write(line) :]
-            except OSError:
-                self._history.truncate(length)
-                raise
+            append(self._history, line.encode())
 
     def frame(self, number, state, shape=None, run=None):
         """Write frame and checkpoint of a state and list the frame in ``web.pvd``, with a ``shape`` as its mode.
@@ -337,10 +318,7 @@ class Folder:
             if net.point_mass is not None:
                 arrays["point_masses"] = net.point_mass
             if state.system.weakness is not None:
-                arrays |= {
-                    "broken": net.broken,
-                    "broken_energies": net.line_data.rupture_energy[net.broken],
-                }
+                arrays |= {"broken": net.broken, "broken_energies": net.line_data.rupture_energy[net.broken]}
             if state.system.contact_shares is not None:
                 arrays["contact_shares"] = state.system.contact_shares
             arrays |= run or {}
@@ -377,9 +355,8 @@ class Folder:
 
     def summary(self, run):
         """Write ``run.json``."""
-        text = json.dumps(run, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         with self._written():
-            write_text(self.path / "run.json", text)
+            write_json(self.path / "run.json", run)
 
     def last_row(self):
         """The last row of the history."""

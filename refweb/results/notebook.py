@@ -18,14 +18,8 @@ def of_solution(solution):
     rows = []
     for name, result in solution.results.items():
         time = [f"{result.time:.6g} s"] if dynamic else []
-        rows.append(
-            [
-                name,
-                readable(result.value, result.error, result.unit, result.within),
-                *time,
-                position_text(result.where, result.at),
-            ]
-        )
+        value = readable(result.value, result.error, result.unit, result.within)
+        rows.append([name, value, *time, position_text(result.where, result.at)])
     remarks = other_errors(solution.summary()["results"])
     said = [*remarks, solution.message, *(f"warning: {text}" for text in solution.warnings)]
     cost = f"{solution.solver.get('method')}, {solution.cost['cpu_s']:.2f} s CPU"
@@ -45,9 +39,9 @@ def of_scene(given, title):
     return _part(title, _table(["table", "keys"], rows), [])
 
 
-def _short(value, limit=60):
+def _short(value):
     text = str(value)
-    return text if len(text) <= limit else f"{text[: limit - 1]}…"
+    return text if len(text) <= 60 else f"{text[:59]}…"
 
 
 def _table(head, rows):

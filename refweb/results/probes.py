@@ -61,6 +61,11 @@ class Probe(NamedTuple):
     average: float = 0.0
     term: int = -1
 
+    def at(self, state: Any, force: np.ndarray) -> float:
+        """Value in a `refweb.results.state.State` with the total ``force`` of each row, of a probe without lines."""
+        rows, data = np.array(self.rows, dtype=np.int64), np.ascontiguousarray(self.data, dtype=float)
+        return float(self.kernel(state.time, state.x, state.v, force, np.zeros((0, 0)), rows, data, np.full(2, -1)))
+
 
 @kernel()
 def _larger(a, b):

@@ -43,20 +43,15 @@ def followed(progress, text=LOADING):
     ------
     callable
     """
-    if callable(progress):
-        with _compiling(progress):
-            yield progress
-    elif progress and sys.stderr.isatty():
-        with _bar(text) as tell, _compiling(tell):
-            yield tell
-    elif progress and _in_notebook():
-        with _line() as tell, _compiling(tell):
-            yield tell
-    elif progress:
-        with _lines() as tell, _compiling(tell):
-            yield tell
-    else:
+    if not progress:
         yield lambda text, share: None
+        return
+    if callable(progress):
+        display = contextlib.nullcontext(progress)
+    else:
+        display = _bar(text) if sys.stderr.isatty() else _line() if _in_notebook() else _lines()
+    with display as tell, _compiling(tell):
+        yield tell
 
 
 def _compiling(tell):

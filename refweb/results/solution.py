@@ -37,6 +37,10 @@ OTHER_ERRORS = {"smoothing": "smoothing moves", "discretisation": "discretisatio
 """Errors of a result with separate keys, and the words before them; ± contains the first two."""
 
 
+OPTIONAL = "broken_before commands controls margin bodies pairs lines passage throw horizon".split()
+"""Keys of ``run.json`` and attributes of a solution that are left out where they are empty."""
+
+
 class Names(dict[str, Any]):
     """A dict whose errors on unknown keys name the nearest key."""
 
@@ -105,11 +109,8 @@ def read_results(given: dict[str, Any]) -> dict[str, Result]:
     """Results by name from their dicts in ``run.json``; raise a `TypeError` for other content."""
     results = {name: Result(**entry) for name, entry in given.items()}
     for name, entry in results.items():
-        if not (
-            isinstance(entry.value, float | int)
-            and isinstance(entry.error, float | None)
-            and isinstance(entry.unit, str)
-        ):
+        kinds = ((entry.value, float | int), (entry.error, float | None), (entry.unit, str))
+        if not all(isinstance(value, kind) for value, kind in kinds):
             raise TypeError(f"{name} is not a number")
         if entry.within is not None:
             results[name] = entry = entry._replace(within=tuple(entry.within))
@@ -266,9 +267,6 @@ class SolutionData:
             "steps": [{**step, "results": plain(step["results"])} for step in self.steps],
             "events": self.events,
             **({} if self.breaks is None else {"breaks": self.breaks}),
-            **({"broken_before": self.broken_before} if self.broken_before else {}),
-            **({"commands": self.commands} if self.commands else {}),
-            **({"controls": self.controls} if self.controls else {}),
             "solver": self.solver,
             "cost": self.cost,
             "versions": self.versions,
@@ -277,13 +275,7 @@ class SolutionData:
             "warnings": self.warnings,
             "findings": [finding._asdict() for finding in self.findings],
             **({"utilisation": self.utilisation.plain()} if self.utilisation else {}),
-            **({"margin": self.margin} if self.margin else {}),
-            **({"bodies": self.bodies} if self.bodies else {}),
-            **({"pairs": self.pairs} if self.pairs else {}),
-            **({"lines": self.lines} if self.lines else {}),
-            **({"passage": self.passage} if self.passage else {}),
-            **({"throw": self.throw} if self.throw else {}),
-            **({"horizon": self.horizon} if self.horizon else {}),
+            **{key: value for key in OPTIONAL if (value := getattr(self, key))},
             **({"further_runs": self.further} if self.further else {}),
         }
 

@@ -124,12 +124,8 @@ class State:
     @cached_property
     def element_slack(self) -> NDArray[np.bool_]:
         """True for each element that is slack all along, as `slack`, shape (cells,); none of form finding is."""
-        return (self.element_strain <= self._slack_below) & ~self.system.net.forming
-
-    @property
-    def _slack_below(self):
-        """Strain at or below which each element is slack, shape (cells,)."""
-        return self.system.net.slackness if self.plastic_strain is None else self.plastic_strain
+        slack_below = self.system.net.slackness if self.plastic_strain is None else self.plastic_strain
+        return (self.element_strain <= slack_below) & ~self.system.net.forming
 
     @cached_property
     def plastic_strain(self) -> NDArray[np.float64] | None:

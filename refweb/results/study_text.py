@@ -14,15 +14,8 @@ from .units import readable, scale_of
 
 def on_count(summary):
     """Number of cases, and their status."""
-    words = {
-        "solved": "solved",
-        "failed": "failed",
-        "refused": "refused",
-        "lost": "lost with their workers",
-        "skipped": "skipped",
-        "waiting": "not run yet",
-    }
-    text = ", ".join(f"{number} {words[status]}" for status, number in summary["count"].items())
+    words = {"lost": "lost with their workers", "waiting": "not run yet"}
+    text = ", ".join(f"{number} {words.get(status, status)}" for status, number in summary["count"].items())
     return f"{summary['cases']} cases: {text}"
 
 
@@ -60,22 +53,16 @@ def rows_of_spread(entry):
     for name, of_result in entry["results"].items():
         factor, unit = scale_of(max(abs(of_result["least"]), abs(of_result["largest"])), of_result["unit"])
         keys = ("mean", "mean_error", "standard_error", "deviation") if "mean" in of_result else ("least", "largest")
-        values = (
-            [of_result[key] for key in keys]
-            + [q["value"] for q in of_result.get("quantiles", ())]
-            + [of_result["error"]]
-        )
-        short = ("mean_error", "standard_error")
-        forms = (
-            [".2g" if key in short else ".4g" for key in keys] + [".4g"] * len(of_result.get("quantiles", ())) + [".2g"]
-        )
-        texts = ["not known" if v is None else f"{v / factor:{form}}" for v, form in zip(values, forms, strict=True)]
+        quantiles = of_result.get("quantiles", ())
+        values = [(of_result[key], ".2g" if key in ("mean_error", "standard_error") else ".4g") for key in keys]
+        values += [*((q["value"], ".4g") for q in quantiles), (of_result["error"], ".2g")]
+        texts = ["not known" if value is None else f"{value / factor:{form}}" for value, form in values]
         if (off := of_result.get("deviation_error")) is not None:
             texts[keys.index("deviation")] += f" ± {off / factor:.2g}"
         verdicts = ", ".join(f"{number} {verdict}" for verdict, number in of_result.get("verdicts", {}).items())
         rows.append([f"{name} [{unit}]" if unit else name, *texts, *([verdicts] if judged else [])])
         heads = ("mean", "its ±", "by samples ±", "spread") if "mean" in of_result else keys
-        columns = ["result", *heads, *(f"{100.0 * q['q']:g} %" for q in of_result.get("quantiles", ())), "± at most"]
+        columns = ["result", *heads, *(f"{100.0 * q['q']:g} %" for q in quantiles), "± at most"]
         columns += ["verdict"] * judged
     return Rows(columns, rows, [])
 
@@ -97,30 +84,17 @@ def rows_of_conditions(entry):
     """A row for each condition: its probability with its interval, and the number of cases that decide it."""
     rows = []
     for name, of_condition in entry["conditions"].items():
-        if of_condition["share"] is None:
-            chance = "not known"
-        else:
-            chance = f"{100.0 * of_condition['share']:.4g} %"
+        share = of_condition["share"]
+        chance = "not known" if share is None else f"{100.0 * share:.4g} %"
         lower, upper = of_condition.get("lower"), of_condition.get("upper")
         if lower is not None and lower != upper:
             chance += f", from {100.0 * lower:.4g} to {100.0 * upper:.4g} %"
         between = of_condition.get("interval")
         text = f"{100.0 * between[0]:.3g} … {100.0 * between[1]:.3g} %" if between else ""
-        left = ", ".join(
-            f"{of_condition[key]} {key}"
-            for key in ("undecided", "failed", "unproven", "statistical")
-            if of_condition[key]
-        )
-        rows.append(
-            [
-                name,
-                chance,
-                text,
-                f"{of_condition['true']} true, {of_condition['false']} false",
-                left,
-                of_condition["condition"],
-            ]
-        )
+        kinds = ("undecided", "failed", "unproven", "statistical")
+        left = ", ".join(f"{of_condition[key]} {key}" for key in kinds if of_condition[key])
+        cases = f"{of_condition['true']} true, {of_condition['false']} false"
+        rows.append([name, chance, text, cases, left, of_condition["condition"]])
     return Rows(["condition", "holds in", "interval", "cases", "", "which is"], rows, [])
 
 

@@ -94,16 +94,7 @@ def rows_of_modes(step):
         remarks += ["local"] if step["moving"][k] < 0.1 else []
         share = 100.0 * step["moving"][k]
         moving = f"{share:.0f} %" if share >= 10.0 else f"{share:.2g} %"
-        rows.append(
-            [
-                str(k + 1),
-                text,
-                axes,
-                moving,
-                str(step["at"][k]),
-                ", ".join(remarks),
-            ]
-        )
+        rows.append([str(k + 1), text, axes, moving, str(step["at"][k]), ", ".join(remarks)])
     return Rows(["mode", "frequency", "along", "moving mass", "most at", ""], rows, [])
 
 
@@ -215,10 +206,8 @@ def _breaks(breaks):
         yield "breaks", "none"
     for n, entry in enumerate(breaks[:FEW_BREAKS]):
         when = readable(entry["time"], entry["error"], "s")
-        yield (
-            "breaks" * (n == 0),
-            f"line {entry['line']} at t = {when}, stored energy {readable(entry['energy'], None, 'J')}",
-        )
+        text = f"line {entry['line']} at t = {when}, stored energy {readable(entry['energy'], None, 'J')}"
+        yield "breaks" * (n == 0), text
     if len(breaks) > FEW_BREAKS:
         yield "", f"and {len(breaks) - FEW_BREAKS} more, the last at t = {breaks[-1]['time']:.6g} s"
 
@@ -258,7 +247,6 @@ def _horizon(horizon):
 
 
 def _equal(first, second):
-    within = min(
-        first["error"] + second["error"], 1e-6 * abs(first["value"])
-    )  # in a turning frame ± says nothing of that
+    # in a turning frame ± says nothing of that
+    within = min(first["error"] + second["error"], 1e-6 * abs(first["value"]))
     return abs(first["value"] - second["value"]) <= max(within, 1e-9 * abs(first["value"]))

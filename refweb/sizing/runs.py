@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 from ..errors import InputError
 from ..messages import one_line
 from ..results import case_rows
-from ..results.files import as_toml, write_text
+from ..results.files import as_toml, write_json, write_text
 from ..sweeps.case import solve
 from ..sweeps.chances import bounds, clopper_pearson
 from ..sweeps.design import KEY, Case, key_of
@@ -147,9 +147,8 @@ class Runs:
     def summary(self, content):
         """Write ``run.json``."""
         if self.path is not None:
-            text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
             with case_rows.written(self.path):
-                write_text(self.path / "run.json", text)
+                write_json(self.path / "run.json", content)
 
     def end(self):
         """Close the table of rows."""

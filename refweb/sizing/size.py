@@ -176,15 +176,9 @@ def prepared(requirements):
 
 def _conclude(sized, runs, judged, optimum, spent):
     """Say what was found: the design, its requirements, and designs that are undecided."""
-    sized.designs = [
-        {
-            "values": runs.problem.space.values(j.design),
-            "objective": j.value,
-            "reserve": j.tightest,
-            "holds": j.feasible,
-        }
-        for j in runs.judged.values()
-    ]
+    for j in runs.judged.values():
+        result = {"objective": j.value, "reserve": j.tightest, "holds": j.feasible}
+        sized.designs.append({"values": runs.problem.space.values(j.design), **result})
     if judged is None:
         reasons = [j.message for j in runs.judged.values() if j.message]
         raise SolverError(f"no design gives a result: {reasons[0] if reasons else 'the first has none'}")
@@ -272,11 +266,7 @@ def _text_of(values):
 
 def _count(designs, adjective, verb, of_several):
     """Number of some designs, with an adjective and a verb, which is another one ``of_several``."""
-    return (
-        f"{len(designs)} {adjective}design {verb}"
-        if len(designs) == 1
-        else f"{len(designs)} {adjective}designs {of_several}"
-    )
+    return f"{len(designs)} {adjective}" + (f"design {verb}" if len(designs) == 1 else f"designs {of_several}")
 
 
 def _add_notes(sized, runs, judged):

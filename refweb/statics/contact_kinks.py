@@ -57,7 +57,7 @@ def sharing_remark(state, stability):
 
 def no_modes(system, equilibrium):
     """The error of natural frequencies about an equilibrium in which elements share a push."""
-    body, line = _first(system, equilibrium)
+    body, line = next(iter(shared_by(equilibrium.system_of(system), equilibrium.step, equilibrium.x)))
     return SolverError(
         f'no natural frequencies at step {equilibrium.step:g}: body "{body.name}" touches line {line} with several '
         "elements alike, and the push jumps between these, so that vibrations are not linear; give it a shape that "
@@ -76,11 +76,6 @@ def jumps(system, shares, x):
         "contact with a sphere acts once a line, and the push goes to and fro between these elements, by the way of a "
         "step"
     )
-
-
-def _first(system, equilibrium):
-    """The first body and line of which elements share a push."""
-    return next(iter(shared_by(equilibrium.system_of(system), equilibrium.step, equilibrium.x)))
 
 
 def kink_remark(system, x, remedy=""):

@@ -32,7 +32,7 @@ precision where the platform has it, because the remaining unbalanced force ente
 May change: the three constants, and how forces are corrected: any correction proves a bound, a better one a smaller
 bound. Must stay: each term of the gap is at least 0 and holds its rounding, else nothing is proven; names of the fields
 of `DualityBound`, which `simulation`, `floating` and `results.observables` read. `thread_bars` brings the same arrays
-for threads. Must stay as well: `duality_bound`, which `dynamic_relaxation`, `load_steps` and `monotone_loading` import.
+for threads. Must stay as well: `duality_bound`, which `equilibrium` and `monotone_loading` import.
 Tests: ``tests/statics/test_statics.py``, ``tests/net/test_curves.py``.
 """
 
@@ -160,7 +160,7 @@ class _Balance:
             return across * change + along * stretch[:, None] + bars.shared(stretch)
 
         def times(p):
-            return (down @ weigh(self._of_bars @ self._rows(p))).ravel()[system.free]
+            return (down @ weigh(self._of_bars @ system.rows_of(p))).ravel()[system.free]
 
         def solve(b):
             return conjugate_gradients.solve(times, factor.precondition, b, CLOSE, MOST).y
@@ -179,7 +179,7 @@ class _Balance:
             p = solve(unbalanced.ravel()[self._system.free].astype(float))
             if p is None:
                 break
-            correction += weigh(self._of_bars @ self._rows(p))
+            correction += weigh(self._of_bars @ self._system.rows_of(p))
             unbalanced = self._unbalanced(self._force + correction)
             if np.abs(unbalanced).sum() * self._reach <= self._least_gap:
                 break
@@ -199,12 +199,6 @@ class _Balance:
             value[:count].reshape(-1, len(self._system.net.weights)).max(axis=1) for value in (tension, strain)
         )
         return DualityBound(gap, tension, strain, strain_energy, bool(gap <= SHARP * self._least_gap), threads)
-
-    def _rows(self, p):
-        """Displacement of all rows, shape (rows, 3), from that of the unknowns."""
-        y = np.zeros((self._system.rows, 3))
-        y.ravel()[self._system.free] = p
-        return y
 
     def _unbalanced(self, force):
         """Outer forces that the forces of the bars do not balance, shape (rows, 3)."""

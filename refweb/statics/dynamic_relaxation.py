@@ -29,6 +29,7 @@ from .equilibrium import (
     TOLERANCE,
     Equilibrium,
     NotFound,
+    add_proofs,
     check_supported,
     force_scale,
     refuse_half_turns,
@@ -181,18 +182,7 @@ class Relaxation:
         if system.dead and not system.convex:
             stats["above_lowest"] = None if (per_cell.tension < 0.0).any() else 0.0
         state = Equilibrium(t, x, per_cell.tension.copy(), f, stats)
-        if system.bounded:
-            from .duality_bound import duality_bound
-
-            state.duality_bound = duality_bound(system, state)
-        if system.convex:
-            from .floating import between_slack_lines
-
-            state.floating = between_slack_lines(system, state)
-        elif system.net.law_is("plastic").any():
-            from .monotone_loading import add_bounds
-
-            add_bounds(system, state)
+        add_proofs(system, state)
         return state
 
     def _inverse_mass(self, t):

@@ -131,6 +131,25 @@ def add_spent(stats, more):
         stats[key] += more.get(key, 0)
 
 
+def add_proofs(system, state, factor=None):
+    """Add to an `Equilibrium` the bounds that duality proves, and the parts that float.
+
+    ``factor`` is a `refweb.system.factorization.Factor` that is used again.
+    """
+    if system.bounded:
+        from .duality_bound import duality_bound
+
+        state.duality_bound = duality_bound(system, state, factor)
+    if system.convex:
+        from .floating import between_slack_lines
+
+        state.floating = between_slack_lines(system, state)
+    elif system.net.law_is("plastic").any():
+        from .monotone_loading import add_bounds
+
+        add_bounds(system, state, factor)
+
+
 def check_supported(system, t):
     """Refuse a load that no support carries, a frame that rotates too fast, and links."""
     if system.constraints:

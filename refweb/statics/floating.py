@@ -8,8 +8,8 @@ change as parts float.
 
 May change: `SAMPLES`, `OPEN`, private functions. Must stay: fields of `Floating` and `Parts`, which
 `results.observables`, `remarks` and `interval` read by name; `reach` and `limits` hold the values of all equilibria:
-they may be too wide, never too narrow; `between_slack_lines`, which `dynamic_relaxation`, `load_steps` and
-`monotone_loading` import; `NullSpace`, which `newton` imports. Tests: ``tests/statics/test_floating.py``.
+they may be too wide, never too narrow; `between_slack_lines`, which `equilibrium` and `monotone_loading`
+import; `NullSpace`, which `newton` imports. Tests: ``tests/statics/test_floating.py``.
 """
 
 from __future__ import annotations

@@ -229,8 +229,7 @@ class InteriorPoint:
         y = self._factor.solve((force + self._bars.T @ right).ravel()[self.system.free])
         if y is None:
             return None
-        move = np.zeros_like(self.x)
-        move.ravel()[self.system.free] = y
+        move = self.system.rows_of(y)
         turn = self._bars @ move
         longer = kept.extension(tension, turn)
         pulls = np.column_stack([self._stiffness * longer - pull, right - kept.across(turn)])
@@ -280,7 +279,7 @@ class _Scaling:
         size, weight = _size(s), _size(y)
         first, second = s / size[:, None], y / weight[:, None]
         between = np.sqrt(0.5 * (1.0 + np.maximum((first * second).sum(axis=1), 1.0)))
-        self.w = (first + _mirrored(second)) / (2.0 * between)[:, None]
+        self.w = (first + second * [1.0, -1.0, -1.0, -1.0]) / (2.0 * between)[:, None]
         self.w[:, 0] = np.sqrt(1.0 + (self.w[:, 1:] ** 2).sum(axis=1))
         self.ratio = np.sqrt(size / weight)
         self.point = self.multiply(y)
@@ -304,10 +303,6 @@ class _Scaling:
         along = (tail * vectors[:, 1:]).sum(axis=1)
         first = (head * vectors[:, 0] - along) / _size(self.point) ** 2
         return np.column_stack([first, (vectors[:, 1:] - first[:, None] * tail) / head[:, None]])
-
-
-def _mirrored(vectors):
-    return vectors * np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def _size(vectors):

@@ -100,7 +100,7 @@ class Interval:
                 moved, change = self._newton(line, weight, rest, open_, off, share * mean)
             except RuntimeError:  # exactly singular, where rounding allows no further step
                 break
-            closer = off - _dot(line, (self._turns @ moved).reshape(-1, 3))
+            closer = off - (line * (self._turns @ moved).reshape(-1, 3)).sum(axis=1)
             length = min(_longest_step(weight, change), _longest_step(rest, closer))
             t, weight, rest = t + length * moved, weight + length * change, rest + length * closer
         return farthest
@@ -115,10 +115,6 @@ class Interval:
         matrix = block_array([[across, along.T], [along, diags_array(-rest / weight)]], format="csc")
         change = splu(matrix).solve(np.concatenate([open_, off - target / weight + rest]))
         return change[:count], change[count:]
-
-
-def _dot(a, b):
-    return (a * b).sum(axis=1)
 
 
 def _longest_step(value, change):

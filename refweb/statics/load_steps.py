@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..system.static_system import at_rest
-from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, refuse_half_turns, with_reason
+from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_proofs, add_spent, refuse_half_turns, with_reason
 from .newton import Newton
 
 MOST = 400
@@ -75,18 +75,7 @@ def solve(system, load_steps, progress=None):
             solver, state = push.newton, push.equilibrium(t, x, error)
         _refuse_far(system, t, state)
         turns = refuse_half_turns(system, t, state.x, turns)
-        if system.bounded:
-            from .duality_bound import duality_bound
-
-            state.duality_bound = duality_bound(system, state, newton.factor)
-        if system.convex:
-            from .floating import between_slack_lines
-
-            state.floating = between_slack_lines(system, state)
-        elif system.net.law_is("plastic").any():
-            from .monotone_loading import add_bounds
-
-            add_bounds(system, state, newton.factor)
+        add_proofs(system, state, newton.factor)
         if newton.follows:
             solver.factorize_at(state)
         if not system.convex:
@@ -192,6 +181,5 @@ def _by_patience(newton, t, x):
     except NotFound as error:
         net = newton.system.net
         floors = [law.floor(net.line_data[net.law_index == number]).max() for number, law in enumerate(net.laws)]
-        push = f"{max(floors):.3g} N"
-        text = f'{error}, or law = "tension-only": slack lines push with up to {push}'
+        text = f'{error}, or law = "tension-only": slack lines push with up to {max(floors):.3g} N'
         raise NotFound(text, error.stats) from None

@@ -6,13 +6,13 @@ equilibrium is that of lines with a curve, whatever the path has been, and `refw
 has no bound where a line yields without hardening, since its tension then tells nothing of its strain.
 
 May change: `CLOSE` and the insides of other functions than `pieces_of`. Must stay: `turned_back` finds each line that
-was let go, else a bound is wrong; functions that `load_steps`, `dynamic_relaxation` and `gradients` call. `of_curves`
+was let go, else a bound is wrong; functions that `equilibrium` and `gradients` call. `of_curves`
 drops cached properties of `System` by the names in `KEPT_BY_LINES`: a new one that follows from terms or numbers of
 lines belongs there. Must stay as well: numbers of a piece by position as those of `net.laws.curve` (`WIDTH`), whose
 kernels read them at the address in `Table.columns`, and the array in ``kept`` of the net, which keeps it alive; the
 name "plastic" of the terms that `of_curves` leaves out and the columns ``plastic_strain_…`` and ``plastic_force_…``,
 all of `effects.plastic`; strains of corners, the same in `pieces_of` and `corners_of`; `add_bounds`, which
-`dynamic_relaxation` and `load_steps` import; `corners_of`, which `gradients` imports. Tests:
+`equilibrium` imports; `corners_of`, which `gradients` imports. Tests:
 ``tests/statics/test_monotone_loading.py``.
 """
 

@@ -409,8 +409,7 @@ class Newton:
                 state.floating = null.floating(system, state.x)
             if state.floating is not None or any(any(thread.friction) for thread in system.net.threads):
                 solve = null.solve
-        forces = self.disturbing(state)
-        deviations = [solve(force) for force in forces]
+        deviations = [solve(force) for force in self.disturbing(state)]
         return None if any(p is None for p in deviations) else np.array([system.rows_of(p) for p in deviations])
 
     def _deviations_by_factor_at_hand(self, state):
@@ -421,9 +420,7 @@ class Newton:
         deviation = self._by_factor_at_hand(self._matrix(state.step, state.x, self._tiny, False), forces, ROUGH)
         if not deviation.enough:
             return None
-        deviations = np.zeros((forces.shape[1], self.system.rows, 3))
-        deviations.reshape(len(deviations), -1)[:, self.system.free] = deviation.y.T
-        return deviations
+        return np.array([self.system.rows_of(p) for p in deviation.y.T])
 
     def disturbing(self, state):
         """Forces on the unknowns [N]: the residual, and three times the rounding errors with random signs."""

@@ -79,23 +79,20 @@ def on_stability(state, equilibrium, subject="the equilibrium"):
         return
     if stability.sign is None:
         yield Finding("stability-in-doubt", f"whether {subject} is stable is not decided: {stability.why}")
-    pushing = "bars" if _bars_push(state) else "slack lines"
+    pushing, above = "bars" if _bars_push(state) else "slack lines", equilibrium.stats.get("above_lowest", 0.0)
+    others = "there may be other equilibria, and lower ones, which ± does not know"
+    text = ""
     if equilibrium.may_turn_over:
         pull = (state.element_tension[state.system.net.law_is("bar")] >= 0.0).all()
         lowest = equilibrium.stats.get("above_lowest") == 0.0
-        which = "none of them lower" if lowest else "and lower ones, which ± does not know"
-        yield Finding(
-            "lowest-in-doubt", f"{'bars can' if pull else 'bars'} push: there may be other equilibria, {which}"
-        )
-    elif equilibrium.stats.get("above_lowest", 0.0) is None:
-        yield Finding(
-            "lowest-in-doubt", f"{pushing} push: there may be other equilibria, and lower ones, which ± does not know"
-        )
+        others = "there may be other equilibria, none of them lower" if lowest else others
+        text = f"{'bars can' if pull else 'bars'} push: {others}"
+    elif above is None:
+        text = f"{pushing} push: {others}"
     elif equilibrium.stats.get("unsure"):
-        lower = f"{equilibrium.stats['above_lowest']:.3g} J"
-        yield Finding(
-            "lowest-in-doubt", f"{pushing} push: another state may be lower by up to {lower}, which ± does not know"
-        )
+        text = f"{pushing} push: another state may be lower by up to {above:.3g} J, which ± does not know"
+    if text:
+        yield Finding("lowest-in-doubt", text)
 
 
 def _way_out(state, stability):
@@ -167,17 +164,12 @@ def _not_proven(state, equilibrium):
         yield Finding("not-proven", text, "body")
     if net.wound and proven.all():
         text = "lines are on a winch: ± are estimates for these load steps, no proven bounds, and a winch that turns "
-        yield Finding(
-            "not-proven", text + "round between two of them is not seen; compare with more load_steps", "winch"
-        )
+        text += "round between two of them is not seen; compare with more load_steps"
+        yield Finding("not-proven", text, "winch")
     elif any(thread.rings for thread in net.threads) and proven.all():
         text = "threads have friction or a winch: ± are estimates for these load steps, no proven bounds, and a thread "
-        yield Finding(
-            "not-proven",
-            text + "that slips over a ring and turns back between two of them is not seen; "
-            "compare with more load_steps",
-            "thread",
-        )
+        text += "that slips over a ring and turns back between two of them is not seen; compare with more load_steps"
+        yield Finding("not-proven", text, "thread")
     elif net.threads and proven.all() and equilibrium.duality_bound is None:
         text = f'thread "{net.threads[0].name}": ± are estimates, as the proven bound asks for threads with law = '
         yield Finding("not-proven", text + '"tension-only" that run over no body, dead loads and no contact', "thread")

@@ -7,7 +7,6 @@ May change: private functions; sentences, and `DIGITS`, of which the cost is rep
 
 from __future__ import annotations
 
-import json
 import math
 import pathlib
 from dataclasses import dataclass, field
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..results.files import as_toml, write_atomically, write_text
+from ..results.files import as_toml, write_atomically, write_json, write_text
 from ..results.folder import check_folder, clear
 from ..results.provenance import versions
 from . import dop853
@@ -88,7 +87,9 @@ class Cost:
     @property
     def sentence(self) -> str:
         """Cost of digits, in words."""
-        return " ".join(_sentence(self))
+        if not self.references:
+            return "No two runs can be compared, so nothing is known of errors."
+        return f"{_prices(self)} {_agreement(self)}"
 
     def price(self, digits: int, method: str | None = None) -> Any:
         """The cheapest `Trial` with so many digits, which finer trials of its method have as well; else None.
@@ -151,20 +152,12 @@ class Cost:
         check_folder(folder, force)
         folder = pathlib.Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        write_text(folder / "run.json", json.dumps(self.summary(), indent=1, ensure_ascii=False) + "\n")
+        write_json(folder / "run.json", self.summary())
         clear(folder)
         write_text(folder / "scene.toml", as_toml(self.scene.to_dict()))
         lines = [",".join(map(str, row)) for row in (COLUMNS, *self.rows())]
         write_text(folder / "cost.csv", "\n".join(lines) + "\n")
         write_atomically(folder / "cost.png", self.draw().savefig)
-
-
-def _sentence(costs):
-    if costs.references:
-        yield _prices(costs)
-        yield _agreement(costs)
-    else:
-        yield "No two runs can be compared, so nothing is known of errors."
 
 
 def _prices(costs):

@@ -41,21 +41,17 @@ def discretisation_errors(scene, results, solve):
         results_by_mesh.append(solve(scene.replace(cable=cable, accuracy=Accuracy(error="none"))))
     return [
         {
-            name: result._replace(discretisation=_left(*(step[name].value for step in steps)))
+            name: result._replace(discretisation=left_of(*(step[name].value for step in steps)))
             for name, result in coarse.items()
         }
         for coarse, *steps in zip(results, *results_by_mesh, strict=True)
     ]
 
 
-def _left(coarse, fine, finest):
+def left_of(coarse, fine, finest):
     """Error of the first of three values."""
-    return left_of(abs(coarse - fine), abs(fine - finest), abs(coarse - finest))
-
-
-def left_of(first, second, both):
-    """Error of the first of three values, by the differences of 1 and 2, of 2 and 3, and of 1 and 3."""
+    first, second = abs(coarse - fine), abs(fine - finest)
     if second * SLOWEST > first:
-        return 2.0 * max(first, second, both)
+        return 2.0 * max(first, second, abs(coarse - finest))
     ratio = min(first / second, FASTEST) if second > 0.0 else FASTEST
     return MARGIN * first * ratio / (ratio - 1.0)

@@ -131,10 +131,8 @@ class FurtherRuns:
             left = self.budget - self.spent
             entry = {"part": variant.part, "text": variant.text, "expected_s": variant.price, "cpu_s": 0.0}
             if variant.price > left:
-                entry |= {
-                    "status": "left out",
-                    "message": f"{variant.price:.3g} s expected, {max(left, 0.0):.3g} s left of the budget",
-                }
+                message = f"{variant.price:.3g} s expected, {max(left, 0.0):.3g} s left of the budget"
+                entry |= {"status": "left out", "message": message}
             else:
                 entry |= self._tried(variant, left)
             self.solution.further.append(entry)
@@ -232,11 +230,7 @@ class FurtherRuns:
     def _left(self, name, texts, factor):
         """Error of a result by one or two refined runs; with one run it is ``factor`` times the change."""
         values = [self._compared[text][0][name] for text in (None, *texts)]
-        first = abs(values[0] - values[1])
-        if len(values) == 2:
-            left = MARGIN * factor * first
-        else:
-            left = left_of(first, abs(values[1] - values[2]), abs(values[0] - values[2]))
+        left = MARGIN * factor * abs(values[0] - values[1]) if len(values) == 2 else left_of(*values)
         return max(left, MARGIN * self._mean_apart(name, texts[-1]))
 
     def _mean_apart(self, name, text):

@@ -265,15 +265,8 @@ def _follow(result, rest, number, tell):
         }
         totals = {key: totals[key] + stats[key] for key in totals}
         result.solver = {**stats, **totals}
-        result.steps.append(
-            {
-                "step": computed.step,
-                "results": _results(computed, rest.net.nodes),
-                "solver": stats,
-                "at": _nodes_or_bodies(computed, rest.net),
-                **_described(computed),
-            }
-        )
+        step = {"step": computed.step, "results": _results(computed, rest.net.nodes), "solver": stats}
+        result.steps.append({**step, "at": _nodes_or_bodies(computed, rest.net), **_described(computed)})
         remarks.record(computed.step, remarks_on(computed, result.state, equilibrium))
         result.findings = [*remarks.findings(), *rest.remarks()]
 
@@ -299,23 +292,15 @@ def _nodes_or_bodies(computed, net):
 def _described(computed):
     """Data of a spectrum for ``run.json`` besides its frequencies."""
     names = ("squared", "bound", "residual", "modal_mass", "shares", "moving")
-    return {
-        "unstable": computed.unstable,
-        "zero": computed.zero,
-        **{name: getattr(computed, name).tolist() for name in names},
-    }
+    arrays = {name: getattr(computed, name).tolist() for name in names}
+    return {"unstable": computed.unstable, "zero": computed.zero, **arrays}
 
 
 def _rows(computed, nodes):
     """A spectrum as rows of ``modes.csv``, without numbers of nodes where a body moves most."""
     count = np.arange(1, len(computed.squared) + 1)
-    columns = [
-        np.full(len(count), computed.step),
-        count,
-        computed.frequency,
-        computed.error,
-        computed.squared,
-        computed.residual,
-    ]
+    columns = [np.full(len(count), computed.step), count, computed.frequency, computed.error, computed.squared]
     node = np.where(computed.nodes < nodes, computed.nodes, np.nan)
-    return np.column_stack([*columns, computed.modal_mass, computed.shares, computed.moving, node]).tolist()
+    return np.column_stack(
+        [*columns, computed.residual, computed.modal_mass, computed.shares, computed.moving, node]
+    ).tolist()

@@ -184,8 +184,7 @@ def _definite(gyroscopic, number, lower):
     for attempt in range(4):
         wanted = min(number + 1 + 20 * attempt, size)
         dense = size <= DENSE or 3 * wanted >= size
-        inverse, parts = (_all if dense else _some)(gyroscopic, wanted, solve, attempt)
-        vectors = gyroscopic.all_rows(parts)
+        vectors = gyroscopic.all_rows((_all if dense else _some)(gyroscopic, wanted, solve, attempt))
         stiff, turned = gyroscopic.forms(vectors)
         split = np.sqrt(turned**2 + 4.0 * stiff)
         omega = np.where(turned > 0.0, 0.5 * (turned + split), 2.0 * stiff / (split - np.minimum(turned, 0.0)))
@@ -206,12 +205,11 @@ def _definite(gyroscopic, number, lower):
 
 
 def _all(gyroscopic, wanted, solve, attempt):
-    """The largest 1/ω, and φ of the unknowns with mass."""
+    """Shapes φ of the largest 1/ω, of the unknowns with mass."""
     M, G, K = gyroscopic.M.toarray(), gyroscopic.matrix.toarray(), gyroscopic.stiffness()
     none = np.zeros_like(M)
     B, A = np.block([[-1j * G, M], [M, none]]), np.block([[K, none], [none, M]])
-    inverse, vectors = scipy.linalg.eigh(B, A)
-    return inverse[: -wanted - 1 : -1], vectors[: len(M), : -wanted - 1 : -1]
+    return scipy.linalg.eigh(B, A)[1][: len(M), : -wanted - 1 : -1]
 
 
 def _some(gyroscopic, wanted, solve, attempt):
@@ -246,10 +244,10 @@ def _some(gyroscopic, wanted, solve, attempt):
     )
     start = np.random.default_rng(pencil.seed + attempt).standard_normal(2 * size).astype(complex)
     try:
-        values, vectors = eigsh(B, wanted, A, which="LA", v0=start, Minv=inverse)
+        _, vectors = eigsh(B, wanted, A, which="LA", v0=start, Minv=inverse)
     except ArpackError as error:
         raise SolverError(f"no modes at step {pencil.t:g}: {error}") from None
-    return values, vectors[:size]
+    return vectors[:size]
 
 
 def _general(gyroscopic, number, lower):

@@ -16,7 +16,6 @@ import contextlib
 import functools
 import hashlib
 import io
-import json
 import os
 import pathlib
 import shutil
@@ -88,13 +87,11 @@ def solve(job):
         with warnings.catch_warnings() if job.home == machine() else contextlib.nullcontext():
             summary, archive = _run(job)
         cells = cells_of(summary) | summary.get("more", {})
-    except InputError as error:
-        summary, archive, cells = None, None, {"status": "refused", "message": _values_text(job, error)}
-    except SolverError as error:
-        summary, archive, cells = None, None, {"status": "failed", "message": _values_text(job, error)}
     except Exception as error:
-        text = one_line(f"internal error, {type(error).__name__}: {error}")
-        summary, archive, cells = None, None, {"status": "failed", "message": text}
+        text = f"internal error, {type(error).__name__}: {error}"
+        message = _values_text(job, error) if isinstance(error, InputError | SolverError) else one_line(text)
+        status = "refused" if isinstance(error, InputError) else "failed"
+        summary, archive, cells = None, None, {"status": status, "message": message}
     return Outcome(job.key, cells | clock.spent(), summary if job.keeps == "json" else None, archive)
 
 
@@ -222,13 +219,13 @@ def kept_files(folder, job_key):
 
 def keep_outcome(folder, outcome):
     """Write the files of a case into the folder of a study, atomically."""
-    from ..results.files import write_text
+    from ..results.files import write_json
 
     as_json, archive = kept_files(folder, outcome.key)
     if outcome.summary is not None or outcome.archive is not None:
         as_json.parent.mkdir(exist_ok=True)
     if outcome.summary is not None:
-        write_text(as_json, json.dumps(outcome.summary, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+        write_json(as_json, outcome.summary)
     if outcome.archive is not None:
         beside = archive.with_name(f".refweb-{outcome.key}")
         for path in (beside, archive):

@@ -22,11 +22,12 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 
 import numpy as np
 
 from ..results.case_rows import results_among
-from .expressions import Expression, Interval
+from .expressions import Expression, Interval, exact
 from .study import SAMPLES
 
 RESAMPLES = 999
@@ -66,10 +67,8 @@ def chances(study, rows, columns, names):
         mine = [(case, row) for case, row in rows if case.group == number]
         plain = [(case, row) for case, row in mine if case.part in ("", "A", "B")]
         solved = [row for _, row in plain if row["status"] == "solved"]
-        count = {}
-        for _, row in mine:
-            count[row["status"]] = count.get(row["status"], 0) + 1
-        entry = {"of": of, "cases": count, "results": {}, "conditions": {}}
+        count = Counter(row["status"] for _, row in mine)
+        entry = {"of": of, "cases": dict(count), "results": {}, "conditions": {}}
         for result_item in results:
             if spread := _spread(study, result_item, solved, sampled):
                 entry["results"][result_item.name] = spread
@@ -174,9 +173,8 @@ def _share(study, condition, results, cases, sampled):
     from the values without ±. Undecided and failed cases count as false in ``lower`` and as true in ``upper``.
     """
     used = [item for item in results if item.name in condition.used]
-    count: dict[str, int] = dict.fromkeys(
-        ("true", "false", "undecided", "failed", "unproven", "statistical", "by_value"), 0
-    )
+    kinds = ("true", "false", "undecided", "failed", "unproven", "statistical", "by_value")
+    count: dict[str, int] = dict.fromkeys(kinds, 0)
     for case, row in cases:
         if row["status"] in UNDONE:
             continue
@@ -192,10 +190,8 @@ def _share(study, condition, results, cases, sampled):
             error is None and not statistical and row.get(f"{item.name} least") is None
             for item, (_, error, statistical) in zip(used, columns, strict=True)
         )
-        values = {name: value for name, value in bounds_found.items()} | {
-            item.name: Interval(value, value) for item, (value, *_) in zip(used, columns, strict=True)
-        }
-        count["by_value"] += condition(values) is True
+        values = {item.name: exact(value) for item, (value, *_) in zip(used, columns, strict=True)}
+        count["by_value"] += condition(bounds_found | values) is True
     decided = count["true"] + count["false"] + count["undecided"]
     n = decided + count["failed"]
     share = {"condition": condition.text, **count, "share": count["by_value"] / decided if decided else None}
@@ -251,10 +247,8 @@ def _indices(study, result, cases):
         again = np.array([of(generator.integers(0, n, n)) for _ in range(RESAMPLES)])
     tails = 0.5 * (1.0 - study.confidence)
     low, high = np.nanquantile(again, [tails, 1.0 - tails], axis=0)
-    kinds = ("first", "total")
-    pairs = itertools.product(enumerate(kinds), enumerate(drawn))
     by_result: dict = {path: {} for path in drawn}
-    for (k, kind), (p, path) in pairs:
+    for (k, kind), (p, path) in itertools.product(enumerate(("first", "total")), enumerate(drawn)):
         by_result[path][kind] = {"value": float(best[k, p]), "interval": [float(low[k, p]), float(high[k, p])]}
     known = [error for error in errors if error is not None]
     return {"of": by_result, "error": max(known) / spread if len(known) == len(errors) else None}

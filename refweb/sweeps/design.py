@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 import pathlib
 import warnings
 from typing import Any, NamedTuple
@@ -64,27 +65,29 @@ class Base(NamedTuple):
     folder: pathlib.Path | None
     file: str
 
+    def name(self, case_values):
+        """Name of the scene with some values by path, in messages."""
+        text = ", ".join(f"{short(key)} = {quote(value)}" for key, value in case_values.items())
+        return f"{self.file} with {text}" if text else self.file
+
     def scene(self, case_values):
         """The dict of a scene file with some values by path, and its scene."""
-        given, name = self.given, self.file
-        text = ", ".join(f"{short(key)} = {quote(value)}" for key, value in case_values.items())
-        with in_file(f"{name} with {text}" if text else name):
+        given, name = self.given, self.name(case_values)
+        with in_file(name):
             for path, value in case_values.items():
                 given = with_value(given, path, value)
-            return given, Scene.from_dict(given, self.folder, f"{name} with {text}" if text else name)
+            return given, Scene.from_dict(given, self.folder, name)
 
 
 def points(study):
     """All cases in their order, each a `Case` with values and without scene."""
     lists = study.listed
-    combinations = list(zip(*lists.values(), strict=True)) if study.sample == "zip" else None
-    count = (
-        len(combinations) if combinations is not None else int(np.prod([len(v) for v in lists.values()], dtype=float))
-    )
+    combinations = zip(*lists.values(), strict=True) if study.sample == "zip" else itertools.product(*lists.values())
+    lengths = [len(values) for values in lists.values()]
     samples = _samples(study)
-    if count * max(len(samples), 1) > MOST_CASES:
-        raise InputError(f"the study has {count * max(len(samples), 1)} cases, must be at most {MOST_CASES}")
-    combinations = combinations or list(itertools.product(*lists.values()))
+    count = (lengths[0] if study.sample == "zip" else math.prod(lengths)) * max(len(samples), 1)
+    if count > MOST_CASES:
+        raise InputError(f"the study has {count} cases, must be at most {MOST_CASES}")
     cases = []
     for group, combination in enumerate(combinations):
         chosen = dict(zip(lists, combination, strict=True))
@@ -109,8 +112,7 @@ def _samples(study):
         return []
     if not study.indices:
         return [(n, "", row) for n, row in enumerate(placed(drawn, _uniform(study, len(drawn))))]
-    both = _uniform(study, 2 * len(drawn))
-    first, second = both[:, : len(drawn)], both[:, len(drawn) :]
+    first, second = np.hsplit(_uniform(study, 2 * len(drawn)), 2)
     parts = {"A": first, "B": second}
     for column, path in enumerate(drawn):
         parts[path] = first.copy()
@@ -151,10 +153,8 @@ def cases_of(study, base):
     InputError
         If values do not make a valid scene; the message names the values and a remedy.
     """
-    skips = None
-    if study.skip is not None:
-        with in_file("skip:"):
-            skips = Expression(study.skip, list(study.parameters))
+    with in_file("skip:"):
+        skips = None if study.skip is None else Expression(study.skip, list(study.parameters))
     known, cases = {}, []
     for case in points(study):
         if skips is not None:

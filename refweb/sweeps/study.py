@@ -128,9 +128,8 @@ def _range(value):
     known = ["from", "to", "count", "spacing"]
     for key in value:
         if key not in known:
-            raise InputError(
-                f"{short(key)} = {quote(value[key])}: unknown key, {nearest(key, [*known, 'distribution'])}"
-            )
+            hint = nearest(key, [*known, "distribution"])
+            raise InputError(f"{short(key)} = {quote(value[key])}: unknown key, {hint}")
     for key in ("from", "to"):
         if key not in value:
             raise InputError(f"{key} is missing: give {key} = ...")
@@ -272,9 +271,8 @@ class Study(Table):
     def drawn(self) -> dict[str, Range | Distribution]:
         """Parameters that are sampled."""
         sampled = self.sample in SAMPLES
-        return {
-            p: values for p, values in self.parameters.items() if sampled and isinstance(values, Range | Distribution)
-        }
+        pairs = self.parameters.items() if sampled else ()
+        return {path: values for path, values in pairs if isinstance(values, Range | Distribution)}
 
     def check(self) -> None:
         """Refuse keys that do not fit together."""

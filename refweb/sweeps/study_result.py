@@ -13,7 +13,7 @@ import pathlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ..results.case_rows import FIRST, LAST, results_among
+from ..results.case_rows import ordered, results_among
 from ..results.observables.observe import bounds_by_name
 from ..results.provenance import versions
 from .chances import chances
@@ -80,23 +80,20 @@ class Sweep:
     @functools.cached_property
     def _not_negative(self):
         """Names of results that cannot be negative in any case."""
-        tables, names = ("observe", "cable", "damping"), None
-        cases = {json.dumps([case.given.get(key) for key in tables]): case for case in self.cases if case.given}
-        for case in cases.values():
-            names_of_case = {name for name, (lower, _) in bounds_by_name(case.given).items() if lower >= 0.0}
-            names = names_of_case if names is None else names & names_of_case
-        return names or set()
+        tables = ("observe", "cable", "damping")
+        given = {json.dumps([case.given.get(key) for key in tables]): case.given for case in self.cases if case.given}
+        bounds = map(bounds_by_name, given.values())
+        names = [{name for name, (lower, _) in by_name.items() if lower >= 0.0} for by_name in bounds]
+        return set.intersection(*names) if names else set()
 
     def gather(self, known: dict[str, dict[str, Any]]) -> None:
         """Set ``rows`` of all cases from the known rows by key, and compute their statistics."""
         self.rows = [row_of(self.study, case, known) for case in self.cases]
         self.columns = columns_of(self.study, self.rows)
-        self.chances = chances(
-            self.study, list(zip(self.cases, self.rows, strict=True)), self.columns, groups(self.study)
-        )
-        self.cost |= {
-            f"cases_{key}": float(sum(row.get(key) or 0.0 for row in self.rows)) for key in ("cpu_s", "compile_s")
-        }
+        pairs = list(zip(self.cases, self.rows, strict=True))
+        self.chances = chances(self.study, pairs, self.columns, groups(self.study))
+        for key in ("cpu_s", "compile_s"):
+            self.cost[f"cases_{key}"] = float(sum(row.get(key) or 0.0 for row in self.rows))
 
     def to_pandas(self) -> pandas.DataFrame:
         """The rows as a `pandas.DataFrame`; pandas must be installed."""
@@ -155,8 +152,7 @@ def row_of(study: Study, case: Any, known: dict[str, dict[str, Any]]) -> dict[st
 
 def columns_of(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
     """All columns in their order."""
-    middle = dict.fromkeys([*study.parameters, *(name for row in rows for name in row)])
-    return [*FIRST, *(name for name in middle if name not in (*FIRST, *LAST)), *LAST]
+    return ordered(dict.fromkeys([*study.parameters, *(name for row in rows for name in row)]))
 
 
 def finite(given: Any) -> Any:

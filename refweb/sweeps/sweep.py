@@ -14,19 +14,17 @@ message of `results.folder.check_folder` by its words "is not empty"; `job_of` a
 from __future__ import annotations
 
 import contextlib
-import json
 import pathlib
 import shutil
 import time
 import tomllib
-from collections import Counter
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, in_file
 from ..messages import quote, short
 from ..results import case_rows
-from ..results.files import as_toml, write_text
+from ..results.files import as_toml, write_json, write_text
 from ..results.folder import check_folder, is_alive, read_summary
 from ..results.progress import duration, followed
 from ..results.run_status import Clock, recorded
@@ -92,7 +90,7 @@ def sweep(
     clock = Clock()
     crew = crew_of(executor, workers)
     study_run, base = prepared(scene, parameters, options)
-    kept = Kept(out, study_run) if out is not None else Kept(None, study_run)
+    kept = Kept(out, study_run)
     study_run.path = kept.path
     study_run.gather(kept.rows)
     if announce is not None:
@@ -114,7 +112,8 @@ def prepared(scene, parameters=None, options=None):
     study, base = _asked(scene, parameters, options or {})
     cases = cases_of(study, base)
     study_run = Sweep(study, cases, str(base.given.get("title", study.scene)))
-    study_run.reasons = _reasons(study, cases)
+    if skipped := sum(case.given is None for case in cases):
+        study_run.reasons = [f"{skipped} of {len(cases)} cases are skipped: {study.skip}"]
     _check(study, base, cases)
     return study_run, base
 
@@ -122,24 +121,19 @@ def prepared(scene, parameters=None, options=None):
 def _asked(scene, parameters, options):
     """The study and the base scene from the arguments of `sweep`."""
     if parameters is None:
-        if not isinstance(scene, Study):
-            if isinstance(scene, Scene):
-                raise InputError('parameters are missing: give what varies, {"solve.duration": [0.1, 0.2]}')
-            study = load(scene)
-        else:
-            study = scene
+        if isinstance(scene, Scene):
+            raise InputError('parameters are missing: give what varies, {"solve.duration": [0.1, 0.2]}')
+        study = scene if isinstance(scene, Study) else load(scene)
         if options:
             raise InputError(f"{next(iter(options))} has no meaning with a study, which has its own keys: leave it out")
         path = study.folder / study.scene if study.folder is not None else pathlib.Path(study.scene)
         return study, base_of(path if path.is_file() else study.scene)
     if isinstance(scene, Scene):
-        given = scene.to_dict()
-        title, base = scene.title, Base(given, scene.folder, scene.file or "scene")
-        return Study(**{"scene": "scene.toml", "title": title, **options, "parameters": parameters}), base
-    base = base_of(scene)
-    path = pathlib.Path(scene)
-    name = str(path.resolve() if path.is_file() else scene)
-    title = f"{base.given.get('title', path.stem)}, sweep"[:200]
+        name, title, base = "scene.toml", scene.title, Base(scene.to_dict(), scene.folder, scene.file or "scene")
+    else:
+        path, base = pathlib.Path(scene), base_of(scene)
+        name = str(path.resolve() if path.is_file() else scene)
+        title = f"{base.given.get('title', path.stem)}, sweep"[:200]
     return Study(**{"scene": name, "title": title, **options, "parameters": parameters}), base
 
 
@@ -149,11 +143,6 @@ def base_of(source):
     Scene.load(path)  # says what is wrong with it alone
     given = {"title": path.stem, **tomllib.loads(path.read_bytes().decode("utf-8-sig"))}
     return Base(given, path.resolve().parent, path.name)
-
-
-def _reasons(study, cases):
-    skipped = sum(case.given is None for case in cases)
-    return [f"{skipped} of {len(cases)} cases are skipped: {study.skip}"] if skipped else []
 
 
 def _check(study, base, cases):
@@ -172,13 +161,12 @@ def _check(study, base, cases):
 def _run(study_run, base, kept, workers, tell):
     """Run the missing cases."""
     missing = {case.key: case for case in study_run.cases if case.given is not None and not kept.has(case)}
-    again = Counter(case.key for case in study_run.cases if case.given is not None)
     by_key = {}
     for case in study_run.cases:
-        by_key.setdefault(case.key, []).append(case)
-    total, left, began = sum(again.values()), sum(again[key] for key in missing), None
-    keeps = study_run.study.keep
-    jobs = (job_of(base, case, workers.local, keeps) for case in missing.values())
+        if case.given is not None:
+            by_key.setdefault(case.key, []).append(case)
+    total, left, began = sum(map(len, by_key.values())), sum(len(by_key[key]) for key in missing), None
+    jobs = (job_of(base, case, workers.local, study_run.study.keep) for case in missing.values())
     tell(f"{total - left} of {total} cases", (total - left) / total)
     start = left
     with contextlib.closing(through(jobs, workers)) as outcomes:
@@ -203,13 +191,12 @@ def job_of(base, case, local, keeps="none", task=None):
         for path in files_of(scene.to_dict()):
             with contextlib.suppress(OSError):
                 files[path] = pathlib.Path(path).read_bytes()
-    text = ", ".join(f"{short(key)} = {quote(value)}" for key, value in case.values.items())
-    return Job(case.key, case.given, folder, f"{base.file} with {text}", keeps, machine(), files, task)
+    return Job(case.key, case.given, folder, base.name(case.values), keeps, machine(), files, task)
 
 
 def _done(study_run, kept):
-    ran = sum(case.given is not None for case in study_run.cases)
-    return f"{sum(case.key in kept.rows for case in study_run.cases if case.given is not None)} of {ran} cases"
+    have_rows = [case.key in kept.rows for case in study_run.cases if case.given is not None]
+    return f"{sum(have_rows)} of {len(have_rows)} cases"
 
 
 class Kept:
@@ -275,7 +262,7 @@ class Kept:
             write_text(self.path / "study.toml", _as_toml(self.study_run.study))
             if self._aside:
                 case_rows.write(self.path / case_rows.ASIDE, self._aside)
-        rows = [row for case in self.study_run.cases if case.key in self.rows for row in [self._row(case)]]
+        rows = [self._row(case) for case in self.study_run.cases if case.key in self.rows]
         self._table = case_rows.CaseRows(self.path, rows, columns_of(self.study_run.study, rows))
 
     def _row(self, case):
@@ -301,9 +288,8 @@ class Kept:
     def summary(self):
         """Write ``run.json``."""
         if self.path is not None:
-            text = json.dumps(self.study_run.summary(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
             with case_rows.written(self.path):
-                write_text(self.path / "run.json", text)
+                write_json(self.path / "run.json", self.study_run.summary())
 
 
 def holds_rows(folder, kind):

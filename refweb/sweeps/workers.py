@@ -200,7 +200,8 @@ def through(jobs, workers, last=True):
             try:
                 while suspects and not running:
                     _hand_out(suspects, running, workers, alone=True)
-                while ahead and not suspects and len(running) <= workers.parallel and not _any_alone(running):
+                alone = any(job_alone for _, job_alone in running.values())
+                while ahead and not suspects and len(running) <= workers.parallel and not alone:
                     _hand_out(ahead, running, workers)
             except SolverError as error:  # what is running may end all the same
                 refused = error
@@ -218,10 +219,6 @@ def through(jobs, workers, last=True):
     finally:
         if last:
             workers.stop()
-
-
-def _any_alone(running):
-    return any(alone for _, alone in running.values())
 
 
 def _hand_out(jobs, running, workers, alone=False):

@@ -8,7 +8,6 @@ name in `registry.OBSERVABLES`. Tests: ``tests/results/test_observable_contract.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from ...effects.base import refuse_flows
 from ...kernels import kernel
 from ...messages import quote
-from ..probes import MAGNITUDE, PROBE, Probe
+from ..probes import PROBE, Probe, component_of
 from .nodal import Nodal
 from .observable import Value
 
@@ -69,9 +68,8 @@ class TotalAngularMomentum(Nodal):
     def probe(self, system: System) -> Probe:
         """Make the probe of x and v."""
         numbers, counted, spins = self._parts(system)
-        component = MAGNITUDE if self.observe.component is None else self.observe.component
         moments = np.array([[moment, 0.0, 0.0, 0.0] for _, moment in spins]).reshape(-1, 4)
-        rows = [component, len(numbers), len(counted), *counted, *(row for row, _ in spins)]
+        rows = [self.component, len(numbers), len(counted), *counted, *(row for row, _ in spins)]
         return Probe(angular_momentum, rows, np.vstack([numbers, moments]))
 
 
@@ -95,6 +93,4 @@ def angular_momentum(t, x, v, f, lines, rows, data, where):
     for n in range(3 + count, rows.size):
         for k in range(3):
             a[k] += data[linear + n - 3 - count, 0] * v[rows[n], k]
-    if rows[0] == MAGNITUDE:
-        return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    return a[rows[0]]
+    return component_of(rows[0], a[0], a[1], a[2])

@@ -74,11 +74,21 @@ class Booked(Observable):
         return weights(system, self.observe.quantity)
 
 
-class KineticEnergy(Booked):
-    """Kinetic energy of all rows."""
+def _column(text: str, needs: str = "", signed: bool = True, dynamic: bool = False) -> type[Booked]:
+    """Make the class of a column, with its docstring ``text`` and its attributes."""
+    return type("Column", (Booked,), {"__doc__": text, "needs": needs, "signed": signed, "dynamic": dynamic})
 
-    signed = False
-    dynamic = True
+
+KineticEnergy = _column("Kinetic energy of all rows.", signed=False, dynamic=True)
+PotentialEnergy = _column("Potential energy of gravity.", "[gravity]")
+ContactEnergy = _column("Energy of contact of lines with bodies.", "[contact]", signed=False)
+BodyContactEnergy = _column("Energy of contact between bodies.", "[contact] with between_bodies = true", signed=False)
+SelfContactEnergy = _column("Energy of contact of lines with lines.", "[self_contact]", signed=False)
+BendingEnergy = _column("Energy of bent lines.", "[bending]", signed=False)
+FrameEnergy = _column("Potential energy in a rotating frame.", "[frame]")
+OrbitEnergy = _column("Potential energy by position in an orbit.", "[orbit]")
+RuptureEnergy = _column("Energy that was stored in lines when they broke.", "[rupture]", signed=False, dynamic=True)
+WinchEnergy = _column("Energy that winches have taken from the web: the negative of their work.", "[[winch]]")
 
 
 class StrainEnergy(Booked):
@@ -93,60 +103,6 @@ class StrainEnergy(Booked):
         return equilibrium.duality_bound.strain_energy
 
 
-class PotentialEnergy(Booked):
-    """Potential energy of gravity."""
-
-    needs = "[gravity]"
-
-
-class ContactEnergy(Booked):
-    """Energy of contact of lines with bodies."""
-
-    signed = False
-    needs = "[contact]"
-
-
-class BodyContactEnergy(Booked):
-    """Energy of contact between bodies."""
-
-    signed = False
-    needs = "[contact] with between_bodies = true"
-
-
-class SelfContactEnergy(Booked):
-    """Energy of contact of lines with lines."""
-
-    signed = False
-    needs = "[self_contact]"
-
-
-class BendingEnergy(Booked):
-    """Energy of bent lines."""
-
-    signed = False
-    needs = "[bending]"
-
-
-class FrameEnergy(Booked):
-    """Potential energy in a rotating frame."""
-
-    needs = "[frame]"
-
-
-class OrbitEnergy(Booked):
-    """Potential energy by position in an orbit."""
-
-    needs = "[orbit]"
-
-
-class RuptureEnergy(Booked):
-    """Energy that was stored in lines when they broke."""
-
-    signed = False
-    dynamic = True
-    needs = "[rupture]"
-
-
 class PlasticEnergy(StrainEnergy):
     """Energy lost in lines that have yielded: a proven error is that of what they have taken up, kept or lost.
 
@@ -158,12 +114,6 @@ class PlasticEnergy(StrainEnergy):
     def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """± as of the strain energy; None where it depends on the load steps."""
         return None if lost_by_path(state) else super().error(state, equilibrium)
-
-
-class WinchEnergy(Booked):
-    """Energy that winches have taken from the web: the negative of their work."""
-
-    needs = "[[winch]]"
 
 
 class DissipatedEnergy(Booked):

@@ -16,7 +16,7 @@ import numpy as np
 from ...errors import InputError
 from ...kernels import kernel
 from ...messages import nearest
-from ..probes import MAGNITUDE, PROBE, Probe
+from ..probes import PROBE, Probe, component_of
 from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
 if TYPE_CHECKING:
@@ -55,10 +55,7 @@ class Between(Observable):
 
     def of(self, state: State) -> Value:
         """Value by the kernel of its probe."""
-        value = self.probe(state.system)
-        rows, data = np.array(value.rows, dtype=np.int64), np.ascontiguousarray(value.data, dtype=float)
-        none = np.zeros((0, 0))
-        return Value(float(value.kernel(0.0, state.x, state.x, state.x, none, rows, data, np.zeros(2, np.int64))), None)
+        return Value(self.probe(state.system).at(state, state.x), None)
 
 
 class Distance(Between):
@@ -123,9 +120,8 @@ class MouthArea(Mouth):
 
     def probe(self, system: System) -> Probe:
         """Make the probe of x and the reference position."""
-        rows, component = self.rows(system), self.observe.component
-        component = MAGNITUDE if component is None else component
-        return Probe(area, [component, *rows], system.net.points[rows])
+        rows = self.rows(system)
+        return Probe(area, [self.component, *rows], system.net.points[rows])
 
 
 @kernel()
@@ -164,6 +160,4 @@ def area(t, x, v, f, lines, rows, data, where):
         q2 = x[row, 2] - x[first, 2] + data[n, 2] - data[0, 2]
         a0, a1, a2 = a0 + p1 * q2 - p2 * q1, a1 + p2 * q0 - p0 * q2, a2 + p0 * q1 - p1 * q0
         p0, p1, p2 = q0, q1, q2
-    if rows[0] == MAGNITUDE:
-        return 0.5 * math.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
-    return 0.5 * (a0 if rows[0] == 0 else a1 if rows[0] == 1 else a2)
+    return 0.5 * component_of(rows[0], a0, a1, a2)

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 class Line(Observable):
     """A number of each element.
 
-    Subclasses have `values`, `bound` and `scale`. The latter is a factor on the ``column`` of tension or strain of each
-    element.
+    The value is `scale` times the ``column`` of tension or strain of each element.
 
     Attributes
     ----------
@@ -47,11 +46,11 @@ class Line(Observable):
 
     def values(self, state: State) -> NDArray[np.float64]:
         """Value of each element in a state, shape (cells,)."""
-        raise NotImplementedError
+        return state.element_tension * self.scale(state.system.net)
 
     def bound(self, proven: DualityBound, net: Net) -> NDArray[np.float64]:
         """Error of each element by a `refweb.statics.duality_bound.DualityBound`, shape (cells,)."""
-        raise NotImplementedError
+        return proven.tension * self.scale(net)
 
     def on(self, system: System) -> None:
         """Refuse lines that the net does not have, and parts of lines of one element."""
@@ -148,14 +147,6 @@ class Tension(Line):
 
     unit = "N"
 
-    def values(self, state: State) -> NDArray[np.float64]:
-        """Tension [N], shape (cells,)."""
-        return state.element_tension
-
-    def bound(self, proven: DualityBound, net: Net) -> NDArray[np.float64]:
-        """The error bound of tension itself [N], shape (cells,)."""
-        return proven.tension
-
 
 class Stress(Line):
     """Nominal stress, tension over area."""
@@ -169,10 +160,6 @@ class Stress(Line):
     def scale(self, net: Net) -> NDArray[np.float64]:
         """Inverse of the area [1/m²], shape (cells,)."""
         return 1.0 / net.area
-
-    def bound(self, proven: DualityBound, net: Net) -> NDArray[np.float64]:
-        """Error bound of tension over the area [Pa], shape (cells,)."""
-        return proven.tension / net.area
 
 
 class StressShare(Line):
@@ -190,17 +177,9 @@ class StressShare(Line):
         super().__init__(Observe(name=over, quantity="stress"))
         self._over = over
 
-    def values(self, state: State) -> NDArray[np.float64]:
-        """Shares of the limit, shape (cells,)."""
-        return state.element_tension * self.scale(state.system.net)
-
     def scale(self, net: Net) -> NDArray[np.float64]:
         """Inverse of the tension at the limit [1/N], 0 without a limit, shape (cells,)."""
         return 1.0 / (net.area * getattr(net, self._over))
-
-    def bound(self, proven: DualityBound, net: Net) -> NDArray[np.float64]:
-        """Error bound of tension over the tension at the limit [1], shape (cells,)."""
-        return proven.tension * self.scale(net)
 
 
 class Strain(Line):

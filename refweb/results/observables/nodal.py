@@ -76,20 +76,16 @@ class Nodal(Observable):
         self, kernel: Any, source: int, rows: Sequence[int] | NDArray[np.int64], data: NDArray[np.float64]
     ) -> Probe:
         """The probe of rows by a kernel of the largest, or by that of another choice, of a ``source`` of vectors."""
-        from ..probes import MAGNITUDE, Probe, selected_row
+        from ..probes import Probe, selected_row
 
         if not self.selects:
             return Probe(kernel, self.numbers(rows), data)
-        component = MAGNITUDE if self.observe.component is None else self.observe.component
-        return Probe(selected_row, [source, SELECTIONS[self.observe.select], component, *rows], data)
+        return Probe(selected_row, [source, SELECTIONS[self.observe.select], self.component, *rows], data)
 
     def numbers(self, rows: Sequence[int] | NDArray[np.int64]) -> list[int]:
         """Component and rows in the form of `refweb.results.probes.largest_of`."""
-        from ..probes import MAGNITUDE
-
-        component = MAGNITUDE if self.observe.component is None else self.observe.component
         consecutive = len(rows) == 1 or (np.diff(rows) == 1).all()
-        return [component, rows[0], rows[-1] + 1] if consecutive else [component, -1, -1, *rows]
+        return [self.component, rows[0], rows[-1] + 1] if consecutive else [self.component, -1, -1, *rows]
 
 
 class Place(Nodal):

@@ -123,6 +123,13 @@ class Observable:
         """True where a value counts that is not the largest."""
         return self.observe.select not in (None, "max")
 
+    @property
+    def component(self) -> int:
+        """Number of the component in kernels: that of the table, or `refweb.results.probes.MAGNITUDE`."""
+        from ..probes import MAGNITUDE
+
+        return MAGNITUDE if self.observe.component is None else self.observe.component
+
     def bounds(self, system: System | None) -> tuple[float, float]:
         """Least and largest value that are possible, whatever the state: a magnitude is not negative."""
         magnitude = "component" in self.keys and self.observe.component is None

@@ -146,19 +146,7 @@ class Observe(Table):
             raise InputError(
                 f"name = {quote(self.name)} must have no commas and no quotes: it heads a column of history.csv"
             )
-        for key in (
-            "node",
-            "body",
-            "to",
-            "component",
-            "line",
-            "thread",
-            "segment",
-            "ring",
-            "control",
-            "part",
-            "select",
-        ):
+        for key in ("node", "body", "to", "component", "line", "thread", "segment", "ring", "control", *PARTS):
             if getattr(self, key) is not None and key not in self.observable.keys:
                 value = quote(getattr(self, key))
                 beside = " of a thread" if self.thread is not None and key != "thread" else ""
@@ -227,20 +215,12 @@ def _of_nets():
 
 def default(threads=()):
     """Observables of a scene without ``[[observe]]``, with the tension of each thread by its name."""
-    return (
-        *_of_nets(),
-        *(
-            Observe(
-                name=f"tension_{name if _is_plain(name) else number}", quantity="tension", thread=name, reduce="max"
-            )
-            for number, name in enumerate(threads)
-        ),
-    )
-
-
-def _is_plain(name):
-    """Tell if the name of a thread can be in that of an observable."""
-    return len(name) <= 70 and "," not in name and '"' not in name
+    observes = [*_of_nets()]
+    for number, name in enumerate(threads):
+        can_be_in_name = len(name) <= 70 and "," not in name and '"' not in name
+        name_of = f"tension_{name if can_be_in_name else number}"
+        observes.append(Observe(name=name_of, quantity="tension", thread=name, reduce="max"))
+    return tuple(observes)
 
 
 def observes_of(tables):

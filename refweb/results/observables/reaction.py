@@ -56,14 +56,13 @@ class Reaction(Nodal):
         from ..probes import REACTION, Probe, contact_force, reaction, selected_contact, selected_row
 
         rows, select = self.rows(system), self.observe.select
-        component = self.numbers(rows)[0]
         if self.observe.body is None:
             data = np.where(system.supported[rows], 1.0, 0.0)
             if select is None:
                 return Probe(reaction, self.numbers(rows), data)
-            return Probe(selected_row, [REACTION, SELECTIONS[select], component, *rows], data)
+            return Probe(selected_row, [REACTION, SELECTIONS[select], self.component, *rows], data)
         felt, none = [system.contact_forces.row(body) for body in self.bodies(system.net)], np.zeros((0, 0))
         if select is None:
-            return Probe(contact_force, [component, *felt], none, term=CONTACT)
-        numbers = [SELECTIONS[select], component, len(felt), *felt, *rows]
+            return Probe(contact_force, [self.component, *felt], none, term=CONTACT)
+        numbers = [SELECTIONS[select], self.component, len(felt), *felt, *rows]
         return Probe(selected_contact, numbers, none, term=CONTACT)

@@ -19,7 +19,7 @@ import numpy as np
 from ...errors import InputError
 from ...kernels import kernel
 from ...net.rotation import matrix_at, quaternion_of, times, times_transposed
-from ..probes import MAGNITUDE, PROBE, Probe
+from ..probes import PROBE, Probe, component_of
 from .observable import Observable, Value
 
 if TYPE_CHECKING:
@@ -45,9 +45,8 @@ class Turning(Observable):
 
     def rows(self, system: System) -> list[int]:
         """Component and rows of rotation of the body, −1 for rows that do not exist."""
-        component, body = self.observe.component, self.body(system.net)
-        rows = (MAGNITUDE if component is None else component, body.spin, body.turn)
-        return [-1 if row is None else row for row in rows]
+        body = self.body(system.net)
+        return [self.component, *(-1 if row is None else row for row in (body.spin, body.turn))]
 
     def _sized(self, vector):
         component = self.observe.component
@@ -83,9 +82,7 @@ class Orientation(Turning):
 
     def of(self, state: State) -> Value:
         """Value by the rotation of the body."""
-        value = self.probe(state.system)
-        rows = np.array(value.rows, dtype=np.int64)
-        return Value(float(orientation_of(state.x, rows, np.ascontiguousarray(value.data, dtype=float))), None)
+        return Value(self.probe(state.system).at(state, state.x), None)
 
     def probe(self, system: System) -> Probe:
         """Make the probe of x alone."""
@@ -130,8 +127,8 @@ class AngularMomentum(Turning):
         return Probe(angular_momentum, self.rows(system), np.array([[body.moment if body.spin is not None else 0.0]]))
 
 
-@kernel()
-def orientation_of(x, rows, data):
+@kernel(PROBE)
+def orientation(t, x, v, f, lines, rows, data, where):
     """Component of a quaternion, or angle; ``rows`` is (component or −1, rows of rotation), data the start, normal."""
     w, a, b, c = 1.0, 0.0, 0.0, 0.0
     s = rows[1]
@@ -155,19 +152,6 @@ def orientation_of(x, rows, data):
 
 
 @kernel(PROBE)
-def orientation(t, x, v, f, lines, rows, data, where):
-    """Kernel of `orientation_of`."""
-    return orientation_of(x, rows, data)
-
-
-@kernel()
-def _sized(component, w):
-    if component == MAGNITUDE:
-        return math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    return w[0] if component == 0 else w[1] if component == 1 else w[2]
-
-
-@kernel(PROBE)
 def angular_velocity(t, x, v, f, lines, rows, data, where):
     """Kernel of R W Rᵀ v; ``rows`` is (component, rows of rotation), data W along the axes of space at the start."""
     s = rows[1]
@@ -183,11 +167,11 @@ def angular_velocity(t, x, v, f, lines, rows, data, where):
             (data[2, 0], data[2, 1], data[2, 2]),
         )
         w = times(turned, times(mobility, p))
-    return _sized(rows[0], w)
+    return component_of(rows[0], w[0], w[1], w[2])
 
 
 @kernel(PROBE)
 def angular_momentum(t, x, v, f, lines, rows, data, where):
     """Kernel of data times v."""
     s = rows[1]
-    return 0.0 if s < 0 else data[0, 0] * _sized(rows[0], (v[s, 0], v[s, 1], v[s, 2]))
+    return 0.0 if s < 0 else data[0, 0] * component_of(rows[0], v[s, 0], v[s, 1], v[s, 2])

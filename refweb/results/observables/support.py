@@ -25,7 +25,7 @@ from ...errors import InputError
 from ...kernels import kernel
 from ...net.rotation import add_forces_to_bodies, matrix_at, times
 from ..probes import PROBE, Probe, component_of
-from .observable import ANY, Value
+from .observable import Value
 from .rotation import Turning
 
 if TYPE_CHECKING:
@@ -51,10 +51,8 @@ class _Held(Turning):
 
     def of(self, state: State) -> Value:
         """Value by its probe, which looks at no lines."""
-        probe, lines, where = self.probe(state.system), np.zeros((0, 0)), np.full(2, -1)
-        rows, data = np.array(probe.rows, dtype=np.int64), np.ascontiguousarray(probe.data, dtype=float)
         force = state.system.balance(state.time, state.x, state.v).force
-        return Value(float(probe.kernel(state.time, state.x, state.v, force, lines, rows, data, where)), None)
+        return Value(self.probe(state.system).at(state, force), None)
 
 
 class SupportForce(_Held):
@@ -113,10 +111,6 @@ class AxleAngle(_Held):
 
     unit = "rad"
     keys: tuple[str, ...] = ("body",)
-
-    def bounds(self, system: System | None) -> tuple[float, float]:
-        """Any angle."""
-        return ANY
 
     def on(self, system: System) -> None:
         """Refuse a body without an axle."""
