@@ -580,6 +580,7 @@ MUTANTS = [
     Mutant("effects/thread_slips", "total += (high - low) * (first + slope * middle)", "total += (high - low) * first"),
     Mutant("effects/thread_slips", "w[SLIP, r] = w[BEFORE, r] + math.copysign(reach, moved)", "w[SLIP, r] += 0.0"),
     Mutant("dynamics/integrators/step_bound", "within = FASTER * span * (", "within = 0.01 * span * ("),
+    Mutant("dynamics/integrators/explicit_loop", "or left <= 0 and end < corner)", "or False)"),
     Mutant("dynamics/integrators/neighbour_list", "skin.past += skin.used", "skin.past += 0.0"),
     Mutant(
         "effects/self_contact/search",

@@ -308,7 +308,8 @@ def advance_rows(
     above ``limit`` and does not fall; then ``before`` has x, v and f at the last corner or row, of the time ``since``.
     It is −1 if a row takes more than `MAX_STEPS_PER_ROW` steps from there. If an event ends the run, its row is the
     last, with the time of the event. The loop also returns after ``breath`` steps, so that a run can be interrupted;
-    the next call continues in that row. It returns `HELD` if a step is cut too far, see
+    the next call continues in that row. Behind the last step of a span it returns as well, before the next is planned,
+    so that `refweb.dynamics.integrators.tangent.Steps` sees each step. It returns `HELD` if a step is cut too far, see
     `refweb.dynamics.integrators.ccd`.
     """
     clock, events, lengths, left = running.clock[0], running.events, model.lengths, breath
@@ -329,7 +330,7 @@ def advance_rows(
             if halved > 0.0 and not begun:
                 add_half_steps(-halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             count = min(clock.planned - begun, max(left, 1))
-            taken = run_steps(count, clock.step, changing, scheme, model, observed, running, space)
+            taken = run_steps(count, clock.step, changing, scheme, model, observed, running, space) if count else 0
             stopped, left = ended_by(events), left - taken
             clock.nsteps += taken
             clock.begun = begun + taken
@@ -337,7 +338,7 @@ def advance_rows(
                 clock.rejected, clock.cut = 0, SHORTER * clock.step
                 if clock.cut < LEAST * clock.stable:
                     return HELD
-            elif clock.begun < clock.planned and not stopped:
+            elif not stopped and (clock.begun < clock.planned or left <= 0 and end < corner):
                 return n
             else:
                 clock.cut = 0.0

@@ -7,6 +7,7 @@ import pytest
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.tangent import Steps
 from refweb.dynamics.simulation import Simulation
 from refweb.effects.self_contact import table
 
@@ -121,7 +122,10 @@ def test_lists_of_pairs_change_no_bit(threshold, monkeypatch):
 
 @pytest.mark.parametrize(("layers", "end"), [(8, 0.2), (3, 0.6)], ids=["found", "listed"])
 def test_a_thrown_net_is_the_same_row_by_row(layers, end):
-    """Pairs of lines are near each other, and a body is within reach of a row but not yet of the list."""
+    """Pairs of lines are near each other, and a body is within reach of a row but not yet of the list.
+
+    So it is step by step, as gradients follow a run: they see each step of each span.
+    """
     keys = {"web.layers": layers, "web.cell_area": 0.6, "accuracy.error": "none"}
     system, times = refweb.Scene.load("capture-stage", keys).build(), np.linspace(0.1 * end, end, 10)
     assert any(term.contact.finder is not None for term in system.terms) == (layers == 8)
@@ -132,8 +136,12 @@ def test_a_thrown_net_is_the_same_row_by_row(layers, end):
         courses.append(solver.start())
         for some in rows:
             solver.advance(courses[-1], some)
-    assert courses[0].nsteps == courses[1].nsteps
+    steps, sizes = Steps(CentralDifference(system), ()), []
+    steps.follow(times, lambda t, h, corner: sizes.append(h))
+    assert courses[0].nsteps == courses[1].nsteps == steps.course.nsteps == len(sizes)
     np.testing.assert_array_equal(courses[0].x, courses[1].x)
+    np.testing.assert_array_equal(courses[0].x, steps.course.x)
+    np.testing.assert_allclose(sum(sizes), end, rtol=1e-12)  # roundings of 1e-16 a step
 
 
 def distances(net, body, x):
