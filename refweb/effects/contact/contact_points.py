@@ -32,7 +32,7 @@ from .pair import LineContacts, Pair, from_shape, pairing
 NOWHERE = -1.0
 """Coordinate ξ of an element without any contact."""
 CLOSE = 1e-8
-"""Step of Newton's method behind which its next one is rounding."""
+"""Step of Newton's method behind which its next one is rounding, and the depth there follows from the slope before."""
 NO_VECTOR = (0.0, 0.0, 0.0)
 """Second derivative of a straight element along itself; vectors of the `Course` of a curved one."""
 
@@ -275,7 +275,7 @@ def places(depth, spins, pieces, nodes, functions):
 
     @kernel(forceinline=nodes == 2)
     def climbed(x, cells, data, c, course, low, high, xi):
-        moved, pair, close = math.inf, course.pair, False
+        moved, pair = math.inf, course.pair
         if pair.once:
             for end in (low, high):
                 spot = spot_of(x, cells, data, c, course, end)
@@ -285,13 +285,14 @@ def places(depth, spins, pieces, nodes, functions):
         for _ in range(100):
             spot = spot_of(x, cells, data, c, course, xi)
             deep, slope = spot.depth, dot(spot.gradient, spot.d)
-            if moved <= 1e-15 or close:
+            if moved <= 1e-15:
                 break
             if nodes == 2 and deep + max(slope * (high - xi), slope * (low - xi)) <= 0.0:
                 return (NOWHERE if high - low == 1.0 else xi), deep  # concave: nowhere deep enough
-            value, curve = rise(pair, xi, spot)
+            (value, curve), before = rise(pair, xi, spot), xi
             low, high, moved, xi = climb(value, curve, low, high, moved, xi)
-            close = moved < CLOSE and abs(abs(value) - moved * abs(curve)) < 1e-6 * abs(value)
+            if moved < CLOSE and abs(abs(value) - moved * abs(curve)) < 1e-6 * abs(value):
+                return xi, deep + slope * (xi - before)
         return xi, deep
 
     @kernel()
