@@ -316,6 +316,7 @@ MUTANTS = [
     Mutant("net/grown_core", "by_tt = g1 * g1 *", "by_tt = g1 *"),
     Mutant("effects/contact/contact_points", " or abs(step - xi) > 0.5 * moved", ""),
     Mutant("effects/contact/contact_points", "spot.depth + reach, dot(", "spot.depth + 0.9 * reach, dot("),
+    Mutant("effects/contact/contact_points", "deep + slope * (xi - before)", "deep"),
     Mutant("effects/contact/penalty", " or nodes == 2 and not reaches(reach, x, cells, data, c, nodes, functions)", ""),
     Mutant("net/shapes/rounding", "ROUNDING = 0.02", "ROUNDING = 0.03"),
     Mutant("net/shapes/plane", "(0.0, 0.0, -1.0), (0.0", "(0.0, 0.0, 1.0), (0.0"),

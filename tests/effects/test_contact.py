@@ -13,6 +13,7 @@ from scipy.special import beta
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.effects.contact.contact_points import places
 from refweb.results.state import State
 
 GRAVITY = 9.81
@@ -144,6 +145,33 @@ def test_derivatives_of_depth(shape):
         first.append(np.abs(change).sum())
         second.append(np.abs(change - 0.5 * h * h * np.einsum("pj,pjk,pk->p", d, hessian, d)).sum())
     assert abs(slope(first, steps) - 2.0) < 0.1 and abs(slope(second, steps) - 3.0) < 0.1
+
+
+@pytest.mark.parametrize("shape", ["box", "cylinder", "capsule"])
+def test_a_line_is_deepest_where_its_window_times_depth_is_largest(shape):
+    """W δ², of a penalty in proportion to depth, falls to both sides of the place; the depth is that of the point.
+
+    The tolerance of the depth is some roundings of coordinates.
+    """
+    start, end = np.random.default_rng(4).uniform(-0.45, 0.45, (2, 40, 3))
+    lines = np.arange(80).reshape(2, 40).T
+    web = refweb.Inline(points=np.vstack([start, end]).tolist(), lines=lines.tolist())
+    system = scene(web, [rigid(shape), refweb.Contact(stiffness=1e4)], solve=refweb.Static(), interval=None).build()
+    (term,) = [term for term in system.terms if term.contact.with_lines]
+    (body,) = system.net.bodies
+    deepest = places(body.shape.depth(), 0, 1, 2, (1.0, 0.0, -1.0, 1.0)).deepest
+    x, count = np.zeros((system.rows, 3)), 0
+    for c in range(len(term.cells)):
+        xi, depth = deepest(x, term.cells, term.data, c)
+        if not (0.0 < xi < 1.0 and depth > 0.0):
+            continue
+        count, (i, j) = count + 1, term.cells[c, :2]
+        at = xi + np.array([0.0, -1e-3, 1e-3])
+        points = (1.0 - at)[:, None] * system.net.points[i] + at[:, None] * system.net.points[j]
+        here = own_depth(shape, points)[0]
+        merit = at * (1.0 - at) * here**2.0
+        assert depth == pytest.approx(here[0], rel=0, abs=1e-15) and merit[0] > merit[1:].max()
+    assert count > 10
 
 
 @pytest.mark.parametrize("shape", SHAPES)
