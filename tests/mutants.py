@@ -211,7 +211,7 @@ MIRRORS = {
     "results/strength": "results/test_strength.py",
     "results/throw": "results/test_throw.py",
     "results/comparison": "results/test_comparison.py",
-    "results/state": "results/test_results.py results/test_observable_contract.py",
+    "results/state": "results/test_results.py results/test_observable_contract.py results/test_remarks.py",
     "results": "results/test_results.py test_faults.py",
     "pages": "pages/test_page.py",
     "pictures/paraview": "pictures/test_viewers.py",
@@ -930,6 +930,7 @@ MUTANTS = [
     ),
     Mutant("results/observables/observable", "changes[0] + 3.0 * max(changes[1:])", "changes[0]"),
     Mutant("results/state", "self.element_strain <= slack_below", "self.element_strain <= 0.0"),
+    Mutant("results/state", "(strain, 0), thread.title", "(0.5 * strain, 0), thread.title"),
     # Studies and modes
     Mutant("sizing/sqp", "penalty = max(penalty, 2.0 *", "penalty = min(penalty, 2.0 *"),
     Mutant("sizing/formulas", "_less(a.low, b.high) / scale", "_less(a.low, b.low) / scale"),

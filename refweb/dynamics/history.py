@@ -57,12 +57,11 @@ def _probes_of_warnings(system, followed, step_size):
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
         for name, (column, scale) in scales.items()
     }
-    curved = {i: thread for i, thread in system.threads.items() if thread.line.curve_scale is not None}
-    if curved:
+    if system.threads:
         from ..results.observables.thread import of_cell
 
         none = np.zeros((0, 0))
-        by_name |= {t.title: probes.Probe(of_cell, [2], none, sign=1.0, term=i) for i, t in curved.items()}
+        by_name |= {t.title: probes.Probe(of_cell, [2], none, sign=1.0, term=i) for i, t in system.threads.items()}
     if system.weakness is not None and system.weakness.strains is not None:
         by_name["break"] = probes.share_of_limits(system)
     if system.orbit_radius is not None:
@@ -429,11 +428,10 @@ class Watch:
             return None
         return float(course.extremes.values[at]), int(course.extremes.places[at])
 
-    def shares_of_threads(self, course):
-        """Pairs of a thread and its largest strain over the last one of its curve in all steps [1], a list."""
-        threads = [thread for thread in self.system.net.threads if self._of_warning(thread.title) is not None]
+    def strains_of_threads(self, course):
+        """Pairs of a thread and its largest strain in all steps [1], a list."""
         values = course.extremes.values
-        return [(t, float(values[self._of_warning(t.title)] * t.line.curve_scale[0])) for t in threads]
+        return [(t, float(values[self._of_warning(t.title)])) for t in self.system.threads.values()]
 
     def half_turns(self, course, drifts=False):
         """Text on the end of a thread that goes about half a turn round a cylinder, or "", see `half_turn_remark`."""

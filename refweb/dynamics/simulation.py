@@ -17,7 +17,7 @@ from ..errors import EnergyDriftError, InputError, IntegrationError, SolverError
 from ..findings import NOTE, Finding
 from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
-from ..results.state import State, curve_remark, floor_remark, strain_remark
+from ..results.state import State, curve_remark, floor_remark, strain_remark, strain_remarks_of_thread
 from ..results.strength import strength_remark
 from .accuracy_loop import CLIMBS, AccuracyState, reach_digits, run_within_drift
 from .budget import Budget, check_budget
@@ -374,7 +374,7 @@ class Simulation:
         if (used := watch.utilisation(course)) is not None:
             solution.utilisation, solution.margin = used, watch.margin(course)
         self._strain, self._share_of_curve = watch.strain(course), watch.share_of_curve(course)
-        self._shares_of_threads = watch.shares_of_threads(course)
+        self._strains_of_threads = watch.strains_of_threads(course)
         self._half_turns = watch.half_turns(course)
         if self.overlaps is not None:
             solution.bodies = self.overlaps.plain()
@@ -452,8 +452,8 @@ class Simulation:
         yield from strain_remark(self.system.net, self._strain)
         if self._share_of_curve is not None:
             yield from curve_remark(self.system.net, *self._share_of_curve)
-        for thread, share in self._shares_of_threads:
-            yield from curve_remark(thread.line, share, 0, thread.title)
+        for thread, strain in self._strains_of_threads:
+            yield from strain_remarks_of_thread(thread, strain)
         if self._half_turns:
             yield Finding("half-turn", self._half_turns, "thread")
         yield from self.system.remarks()

@@ -2,9 +2,9 @@
 
 May change: `STIFF`, `MUCH` and texts of findings. Must stay: names of properties, which observables (of users too),
 frames and remarks read; keys of `margin_of`, which stand in ``run.json``; codes of findings, which stand in
-`refweb.findings.CODES`; `curve_remark` and `strain_remark`, which `dynamics.simulation` and `statics.remarks` import;
-`floor_remark`, which `dynamics.simulation`, `statics.remarks` and `studies.mode_remarks` import; public names of
-`State`, which other files use. Tests: ``tests/results/test_results.py``, ``tests/results/test_observable_contract.py``.
+`refweb.findings.CODES`; `curve_remark`, `strain_remark` and `strain_remarks_of_thread`, which `dynamics.simulation` and
+`statics.remarks` import; `floor_remark`, which these and `studies.mode_remarks` import; public names of `State`, which
+other files use. Tests: ``tests/results/test_results.py``, ``tests/results/test_observable_contract.py``.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..net.net import Net
+    from ..net.threads import ThreadLine
     from ..system.system import System
 
 STIFF = 1e-12
@@ -259,14 +260,18 @@ MUCH = 0.2
 """Strain above which a finding warns: real cables break below it, and a linear law does not describe them."""
 
 
-def strain_remark(net: Net, strain: tuple[float, int]) -> Iterator[Finding]:
-    """Find a largest strain, (value, line), above `MUCH`, of a line that does not yield."""
+def strain_remark(net: Net, strain: tuple[float, int], name: str = "") -> Iterator[Finding]:
+    """Find a largest strain, (value, line), above `MUCH`, of a line that does not yield.
+
+    ``name`` is that of the line in messages, by default its number.
+    """
     if strain[0] > MUCH and not net.law_is("plastic")[net.line == strain[1]].any():
         yield Finding(
             "large-strain",
-            f"line {strain[1]} is strained by {100.0 * strain[0]:.3g} %, above {100.0 * MUCH:g} %: no cable stretches "
-            "that far, and its law does not describe it; lower what acts on it, or raise modulus or area",
-            "cable",
+            f"{name or f'line {strain[1]}'} is strained by {100.0 * strain[0]:.3g} %, above {100.0 * MUCH:g} %: no "
+            "cable stretches that far, and its law does not describe it; lower what acts on it, or raise modulus or "
+            "area",
+            "thread" if name else "cable",
         )
 
 
@@ -283,6 +288,13 @@ def curve_remark(net: Net, share: float, element: int, name: str = "") -> Iterat
             f"{100.0 * last:.4g} %, where its last slope goes on: give the curve more points, or lower what acts",
             "thread" if name else "cable",
         )
+
+
+def strain_remarks_of_thread(thread: ThreadLine, strain: float) -> Iterator[Finding]:
+    """Find a largest strain of a thread above `MUCH`, or beyond the last point of its curve."""
+    yield from strain_remark(thread.line, (strain, 0), thread.title)
+    if (scale := thread.line.curve_scale) is not None:
+        yield from curve_remark(thread.line, strain * float(scale[0]), 0, thread.title)
 
 
 def floor_remark(net: Net, stress: float) -> Iterator[Finding]:

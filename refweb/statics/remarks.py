@@ -12,7 +12,7 @@ import numpy as np
 
 from ..findings import NOTE, Finding
 from ..results.observables.balances import lost_by_path
-from ..results.state import curve_remark, floor_remark, strain_remark
+from ..results.state import curve_remark, floor_remark, strain_remark, strain_remarks_of_thread
 from ..results.strength import strength_remark
 
 
@@ -138,9 +138,7 @@ def remarks_on(state, stats, utilisation, equilibrium):
         shares = state.element_strain * scale
         yield from curve_remark(net, float(shares.max()), int(shares.argmax()))
     for thread in net.threads:
-        if (scale := thread.line.curve_scale) is not None:
-            share = float(state.threads[thread.name][2] * scale[0])
-            yield from curve_remark(thread.line, share, 0, thread.title)
+        yield from strain_remarks_of_thread(thread, float(state.threads[thread.name][2]))
     yield from collapse_remark(state)
 
 

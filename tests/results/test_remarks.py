@@ -107,6 +107,21 @@ def test_large_strains_in_dynamics(law, keys, damping):
             assert "30" in found[0] or "29.9" in found[0]
 
 
+@pytest.mark.parametrize("strain", [0.3, 0.1])
+@pytest.mark.parametrize("dynamic", [False, True])
+def test_large_strains_of_a_thread(dynamic, strain):
+    """Of 2 m over a ring halfway: F = 2 EA ε √(1 − 1/(1 + ε)²) in statics; at rest again where EA ε² is ½ m v²."""
+    web = refweb.Inline(points=[[-1, 0, 0], [0, 0, 0], [1, 0, 0], [-2, 0, 0]], lines=[[3, 0]], supports=[0, 2, 3])
+    rope = refweb.Thread(name="rope", nodes=[0, 1, 2], modulus=1e6, area=1e-4, density=1e-3)
+    speed, force = (200.0 * strain**2) ** 0.5, 200.0 * strain * np.sqrt(1.0 - 1.0 / (1.0 + strain) ** 2)
+    acts, solve = pull((0.0, 0.0, force)), refweb.Static()
+    if dynamic:
+        acts, solve = refweb.Velocity(node=1, value=(0.0, 0.0, speed)), refweb.Dynamic(duration=0.6, safety=0.05)
+    found = told(solved(rope, refweb.PointMass(node=1, mass=1.0), acts, web=web, solve=solve), "is strained by")
+    assert len(found) == (strain > 0.2)
+    assert all(text.startswith('thread "rope" is strained by 30 %, above 20 %') for text in found)
+
+
 def test_a_mean_of_stress_tells_of_no_strain():
     """The largest mean over a window is below the largest value, and says nothing of its strain."""
     mean = refweb.Observe(name="mean", quantity="stress", reduce="max", average=0.3)
