@@ -25,7 +25,7 @@ from numba import types
 
 from ..compiled.rows import record_at
 from ..effects.base import FELT, STRAIN
-from ..kernels import INTEGERS, MATRIX, kernel
+from ..kernels import INTEGERS, MATRIX, kernel, sum_of
 
 PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, MATRIX, INTEGERS)
 MAGNITUDE = 3
@@ -376,7 +376,7 @@ def slack_fraction(t, x, v, f, lines, rows, data, where):
 @kernel(PROBE)
 def root_of_sum(t, x, v, f, lines, rows, data, where):
     """Root of the sum of the column ``rows[0]`` of what lines show."""
-    return math.sqrt(lines[:, rows[0]].sum())
+    return math.sqrt(sum_of(lines[:, rows[0]]))
 
 
 @kernel(PROBE)

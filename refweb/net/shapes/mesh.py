@@ -77,7 +77,6 @@ class Mesh(Filled):
 def _solid(path, content, scale, grid, hull):
     """The `Solid` of the content of a file, or its convex hull."""
     from ..boundary.closed import NotClosedError, closed, convex_hull, is_convex, moments
-    from ..boundary.repair import touches_itself
     from ..boundary.surface_file import read
 
     points, triangles = read(path)
@@ -88,8 +87,11 @@ def _solid(path, content, scale, grid, hull):
         _refuse_size(points[triangles], scale)
         return _repaired(points, triangles, grid)
     _refuse_size(surface.points, scale)
-    if surface.pieces > 1 and touches_itself(surface.points, surface.triangles, grid or GRID):
-        return _repaired(surface.points, surface.triangles, grid)
+    if surface.pieces > 1:
+        from ..boundary.repair import touches_itself
+
+        if touches_itself(surface.points, surface.triangles, grid or GRID):
+            return _repaired(surface.points, surface.triangles, grid)
     volume, centre, inertia = moments(surface.points, surface.triangles)
     centred = surface._replace(points=surface.points - centre)
     mended = []
