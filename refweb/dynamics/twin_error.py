@@ -256,7 +256,7 @@ def with_errors(results, floors, twin, kept_rows, rows_refined, order=2.0, drift
     for i, (name, result) in enumerate(results.items(), 1):
         end = result.time
         if end not in chances:
-            chances[end] = max(_of_chance(times, *pair, end, order, ROUNDING * energy) for pair in known)
+            chances[end] = max(_of_chance(times, doubt, gap, end, order, ROUNDING * energy) for doubt, gap in known)
         apart_then = max(abs(result.value - twin[name].value), largest_mean(times, apart[:, i], end))
         apart_then = max(apart_then, drifts.get(name, 0.0) if end == last else 0.0)
         error = max(SPREAD * order * chances[end] * apart_then + 4e-16 * abs(result.value), floors.get(name, 0.0))

@@ -210,7 +210,7 @@ class CentralDifference(Integrator):
             **monitors,
         )
 
-    def save(self, course):
+    def save(self, course: ExplicitState):
         """The `ExplicitState` as arrays by name, for a checkpoint."""
         course.snapped = self._snapped.copy()
         return course.arrays()
