@@ -808,7 +808,7 @@ MUTANTS = [
     Mutant("dynamics/integrators/energy_balance", "* out[c, POWER]) ** 2 / 12.0", "* out[c, POWER]) ** 2 / 12e4"),
     Mutant("dynamics/integrators/energy_balance", "if out[c, LAST_STRAIN] <= slackness <", "if slackness <"),
     Mutant("dynamics/integrators/central_difference", "= course.snapped if course.snapped.size else", "="),
-    Mutant("dynamics/twin_error", "for pair in known)", "for pair in known[:1])"),
+    Mutant("dynamics/twin_error", "for doubt, gap in known)", "for doubt, gap in known[:1])"),
     Mutant("statics/newton", 'sigma=0.0, which="SA"', 'sigma=0.0, which="LA"'),
     Mutant("statics/energy_search", "ROUNDING = 0.1, 30", "ROUNDING = 0.1, 0"),
     Mutant("statics/predictor", "if energy < lowest:", "if energy > lowest:"),
