@@ -57,6 +57,9 @@ APART = 1e-6
 """Difference of the starts of an ensemble, over the shortest element: no real net is known more precisely."""
 LOST = 5
 """Number of digits that a small difference must cost before a wide result counts as chaotic."""
+LEAST_LOST = 11
+"""Number of digits, of 12, that a small difference must cost before every result counts as chaotic: motion that is
+symmetric by rounding alone may have a narrow ± in time and yet leave its branch in any other run."""
 FALLS, GROWS = 0.85, 1.5
 """Limits of the factors on a force of contact with twice the elements, and with 4 times the stiffness, for a first
 touch. A first touch has the factors 0.71 and 2. With finer elements its force falls to that of the web as a whole; with
@@ -174,7 +177,7 @@ class FurtherRuns:
             self.solution.horizon |= ensemble(self.simulation, MEMBERS, tell, APART)
 
     def _chaotic(self, observable):
-        """Tell if a result is chaotic: it is wide and small differences cost `LOST` digits, or they cost all 12.
+        """Tell if a result is chaotic: it is wide and small differences cost `LOST` digits, or they cost `LEAST_LOST`.
 
         The lost digits are those at the time of the result, for a peak those at the end of the run: a run beside it may
         have a higher peak later.
@@ -182,14 +185,15 @@ class FurtherRuns:
         result = self.solution.results[observable.name]
         time = result.time if observable.reduce == "final" else np.inf
         lost = lost_digits(self.solution.horizon, time)
-        return lost >= LOST and result.error is not None and result.error > ALLOWED * abs(result.value) or lost == 12
+        wide = result.error is not None and result.error > ALLOWED * abs(result.value)
+        return lost >= LOST and wide or lost >= LEAST_LOST
 
     def findings(self):
         """Errors of each result by these runs: ``parts``, ``reasons`` and ``mesh_only``."""
         errors: dict = {o.name: self._found_of(o) for o in self.scene.observables}
         used = {"parts": self._parts_of(UTILISATION)}
         if self.solution.utilisation is not None and (horizon := self.solution.horizon):
-            if lost_digits(horizon, np.inf) < 12:
+            if lost_digits(horizon, np.inf) < LEAST_LOST:
                 used = self._without_chance(used)
             elif (mean := horizon.get("utilisation")) is not None:
                 used["parts"]["chance"] = self._chance(self.solution.utilisation.value, mean)

@@ -192,6 +192,33 @@ def test_a_peak_before_the_horizon_may_be_exceeded_behind_it():
     assert found.verdict in ("statistical", "depends on the model")  # a bar in two elements is a chain, and falls too
 
 
+@pytest.mark.slow
+def test_a_branch_that_is_kept_by_symmetry_alone_has_an_error_of_chance():
+    """A bola whose lines are reeled in with a jump: its light hub buckles between them, but from exact symmetry.
+
+    A narrow ± in time holds the symmetric motion; a hub that is 1e-12 m off comes to other values within the run.
+    """
+    spun = refweb.Velocity(node="all", spin=(0.0, 0.0, 3.0))
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [-1, 0, 0]], lines=[[0, 1], [0, 2]], supports=[]),
+        cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=10.0),
+        effects=[
+            refweb.PointMass(node=[1, 2], mass=0.5),
+            spun,
+            refweb.Reel(lines="all", factor=[(0.2, 1.0), (1.2, 0.7)]),
+            refweb.Rupture(at=[(1, 1.5)]),
+            refweb.Drag(density=1.2, diameter=0.05),
+        ],
+        observe=[refweb.Observe(name="peak", quantity="tension", line=0, reduce="max")],
+        solve=refweb.Dynamic(duration=2.0),
+    )
+    found = scene.trust(progress=False).results["peak"]
+    beside = refweb.Inline(points=[[0, 1e-12, 0], [1, 0, 0], [-1, 0, 0]], lines=[[0, 1], [0, 2]], supports=[])
+    straight, bent = (refweb.run(s).results["peak"] for s in (scene, scene.replace(web=beside)))
+    apart = abs(straight.value - bent.value)
+    assert apart > 100.0 * straight.error and found.parts["chance"] > 0.5 * apart and found.error > apart
+
+
 def test_steps_that_are_too_long_are_no_chance():
     """A double pendulum is wide by its time steps; digits that are asked for are found."""
     scene = refweb.Scene(
