@@ -111,6 +111,9 @@ def _parameter(name, value):
     if isinstance(value, list | tuple):
         if not value:
             raise InputError(f"{name} = [] must hold at least one case")
+        texts = [quote(item) for item in value]
+        if twice := next((item for item in texts if texts.count(item) > 1 and len(item) < 60), None):
+            raise InputError(f"{name}: {twice} stands there twice: each case is run once")
         return tuple(value)
     if not isinstance(value, dict):
         wanted = 'a list of cases, { from = 0, to = 1, count = 5 } or { distribution = "norm", loc = 0, scale = 1 }'
@@ -280,17 +283,6 @@ class Study(Table):
             self._check_samples()
         else:
             self._check_design()
-        self._refuse_repeats()
-
-    def _refuse_repeats(self):
-        """Refuse values that give a case twice: of each list, in a zip of all together."""
-        lists = {path: [quote(value) for value in values] for path, values in self.listed.items()}
-        if self.sample == "zip":
-            cases = [", ".join(values) for values in zip(*lists.values(), strict=True)]
-            lists = {" and ".join(lists): cases}
-        for path, texts in lists.items():
-            if twice := next((text for text in texts if texts.count(text) > 1 and len(text) < 60), None):
-                raise InputError(f"parameters: {short(path)}: {twice} stands there twice: each case is run once")
 
     def _check_samples(self):
         if not self.drawn:
