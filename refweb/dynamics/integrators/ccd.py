@@ -21,7 +21,7 @@ is cut before the run ends. Must stay: bounds may be too large and never too sma
 ``met`` the first three numbers are rows, `line_body_ccd` sets the fourth and `central_difference` reads the fifth.
 `PAST` and `NEXT` are places in the list of `kernels.DUE`, whose layout `line_line_ccd` shares. Must follow: `features`
 gives the names in ``apart``, `records` has the fields of ``model`` and ``running``, `explicit_loop` calls the kernels.
-Must stay as well: all names that `explicit_loop`, `records` and `central_difference` import; public names of `Ccd`,
+Must stay as well: all names that `explicit_loop`, `step`, `records` and other files import; public names of `Ccd`,
 which other files use. Tests: ``tests/effects/test_passage.py``, ``test_self_contact.py``.
 """
 

@@ -29,6 +29,7 @@ from ...kernels import (
     sum_of,
 )
 from ...net.rotation import RigidRotations, add_forces_to_bodies, advance_rotation, note_turns, update_attached_nodes
+from .ccd import largest_of
 from .contacts import feel
 from .energy_balance import act
 from .implicit_contacts import detect_all
@@ -163,25 +164,6 @@ def viscous_kick(
     update_attached_nodes(x, v, turns)
 
 
-@kernel(leaf=True, forceinline=True)
-def largest_speed(h, inverse, v, f):
-    """Largest component of the velocities, and of those that forces give in a step, in a row; by three maxima."""
-    a = b = c = 0.0
-    for n in range(v.size // 3):
-        q = np.uint64(3 * n)
-        a = _larger_speed(a, h, inverse, v, f, q)
-        b = _larger_speed(b, h, inverse, v, f, q + np.uint64(1))
-        c = _larger_speed(c, h, inverse, v, f, q + np.uint64(2))
-    return max(a, b, c)
-
-
-@kernel(leaf=True, forceinline=True)
-def _larger_speed(largest, h, inverse, v, f, q):
-    speed, gained = abs(v[q]), h * inverse[q] * abs(f[q])
-    largest = speed if speed > largest else largest
-    return gained if gained > largest else largest
-
-
 @kernel(apart=("rubbing",))
 def contact_kick(
     number: int,
@@ -210,7 +192,10 @@ def contact_kick(
     count, begin = ends[-1], 0
     flat_half, flat_extra, flat_inverse = half.reshape(-1), extra.reshape(-1), inverse.reshape(-1)
     flat_v, flat_f = v.reshape(-1), f.reshape(-1)
-    fastest = largest_speed(h, flat_inverse, flat_v, flat_f) if count or viscous.size else 0.0
+    fastest = 0.0
+    if count or viscous.size:
+        fastest = largest_of(0.0, flat_v, flat_f, flat_inverse, 1.0)
+        fastest = max(fastest, largest_of(h, flat_v, flat_f, flat_inverse, 0.0))
     if viscous.size:
         copy_rows(v, half)
         extra[:] = 0.0
