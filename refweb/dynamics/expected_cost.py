@@ -33,8 +33,8 @@ class Rule(NamedTuple):
 def ruling(integrator, system, reach, speed):
     """The `Rule` of the critical time step in the initial web, with contacts of bodies within ``reach`` [m].
 
-    The cause is the term with the largest part in the row with the smallest step. It is that of stiffness, or of
-    damping if steps without damping would be over √2 times as long.
+    The cause is the term with the largest part in the row with the smallest step. It is that of stiffness, or of forces
+    that depend on velocity if steps without these would be over √2 times as long.
     """
     net = system.net
     moving = np.flatnonzero(~system.supported.all(axis=1) & (net.mass > 0.0))
@@ -50,7 +50,8 @@ def ruling(integrator, system, reach, speed):
     term = terms[int((lossy if damped else stiff)[:, worst].argmax())]
     row = int(moving[worst])
     if damped:
-        by = f"damping at {system.row_name(row)}"
+        name = f"Coriolis forces of [{term.name}]" if term.name in ("frame", "orbit") else term.name
+        by = f"{name} at {system.row_name(row)}"
     elif term.over_lines:
         of_it = [row, *(node for body in net.bodies if row in (body.row, body.spin) for node in body.carried)]
         at = np.flatnonzero(np.isin(term.cells, of_it).any(axis=1))

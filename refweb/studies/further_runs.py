@@ -54,7 +54,11 @@ SLOWER = 0.25
 MEMBERS, QUANTILE = 8, 2.5
 """Number of runs of an ensemble, and standard deviations from its mean that contain 95 % of further runs."""
 APART = 1e-6
-"""Difference of the starts of an ensemble, over the shortest element: no real net is known more precisely."""
+"""Largest difference of the starts of an ensemble, over the shortest element: no real net is known more precisely.
+
+The differences are spaced by equal ratios down to the smallest one that grows to the size of the motion. The logarithm
+of a difference sets the time at which a branch is left: runs with one difference leave it together.
+"""
 LOST = 5
 """Number of digits that a small difference must cost before a wide result counts as chaotic."""
 LEAST_LOST = 11
@@ -174,19 +178,23 @@ class FurtherRuns:
         if text == HORIZON:
             self.solution.horizon = horizon(self.simulation, self.solution.results, None, tell)
         else:
-            self.solution.horizon |= ensemble(self.simulation, MEMBERS, tell, APART)
+            lost = min((self._lost(o) for o in self.scene.observables if self._chaotic(o)), default=LEAST_LOST)
+            sizes = np.geomspace(APART, min(10.0**-lost, APART), MEMBERS)
+            self.solution.horizon |= ensemble(self.simulation, sizes, tell)
 
     def _chaotic(self, observable):
-        """Tell if a result is chaotic: it is wide and small differences cost `LOST` digits, or they cost `LEAST_LOST`.
-
-        The lost digits are those at the time of the result, for a peak those at the end of the run: a run beside it may
-        have a higher peak later.
-        """
-        result = self.solution.results[observable.name]
-        time = result.time if observable.reduce == "final" else np.inf
-        lost = lost_digits(self.solution.horizon, time)
+        """Tell if a result is chaotic: small differences cost `LOST` digits and it is wide, or `LEAST_LOST`."""
+        result, lost = self.solution.results[observable.name], self._lost(observable)
         wide = result.error is not None and result.error > ALLOWED * abs(result.value)
         return lost >= LOST and wide or lost >= LEAST_LOST
+
+    def _lost(self, observable):
+        """Number of digits that small differences cost until the time of a result.
+
+        For a peak it is that at the end of the run: a run beside it may have a higher peak later.
+        """
+        last = observable.reduce == "final"
+        return lost_digits(self.solution.horizon, self.solution.results[observable.name].time if last else np.inf)
 
     def findings(self):
         """Errors of each result by these runs: ``parts``, ``reasons`` and ``mesh_only``."""

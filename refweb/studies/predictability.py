@@ -68,7 +68,7 @@ def horizon(simulation, results, members=None, tell=None):
         "statistical": [name for name, r in results.items() if end is not None and r.time > end],
     }
     if members is not None:
-        horizon_data |= ensemble(simulation, members, tell)
+        horizon_data |= ensemble(simulation, [PERTURBATION] * members, tell)
     return horizon_data
 
 
@@ -105,8 +105,10 @@ def lost_digits(horizon, time):
     return 12 - max((k for k, when in horizon["digits"] if when is None or when > time), default=0)
 
 
-def ensemble(simulation, count, tell, size=PERTURBATION):
-    """Statistics over runs of different seeds, whose starts differ by ``size``.
+def ensemble(simulation, sizes, tell):
+    """Statistics over runs of different seeds, one for each of ``sizes``, by which its start differs at most.
+
+    A size is relative to the natural length of the shortest element.
 
     Returns
     -------
@@ -115,7 +117,7 @@ def ensemble(simulation, count, tell, size=PERTURBATION):
         utilisation if there is one.
     """
     watch, values = simulation.watch, []
-    for seed in range(1, count + 1):
+    for seed, size in enumerate(sizes, 1):
         integrator = _integrator(simulation)
         simulation.schedule.reset()
         course = integrator.start(*_beside(simulation, seed, size).motion)
@@ -125,7 +127,7 @@ def ensemble(simulation, count, tell, size=PERTURBATION):
         if (used := watch.utilisation(course)) is not None:
             values_found[UTILISATION] = used[0]
         values.append(list(values_found.values()))
-        tell("ensemble", seed / count)
+        tell("ensemble", seed / len(sizes))
     mean, deviation, names = np.mean(values, axis=0), np.std(values, axis=0, ddof=1), list(values_found)
     both = {n: {"mean": float(m), "deviation": float(d)} for n, m, d in zip(names, mean, deviation, strict=True)}
     used = both.pop(UTILISATION, None)

@@ -14,6 +14,7 @@ import math
 import os
 import pathlib
 import tomllib
+from collections import Counter
 from dataclasses import field as plain_field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -83,11 +84,24 @@ def _frozen(distribution):
     return getattr(stats, distribution.name)(**dict(distribution.keys))
 
 
-def read_parameters(name: str, given: Any) -> dict[str, Any]:
-    """Parameters of a study by path: a list of cases, a `Range` or a `Distribution`."""
+def read_parameters(name: str, given: Any, repeats: bool = False) -> dict[str, Any]:
+    """Parameters of a study by path: a list of cases, a `Range` or a `Distribution`.
+
+    A list with an equal value twice is refused unless it may have ``repeats``, as in a "zip".
+    """
     if not isinstance(given, dict) or not given:
         raise InputError(f'{name} = {quote(given)} must be a table of values by path, "solve.duration" = [0.1, 0.2]')
-    return {path: _parameter(f"{name}: {short(path)}", value) for path, value in by_path(given)}
+    parameters = {path: _parameter(f"{name}: {short(path)}", value) for path, value in by_path(given)}
+    for path, values in parameters.items():
+        if not repeats and not isinstance(values, Range | Distribution):
+            _refuse_repeats(f"{name}: {short(path)}", [quote(value) for value in values])
+    return parameters
+
+
+def _refuse_repeats(name, texts):
+    """Refuse cases that stand there twice, by their texts."""
+    if twice := [text for text, count in Counter(texts).items() if count > 1 and len(text) < 60]:
+        raise InputError(f"{name}: {twice[0]} stands there twice: each case is run once")
 
 
 _KEYS = {"from", "to", "count", "spacing", "distribution"}
@@ -111,9 +125,6 @@ def _parameter(name, value):
     if isinstance(value, list | tuple):
         if not value:
             raise InputError(f"{name} = [] must hold at least one case")
-        texts = [quote(item) for item in value]
-        if twice := next((item for item in texts if texts.count(item) > 1 and len(item) < 60), None):
-            raise InputError(f"{name}: {twice} stands there twice: each case is run once")
         return tuple(value)
     if not isinstance(value, dict):
         wanted = 'a list of cases, { from = 0, to = 1, count = 5 } or { distribution = "norm", loc = 0, scale = 1 }'
@@ -172,7 +183,7 @@ def parameters() -> Any:
 
     @accepts(by_name(any_of(array({}, 1), ranged)))
     def read(name, value):
-        return read_parameters(name, value)
+        return read_parameters(name, value, repeats=True)
 
     return field(read)
 
@@ -283,6 +294,7 @@ class Study(Table):
             self._check_samples()
         else:
             self._check_design()
+        self._refuse_equal_cases()
 
     def _check_samples(self):
         if not self.drawn:
@@ -314,6 +326,14 @@ class Study(Table):
         if self.sample == "zip" and len(set(lengths.values())) > 1:
             text = ", ".join(f"{path} has {number}" for path, number in lengths.items())
             raise InputError(f'sample = "zip" needs as many values of each parameter: {text}')
+
+    def _refuse_equal_cases(self):
+        """Refuse an equal value twice of one list; of a "zip", equal values of all lists together."""
+        texts = {path: [quote(value) for value in values] for path, values in self.listed.items()}
+        if self.sample == "zip":
+            texts = {" and ".join(texts): [", ".join(case) for case in zip(*texts.values(), strict=True)]}
+        for path, cases in texts.items():
+            _refuse_repeats(f"parameters: {short(path)}", cases)
 
     def to_dict(self) -> dict[str, Any]:
         """The study as plain TOML values."""

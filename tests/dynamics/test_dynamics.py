@@ -964,3 +964,20 @@ def test_a_drift_is_laid_to_what_leaves_energy_open(monkeypatch):
     )
     with pytest.raises(SolverError, match=r"energy came in with contact at line 1; use a smaller safety"):
         refweb.run(scene, progress=False)
+
+
+def test_a_drift_of_a_damped_body_that_tumbles_is_not_laid_to_a_line():
+    """The line never moves; in 5 steps for each turn the product of torque and rate is far from its integral."""
+    web = refweb.Inline(points=[(0, 0, 0), (1, 0, 0), (2, 0, 0)], lines=[(0, 1), (1, 2)], supports=[0, 2])
+    turning = dict(inertia=(1.0, 2.0, 3.0), angular_velocity=(30.0, 10.0, 30.0))
+    ball = refweb.Body(name="ball", radius=0.1, mass=1.0, position=(0, 0, 3.0), **turning)
+    scene = refweb.Scene(
+        web=web,
+        cable=refweb.Cable(law="linear", modulus=1e4, area=1e-6, density=1e5),
+        effects=[ball, refweb.Damping(bodies=20.0)],
+        solve=refweb.Dynamic(duration=0.4, step_size=0.04),
+        output=refweb.Output(interval=0.04),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+    with pytest.raises(SolverError, match=r'came in with the rotation of body "ball" or damping; use a smaller step'):
+        refweb.run(scene, progress=False)

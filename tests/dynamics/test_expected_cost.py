@@ -65,3 +65,9 @@ def test_in_words():
     assert seconds[0.3][1] > seconds[0.0][1] > seconds[0.0][0]
     implicit = scene(method="cvode")
     assert expected_cost(implicit, implicit.build()) is None
+
+
+def test_coriolis_forces_are_a_cause_of_their_own():
+    """Lines without stiffness to speak of, in a frame that turns fast: no damping is there to be named."""
+    turning = scene(refweb.Frame(angular_velocity=(0.0, 0.0, 1e4)))
+    assert rule(turning).by.startswith("Coriolis forces of [frame] at node ")

@@ -219,6 +219,28 @@ def test_a_branch_that_is_kept_by_symmetry_alone_has_an_error_of_chance():
     assert apart > 100.0 * straight.error and found.parts["chance"] > 0.5 * apart and found.error > apart
 
 
+@pytest.mark.slow
+def test_chance_holds_branches_that_are_left_by_any_small_difference():
+    """A massive end pushes a light hub, exactly in line. The place of the end depends on when the hub leaves the line.
+
+    That is a matter of the logarithm of its difference: runs that are 1e-6 m off alone lie within 0.06 mm.
+    """
+
+    def pushed(off):
+        return refweb.Scene(
+            web=refweb.Inline(points=[[0, 0, 0], [1, off, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0]),
+            cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=10.0),
+            effects=[refweb.PointMass(node=2, mass=0.5), refweb.Velocity(node=2, value=(-0.05, 0.0, 0.0))],
+            observe=[refweb.Observe(name="end", quantity="position", node=2, component="x", reduce="final")],
+            solve=refweb.Dynamic(duration=0.3),
+        )
+
+    found = pushed(0.0).trust(progress=False).results["end"]
+    ends = [refweb.run(pushed(off), progress=False).results["end"].value for off in (1e-12, 1e-9, 1e-6)]
+    assert max(ends) - min(ends) > 1e-3 and np.abs(np.array(ends) - found.value).max() < found.error
+    assert found.parts["chance"] > found.value - min(ends)
+
+
 def test_steps_that_are_too_long_are_no_chance():
     """A double pendulum is wide by its time steps; digits that are asked for are found."""
     scene = refweb.Scene(

@@ -400,17 +400,17 @@ class CentralDifference(Integrator):
 
     def _name_drift(self, course, before, running):
         """Name the source of an energy drift, by the steps from ``before`` [s] on."""
-        from .drift_source import name_of, source_of, suspects
+        from .drift_source import described_source, suspects
 
         system, after, state = self.system, self._again(course, before, running), course.before.copy()
         places = [(before, state[0])]
         for n in range(round((course.time - before) / course.step) if course.step > 0.0 else 0):
             state = after(state, n, 1)
             places.append((before + (n + 1) * course.step, state[0]))
-        of, cell = source_of(system, places)
+        source = described_source(system, places, course.drift * course.largest)
         raise EnergyDriftError(
             f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and {course.time:.6g} s, "
-            f"limit {DRIFT:g}: energy came in with {of.name} at {name_of(system, of, cell)}; {self._remedy}"
+            f"limit {DRIFT:g}: {source}; {self._remedy}"
             f"{suspects(system)}",
             course.drift,
         )

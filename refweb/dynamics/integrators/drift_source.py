@@ -2,10 +2,11 @@
 
 A kick, a drift and a kick change the kinetic energy by ½ (f₀ + f₁)·Δx of all forces at both ends of the drift, up to a
 part that two successive steps cancel. Therefore the drift of a cell in a step is ΔE + ½ (f₀ + f₁)·Δx with its forces f
-= −∂E/∂x. A cell that gains energy by the work of others has no drift.
+= −∂E/∂x. A cell that gains energy by the work of others has no drift. If no cell has a part in a drift, its source is a
+rotation of a body or a force that depends on velocity.
 
-`central_difference` alone calls it, for the text of an error. May change: all of it but the names `source_of`,
-`name_of` and `suspects`; no result depends on it. Tests: ``tests/results/test_results.py``.
+`central_difference` alone calls it, for the text of an error. May change: all of it but the names `described_source`
+and `suspects`; no result depends on it. Tests: ``tests/results/test_results.py``.
 """
 
 from __future__ import annotations
@@ -16,18 +17,32 @@ SHARE = 1e-3
 """Part of a drift over which an energy is differentiated, with an error of its square."""
 MOST = 3e7
 """Largest number of cells times steps that are evaluated: the last steps of a row."""
+PART = 0.1
+"""Part of the mean drift of the steps below which a cell is not the source."""
 
 
-def source_of(system, places):
-    """(Term, number of its cell) with the largest drift.
+def described_source(system, places, drift):
+    """Name of the source of a drift, as text.
 
     Parameters
     ----------
     system : refweb.system.system.System
         The system.
     places : list of (float, ndarray of shape (rows, 3))
-        Time [s] and displacement [m] at the ends of steps in turn.
+        Time [s] and displacement [m] at the ends of steps in turn, the last at the end of the drift.
+    drift : float
+        Drift from t = 0 to the last time [J].
     """
+    (term, cell), largest, since = _source_of(system, places)
+    others = [f'the rotation of body "{body.name}"' for body in system.net.bodies if body.turn is not None]
+    others += dict.fromkeys(f.name for f in system.terms if f.velocity.damping is not None)
+    if others and largest < PART * abs(drift) * (1.0 - since / places[-1][0]):
+        return f"energy came in with {' or '.join(others)}"
+    return f"energy came in with {term.name} at {_name_of(system, term, cell)}"
+
+
+def _source_of(system, places):
+    """(Term, number of its cell) with the largest drift, this drift [J], and the time of the first step [s]."""
     terms = [f for f in system.terms if f.energy is not None and f.balance.column != "work"]
     cells = sum(len(term.cells) for term in terms)
     steps = list(zip(places, places[1:], strict=False))[-max(int(MOST / max(cells, 1)), 1) :]
@@ -43,7 +58,7 @@ def source_of(system, places):
         if len(left) and np.abs(left).max() > largest:
             cell = int(np.abs(left).argmax())
             largest, source = abs(left[cell]), (term, cell)
-    return source
+    return source, largest, steps[0][0][0] if steps else places[-1][0]
 
 
 def suspects(system):
@@ -58,7 +73,7 @@ def suspects(system):
     return f", or see if the energy of effect{plural} {', '.join(names)} is that of its force" if names else ""
 
 
-def name_of(system, term, cell):
+def _name_of(system, term, cell):
     """Name of the item that a cell of a term belongs to."""
     if term.contact.pairs:
         return " and ".join(f'body "{body.name}"' for body in term.contact.pairs[cell])

@@ -94,7 +94,7 @@ class Observe(Table):
     component : {0, 1, 2, "x", "y", "z", "w"}, optional
         Axis of a nodal quantity, or of a quantity of rotation; without it the magnitude. For an orientation it is the
         component of the quaternion that rotates the axes x, y and z to those of the body; "w" or 3 is the scalar part.
-        Without a component an orientation is the angle from the start.
+        Without a component an orientation is the angle from the pose of the body in the web.
     reduce : {"max", "min", "final"}
         Reduction over time. In statics it is not used, since each load step has its results.
     average : float, optional

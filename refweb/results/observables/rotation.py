@@ -54,7 +54,7 @@ class Turning(Observable):
 
 
 class Orientation(Turning):
-    """Component of the quaternion from x, y, z to the axes of the body; without it the angle from the start.
+    """Component of the quaternion from x, y, z to the axes of the body; without it the angle from its pose in the web.
 
     At the start it is the ``orientation`` of the scene, or that of the axes with w ≥ 0. It does not jump. The angle is
     0 to π.

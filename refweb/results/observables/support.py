@@ -107,7 +107,10 @@ class SupportMoment(_Held):
 
 
 class AxleAngle(_Held):
-    """Angle that a body has turned by about its axle since the start, of any number of turns."""
+    """Angle of a body about its axle from its pose in the web, of any number of turns.
+
+    A run with ``start = "equilibrium"`` begins with the angle of the equilibrium.
+    """
 
     unit = "rad"
     keys: tuple[str, ...] = ("body",)
