@@ -990,6 +990,10 @@ MUTANTS = [
     Mutant("compiled/store", "if content[:CHECK] == _checksum(content[CHECK:]):", "if content:"),
     Mutant("compiled/kernel", "if features is None or k.apart <= features", "if features is None or not k.apart"),
     Mutant("compiled/numba_internals", 'function.linkage = "internal"', "pass"),
+    Mutant("compiled/numba_internals", "if inside or step not in", "if step not in"),
+    Mutant("compiled/numba_internals", 'icmp_signed("<", at', 'icmp_signed(">", at'),
+    Mutant("compiled/numba_internals", "builder.add(builder.mul(position, size), at)", "builder.add(position, at)"),
+    Mutant("compiled/numba_internals", "if role == _SEQUENCE else", "if role == _MAPPING else"),
     Mutant("compiled/tables", "(flags := value.flags).c_contiguous", "(flags := value.flags).aligned"),
     Mutant("compiled/tables", "for _ in range(2):  # what", "for _ in range(1):  # what"),
     # Values by path, new scenes and comparisons

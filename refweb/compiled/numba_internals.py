@@ -17,6 +17,10 @@ call by address        a caller that links its callees optimizes all that is   k
 operators of types     kernels read records and tables as Python does         none: what `records` and `tables`
 of one's own                                                                   need of numba beside its
                                                                                ``extending`` stands here
+`Lower`                numba takes an array apart for each number of it, a     numba's own
+                       third of all instructions that LLVM reads
+`_replacements`        parts of numba's front end take a tenth of the time to  numba's own
+                       compile for what is found with less work
 =====================  ======================================================  ====================================
 
 ``REFWEB_PLAIN=1`` uses the right column. Tables of kernels need addresses of functions and the calling convention of
@@ -30,31 +34,41 @@ before the bound in ``pyproject.toml`` is raised. Tests: ``tests/compiled/test_k
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
+import gc
 import importlib
 import os
 import pickle
+from types import CodeType
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, config, sigutils
+from numba.core import cgutils, config, event, sigutils, targetconfig
+from numba.core import ir as numba_ir
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import register_pass
+from numba.core.datamodel import default_manager
 from numba.core.imputils import lower_builtin, lower_constant
+from numba.core.lowering import Lower
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
+from numba.core.typed_passes import NativeLowering
+from numba.core.types.functions import BaseFunction
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, Signature, infer_global
+from numba.core.untyped_passes import InlineClosureLikes, MakeFunctionToJitFunction
 from numba.extending import intrinsic, models, register_model
-from numba.np.arrayobj import make_array, populate_array
+from numba.np.arrayobj import make_array
 
 from . import keys, store
 
-__all__ = ["AbstractTemplate", "AttributeTemplate", "infer_global", "lower_builtin", "make_array", "populate_array"]
+__all__ = ["AbstractTemplate", "AttributeTemplate", "infer_global", "lower_builtin", "make_array"]
 
 PLAIN = os.environ.get("REFWEB_PLAIN") == "1"
 """True if kernels use only public parts of numba."""
@@ -62,6 +76,9 @@ BARE = {} if PLAIN else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of a kernel without an entry from Python."""
 ENTRY = {} if PLAIN else {"no_cfunc_wrapper": True}
 """Options of a kernel that only Python calls."""
+_array = default_manager[types.Array(types.float64, 1, "C")]
+_COUNTER, _DATA, _SHAPE = (_array.get_field_position(name) for name in ("meminfo", "data", "shape"))
+"""Places of an array's parts in its intermediate code."""
 _byte = ir.IntType(8).as_pointer()
 _config: Any = config  # numba makes its entries at run time, from variables of the environment
 lock = global_compiler_lock
@@ -171,16 +188,234 @@ class _Library(JITCodeLibrary):
         super()._finalize_final_module()
 
 
+def array_of(context, builder, kind, parts):
+    """Array of numba from its parts by name."""
+    array = ir.Constant(context.get_value_type(kind), ir.Undefined)
+    for position, name in enumerate(context.data_model_manager[kind]._fields):
+        array = builder.insert_value(array, parts[name], position)
+    return array
+
+
+class _Lower(Lower):
+    """Writes fewer instructions for LLVM than numba: an array is not taken apart for a number in it, nor to be counted.
+
+    LLVM removes the others, which are a third of all, after it has read them. Machine code is nearly the same.
+    """
+
+    def _indices(self, array, index):
+        """Types and values of indices of one number in an array without gaps; None for other indices and arrays."""
+        kind = self.typeof(index.name)
+        kinds = kind.types if isinstance(kind, types.BaseTuple) else (kind,)
+        if (
+            not isinstance(array, types.Array)
+            or array.layout != "C"
+            or not isinstance(array.dtype, types.Float | types.Integer | types.Boolean)
+            or len(kinds) != array.ndim
+            or not all(isinstance(kind, types.Integer) for kind in kinds)
+            or self.context.enable_boundscheck
+        ):
+            return None
+        value = self.loadvar(index.name)
+        if not isinstance(kind, types.BaseTuple):
+            return [(kind, value)]
+        return [(kind, self.builder.extract_value(value, n)) for n, kind in enumerate(kinds)]
+
+    def _item_pointer(self, array, indices):
+        """Pointer to the number at indices of an array, which count from its end if they are negative."""
+        builder, position = self.builder, None
+        shape = builder.extract_value(array, _SHAPE)
+        for axis, (kind, value) in enumerate(indices):
+            size = builder.extract_value(shape, axis)
+            at = self.context.cast(builder, value, kind, types.intp if kind.signed else types.uintp)
+            if kind.signed:
+                at = builder.select(builder.icmp_signed("<", at, at.type(0)), builder.add(at, size), at)
+            position = at if position is None else builder.add(builder.mul(position, size), at)
+        return builder.gep(builder.extract_value(array, _DATA), [position])
+
+    def lower_getitem(self, resty, expr, value, index, signature):
+        """Read a number of an array."""
+        array = self.typeof(value.name)
+        if (indices := self._indices(array, index)) is None:
+            return super().lower_getitem(resty, expr, value, index, signature)
+        position = self._item_pointer(self.loadvar(value.name), indices)
+        item = self.context.unpack_value(self.builder, array.dtype, position, align=None if array.aligned else 1)
+        return self.context.cast(self.builder, item, array.dtype, resty)
+
+    def lower_setitem(self, target_var, index_var, value_var, signature):
+        """Write a number of an array."""
+        array, kind = self.typeof(target_var.name), self.typeof(value_var.name)
+        number = isinstance(kind, types.Number | types.Boolean)
+        if not number or (indices := self._indices(array, index_var)) is None:
+            return super().lower_setitem(target_var, index_var, value_var, signature)
+        position = self._item_pointer(self.loadvar(target_var.name), indices)
+        value = self.context.cast(self.builder, self.loadvar(value_var.name), kind, array.dtype)
+        self.context.pack_value(self.builder, array.dtype, value, position, align=None if array.aligned else 1)
+        return self.context.get_dummy_value()
+
+    def incref(self, typ, val):
+        """Count a reference."""
+        super().incref(*self._counted(typ, val))
+
+    def decref(self, typ, val):
+        """Give a reference back."""
+        super().decref(*self._counted(typ, val))
+
+    def _counted(self, kind, value):
+        """The counter of an array, in place of the whole array."""
+        if not isinstance(kind, types.Array) or not self.context.enable_nrt:
+            return kind, value
+        return types.MemInfoPointer(types.voidptr), self.builder.extract_value(value, _COUNTER)
+
+    def delvar(self, name):
+        """Give the references of a variable back; without any there is nothing to do."""
+        if self.context.data_model_manager[self.typeof(name)].contains_nrt_meminfo():
+            super().delvar(name)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Lowering(NativeLowering):
+    _name = "kernel_lowering"
+    lowering_class = _Lower
+
+
+_FOR_FUNCTIONS_INSIDE = InlineClosureLikes, MakeFunctionToJitFunction
+"""Passes of numba for functions and comprehensions inside of a function, which few kernels have."""
+
+
 def _compiler_of(cache):
-    """Compiler of numba that makes a `_Library`."""
+    """Compiler of numba that makes a `_Library` by `_Lower`."""
 
     class KernelCompiler(Compiler):
         def define_pipelines(self):
             state = self.state
             state.library = _Library(state.targetctx.codegen(), state.func_id.func_qualname, cache)
-            return super().define_pipelines()
+            pipelines = super().define_pipelines()
+            inside = any(isinstance(value, CodeType) for value in state.func_id.code.co_consts)
+            for pipeline in pipelines:
+                pipeline.passes = [
+                    (_Lowering if step is NativeLowering else step, text)
+                    for step, text in pipeline.passes
+                    if inside or step not in _FOR_FUNCTIONS_INSIDE
+                ]
+            return pipelines
 
     return KernelCompiler
+
+
+_SCALARS_AND_ARRAYS = types.Number, types.Boolean, types.Array
+_roles: dict[type, int] = {}
+_VARIABLE, _INSTRUCTION, _SEQUENCE, _MAPPING, _NEITHER = range(5)
+
+
+def _role(kind):
+    """Tell how `_add_variables` reads a value of a Python type."""
+    for role, kinds in enumerate((numba_ir.Var, numba_ir.Inst, (list, tuple), dict)):
+        if issubclass(kind, kinds):
+            return _roles.setdefault(kind, role)
+    return _roles.setdefault(kind, _NEITHER)
+
+
+def _add_variables(value, variables):
+    """Add to a list all variables in a part of an instruction of numba's intermediate code."""
+    role = _roles.get(type(value))
+    if role is None:
+        role = _role(type(value))
+    if role == _VARIABLE:
+        variables.append(value)
+    elif role == _INSTRUCTION:
+        variables += value.list_vars()
+    elif role != _NEITHER:
+        for part in value if role == _SEQUENCE else value.values():
+            _add_variables(part, variables)
+
+
+def _variables_in(instruction, value):
+    """All variables in a part of an instruction, by one look-up of the type of each value."""
+    variables: list[Any] = []
+    _add_variables(value, variables)
+    return variables
+
+
+def _call_type(original):
+    """Return ``BaseFunction.get_call_type`` that remembers the signatures of operators of scalars and arrays.
+
+    Without that numba tries all meanings of an operator, up to one of strings and of sets, for each occurrence. Only
+    a meaning that is lowered by the name of the operator is remembered; others are functions to be compiled.
+    """
+
+    def get_call_type(self, context, args, kws):
+        known = self.__dict__.setdefault("_refweb_signatures", {})
+        signature = None if kws else known.get((context, args))
+        if signature is None:
+            signature = original(self, context, args, kws)
+            simple = not kws and all(isinstance(kind, _SCALARS_AND_ARRAYS) for kind in args)
+            if simple and self._impl_keys[signature.args] is self.typing_key:
+                known[context, args] = signature
+        return signature
+
+    return get_call_type
+
+
+@functools.cache
+def _defaults(kind):
+    return {name: option.default for name, option in kind.options.items()}
+
+
+def _values(flags):
+    """Values of all options of a compilation, without a call for each."""
+    return {**_defaults(type(flags)), **flags._values}
+
+
+def _equal(flags, second):
+    """Tell if options of two compilations are equal."""
+    if flags is second:
+        return True
+    return _values(flags) == _values(second) if isinstance(second, targetconfig.TargetConfig) else NotImplemented
+
+
+@functools.cache
+def _hash_of(kind):
+    return hash(tuple(sorted(kind.options)))
+
+
+def _heard(original):
+    """Return a function that announces an event of numba, and does nothing if nobody listens."""
+    return lambda kind, *data, **named: original(kind, *data, **named) if event._registered.get(kind) else None
+
+
+@contextlib.contextmanager
+def _no_timer(kind, callback):
+    """Stand in for a timer of the locks of numba and LLVM, which are taken 200 000 times for a capture."""
+    yield
+
+
+_replacements = (
+    (numba_ir.Inst, "_rec_list_vars", _variables_in),
+    (BaseFunction, "get_call_type", _call_type(BaseFunction.get_call_type)),
+    (targetconfig.TargetConfig, "values", _values),
+    (targetconfig.TargetConfig, "__eq__", _equal),
+    (targetconfig.TargetConfig, "__hash__", lambda flags: _hash_of(type(flags))),
+    (event, "start_event", _heard(event.start_event)),
+    (event, "end_event", _heard(event.end_event)),
+    (event, "install_timer", _no_timer),
+)
+"""Faster functions for those of numba, with the same results, while kernels are compiled."""
+
+
+@contextlib.contextmanager
+def _replaced():
+    """Compile in the block, whose thread has the lock, with `_replacements` and without collection of garbage."""
+    before, collected = [getattr(where, name) for where, name, _ in _replacements], gc.isenabled()
+    try:
+        gc.disable()
+        for where, name, replacement in _replacements:
+            setattr(where, name, replacement)
+        yield
+    finally:
+        for (where, name, _), original in zip(_replacements, before, strict=True):
+            setattr(where, name, original)
+        if collected:
+            gc.enable()
 
 
 def without_literals(signature):
@@ -212,7 +447,7 @@ def dispatcher(function, given, cache) -> Any:
                 made.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
                 made.add_overload(result)
                 return result.entry_point
-            with store.alone(cache.file(signature)):
+            with store.alone(cache.file(signature)), _replaced():
                 return compile_one(signature)
 
     made.compile = compile_alone

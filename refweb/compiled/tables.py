@@ -26,7 +26,7 @@ from numba.extending import NativeValue, models, register_model, unbox
 from numba.np.numpy_support import as_dtype
 
 from . import numba_internals
-from .numba_internals import AbstractTemplate, infer_global, lower_builtin, make_array, populate_array
+from .numba_internals import AbstractTemplate, infer_global, lower_builtin, make_array
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,15 +58,21 @@ def load(builder, pointer, index, stays=True):
 
 def array_at(context, builder, kind, data, sizes, meminfo=None):
     """Array of numba at an address, with given sizes."""
-    made = make_array(kind)(context, builder)
-    size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
-    step, strides = ir.Constant(_word, size), []
+    size = ir.Constant(_word, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
+    step, strides, number = size, [], ir.Constant(_word, 1)
     for count in reversed(sizes):
         strides.insert(0, step)
-        step = builder.mul(step, count)
-    pointer = builder.inttoptr(data, context.get_data_type(kind.dtype).as_pointer())
-    populate_array(made, pointer, sizes, strides, ir.Constant(_word, size), meminfo)
-    return made._getvalue()
+        step, number = builder.mul(step, count), builder.mul(number, count)
+    parts = {
+        "meminfo": ir.Constant(_byte, None) if meminfo is None else meminfo,
+        "parent": ir.Constant(_byte, None),
+        "nitems": number,
+        "itemsize": size,
+        "data": builder.inttoptr(data, context.get_data_type(kind.dtype).as_pointer()),
+        "shape": cgutils.pack_array(builder, sizes),
+        "strides": cgutils.pack_array(builder, strides),
+    }
+    return numba_internals.array_of(context, builder, kind, parts)
 
 
 class Pointer(types.Type):

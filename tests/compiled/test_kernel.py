@@ -423,3 +423,72 @@ def test_a_second_process_compiles_the_same_and_none_is_left(tmp_path, what, wor
     *told, count = done.stdout.split()[:-10]
     assert told == words and int(count) <= most and done.stderr == ""
     assert done.stdout.split()[-10:] == [str(2.0 * n) for n in range(10)]
+
+
+@pytest.mark.parametrize("what", ["range(3)", "[k for k in range(3)]"], ids=["plain", "comprehension"])
+def test_replacements_in_the_front_end_give_the_code_of_numba(tmp_path, what):
+    lines = f"""
+import sys
+from refweb.compiled import numba_internals
+if sys.argv[1] == "numba":
+    numba_internals._replacements = ()
+    numba_internals._FOR_FUNCTIONS_INSIDE = ()
+from refweb.kernels import Indices, Matrix, Vector, kernel
+import math, re
+
+@kernel()
+def size(x, n):
+    return math.sqrt(x[n, 0] ** 2 + x[n, 1] ** 2) if n >= 0 else float(n)
+
+@kernel(apart=())
+def force(h: float, x: Matrix, cells: Indices, out: Vector) -> int:
+    number = 0
+    for k in {what}:
+        for c in range(cells.shape[0]):
+            first, second = cells[c, 0], cells[c, 1]
+            if first != second and not (size(x, first) > 1.0 or k == 2):
+                out[c] += h * size(x, second) - 2 * k / 3 + max(h, x[c, 1])
+                number += 1 + cells[c, 0] // 2
+            x[c, 0] = -x[c, 1] + h
+    return number
+
+address = force.address()
+code = force._body.overloads[tuple(force.signature.args)].library.get_llvm_str()
+print(re.sub(r"(pickle[a-z]+)[.][0-9]+", "", code))  # what an address names
+"""
+    (tmp_path / "own.py").write_text(lines)
+    codes = []
+    for way in ("numba", "replaced"):
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "REFWEB_CACHE": str(tmp_path / way)}
+        command = [sys.executable, str(tmp_path / "own.py"), way]
+        codes.append(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert codes[0] == codes[1] != ""
+
+
+@pytest.mark.parametrize("index", [np.array([1, -2]), np.array([1, -2], np.int32), np.array([1, 2], np.uint8)], ids=str)
+@pytest.mark.parametrize("dtype", [np.float64, np.int32, np.bool_])
+def test_numbers_of_arrays_are_those_of_python(index, dtype):
+    """Read and written by integers of any kind, also from the end, in arrays of one to three axes and in parts of them.
+
+    Numbers that are written have the type of the array.
+    """
+    number = numba.from_dtype(np.dtype(dtype))
+    arrays = [numba.types.Array(number, n, "C") for n in (1, 2, 3)]
+
+    @kernel(numba.types.void(*arrays, numba.typeof(index)))
+    def move(line, plane, cube, index):
+        i, j = index[0], index[1]
+        line[i] = plane[j, -1]
+        plane[i + 1, 1] = 2 * cube[i, j, 2] + 0.5
+        cube[j, 0, -2] = line[-2] + plane[2][j]
+        part = cube[:, 1]
+        part[i, j] = cube[-1, -1, -1]
+        plane[i][0] = True
+
+    generator = np.random.default_rng(1)
+    given = [generator.integers(0, 9, shape).astype(dtype) for shape in ((4,), (4, 3), (3, 4, 3))]
+    found, expected = [x.copy() for x in given], [x.copy() for x in given]
+    move(*found, index)
+    move.py_func(*expected, index.astype(np.int64))
+    for a, b in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(a, b)
