@@ -159,6 +159,12 @@ CASES = [
     for n, law in enumerate(LAWS)
     if (n == i % len(LAWS) if name in OF_ONE_LAW else law == "tension-only" or not on_lines(name, i))
 ]
+IN_TURN = [
+    pytest.param(name, i, law, marks=pytest.mark.slow if not on_lines(name, i) and n != i % len(LAWS) else ())
+    for name, i, law in CASES
+    for n in [[*LAWS].index(law)]
+]
+"""Examples with their laws, of which the ordinary run takes one for each, in turn."""
 
 
 def example(name, i):
@@ -333,7 +339,7 @@ def agrees(change, product):
     return min(errors) < 1e-5
 
 
-@pytest.mark.parametrize("name, i, law", CASES)
+@pytest.mark.parametrize("name, i, law", IN_TURN)
 def test_derivatives_in_hard_states(name, i, law):
     for place in (flat, stretched, crumpled, far):
         check_derivatives(name, i, law, place)

@@ -45,6 +45,11 @@ LONG = (
     "falling_chain",
     "figures_with_a_limit",
     "spinning_arm",
+    "spin_up",
+    "tumbling",
+    "elastic_catenary",
+    "three_cables",
+    "two_links",
 )
 """Cases that take more than a second with ``--quick``; what they show has tests of its own beside them."""
 

@@ -196,6 +196,7 @@ def test_drawn_surface_lies_on_the_shape(shape):
 # Energies: all of the penalty against places sampled along the lines
 
 
+@pytest.mark.ordinary("sphere-1", "box-1", "r*-1.5", "c*-1.5")
 @pytest.mark.parametrize("exponent", [1, 1.5])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_energy_of_contact(shape, exponent):
@@ -843,7 +844,7 @@ def overlapping(shape, contact, mass, seed):
     return system, x, np.repeat(system.net.mass, 3)[system.free]
 
 
-@pytest.mark.ordinary("1e-05-*-1", "0.001-*-1.5", "1.0-*-1", "1000.0-*-1.5")
+@pytest.mark.ordinary("1e-05-[src]*-1", "0.001-box-1.5", "1.0-box-1", "1000.0-[src]*-1.5")
 @pytest.mark.parametrize("exponent", [1, 1.5])
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("mass", [1e-5, 1e-3, 1.0, 1e3])

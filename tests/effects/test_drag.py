@@ -76,6 +76,7 @@ def test_ball_of_order_two(case):
     assert errors[-1][1] < 1e-4
 
 
+@pytest.mark.ordinary("falls-cvode-*", "coasts-ida-*")
 @pytest.mark.parametrize("method, rtol", [("cvode", 1e-8), ("ida", 1e-7)])
 @pytest.mark.parametrize("case", CASES)
 def test_ball_by_other_methods(case, method, rtol):

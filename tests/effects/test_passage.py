@@ -68,6 +68,7 @@ def test_middles_are_deeper_than_what_nothing_comes_to(shape):
     assert depths(body, np.zeros((1, 3)))[0] > MIDDLE * body.thickness > CORE * body.thickness
 
 
+@pytest.mark.ordinary("sphere-1.0", "bar-1.0", "cube-1.0", "c[aoy]*-1.5", "plate-1.5")
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_lines_are_hardly_deeper_than_what_is_shown(shape, exponent):

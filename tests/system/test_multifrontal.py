@@ -91,6 +91,7 @@ def test_separators_of_a_lattice_are_short():
     assert abs(np.count_nonzero(top == 2) - np.count_nonzero(top == 3)) <= n + 1
 
 
+@pytest.mark.ordinary("lattice-1", "triangulation-24", "two parts-1", "hub-24", "cable-24", "no edges but one-1")
 @pytest.mark.parametrize("part", [1, 24])
 @pytest.mark.parametrize("name", GRAPHS)
 def test_solutions_are_those_of_numpy(name, part, monkeypatch):
