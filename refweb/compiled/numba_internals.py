@@ -37,7 +37,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
-import gc
 import importlib
 import os
 import pickle
@@ -404,18 +403,15 @@ _replacements = (
 
 @contextlib.contextmanager
 def _replaced():
-    """Compile in the block, whose thread has the lock, with `_replacements` and without collection of garbage."""
-    before, collected = [getattr(where, name) for where, name, _ in _replacements], gc.isenabled()
+    """Compile in the block, whose thread has the lock, with `_replacements`."""
+    before = [getattr(where, name) for where, name, _ in _replacements]
     try:
-        gc.disable()
         for where, name, replacement in _replacements:
             setattr(where, name, replacement)
         yield
     finally:
         for (where, name, _), original in zip(_replacements, before, strict=True):
             setattr(where, name, original)
-        if collected:
-            gc.enable()
 
 
 def without_literals(signature):
