@@ -954,7 +954,7 @@ MUTANTS = [
     Mutant("studies/further_runs", "return max(left, MARGIN", "return min(left, MARGIN"),
     Mutant("studies/further_runs", "times * value for name", "value for name"),
     Mutant("studies/further_runs", "if variant.price > left:", "if False:"),
-    Mutant("studies/further_runs", "lost >= LEAST_LOST", "lost >= 13"),
+    Mutant("studies/further_runs", "self._lost(observable) >= LOST", "self._lost(observable) >= 11"),
     Mutant("results/error_budget", "float(sum(numbers))", "float(max(numbers))"),
     Mutant("results/error_budget", "if error <= ALLOWED * value", "if error < value"),
     Mutant("results/error_budget", 'reasons["contact_stiffness"] = "nothing touches"', "pass"),

@@ -209,7 +209,7 @@ class _Lower(Lower):
             not isinstance(array, types.Array)
             or array.layout != "C"
             or not isinstance(array.dtype, types.Float | types.Integer | types.Boolean)
-            or len(kinds) != array.ndim
+            or not len(kinds) == array.ndim > 0
             or not all(isinstance(kind, types.Integer) for kind in kinds)
             or self.context.enable_boundscheck
         ):

@@ -35,7 +35,7 @@ from ..dynamics.budget import Spent, budget_of, steps_with_twin
 from ..dynamics.twin_error import largest_mean
 from ..errors import InputError, SolverError
 from ..registry import EFFECTS, INTEGRATORS, name_of
-from ..results.error_budget import ALLOWED, SMOOTHED, SMOOTHING_SHARE, first_touch, reasons_of, rubs
+from ..results.error_budget import SMOOTHED, SMOOTHING_SHARE, first_touch, reasons_of, rubs
 from ..results.files import write_atomically, write_text
 from ..results.solution import as_history
 from ..results.strength import UTILISATION
@@ -60,10 +60,8 @@ The differences are spaced by equal ratios down to the smallest one that grows t
 of a difference sets the time at which a branch is left: runs with one difference leave it together.
 """
 LOST = 5
-"""Number of digits that a small difference must cost before a wide result counts as chaotic."""
-LEAST_LOST = 11
-"""Number of digits, of 12, that a small difference must cost before every result counts as chaotic: motion that is
-symmetric by rounding alone may have a narrow ± in time and yet leave its branch in any other run."""
+"""Number of digits that a small difference must cost before a result counts as chaotic: a difference of `APART` then
+grows to a tenth of the motion, also where a motion that is symmetric by rounding alone has a narrow ± in time."""
 FALLS, GROWS = 0.85, 1.5
 """Limits of the factors on a force of contact with twice the elements, and with 4 times the stiffness, for a first
 touch. A first touch has the factors 0.71 and 2. With finer elements its force falls to that of the web as a whole; with
@@ -178,15 +176,13 @@ class FurtherRuns:
         if text == HORIZON:
             self.solution.horizon = horizon(self.simulation, self.solution.results, None, tell)
         else:
-            lost = min((self._lost(o) for o in self.scene.observables if self._chaotic(o)), default=LEAST_LOST)
+            lost = min((self._lost(o) for o in self.scene.observables if self._chaotic(o)), default=LOST)
             sizes = np.geomspace(APART, min(10.0**-lost, APART), MEMBERS)
             self.solution.horizon |= ensemble(self.simulation, sizes, tell)
 
     def _chaotic(self, observable):
-        """Tell if a result is chaotic: small differences cost `LOST` digits and it is wide, or `LEAST_LOST`."""
-        result, lost = self.solution.results[observable.name], self._lost(observable)
-        wide = result.error is not None and result.error > ALLOWED * abs(result.value)
-        return lost >= LOST and wide or lost >= LEAST_LOST
+        """Tell if a result is chaotic: small differences cost `LOST` digits."""
+        return self._lost(observable) >= LOST
 
     def _lost(self, observable):
         """Number of digits that small differences cost until the time of a result.
@@ -201,7 +197,7 @@ class FurtherRuns:
         errors: dict = {o.name: self._found_of(o) for o in self.scene.observables}
         used = {"parts": self._parts_of(UTILISATION)}
         if self.solution.utilisation is not None and (horizon := self.solution.horizon):
-            if lost_digits(horizon, np.inf) < LEAST_LOST:
+            if lost_digits(horizon, np.inf) < LOST:
                 used = self._without_chance(used)
             elif (mean := horizon.get("utilisation")) is not None:
                 used["parts"]["chance"] = self._chance(self.solution.utilisation.value, mean)

@@ -492,3 +492,13 @@ def test_numbers_of_arrays_are_those_of_python(index, dtype):
     move.py_func(*expected, index.astype(np.int64))
     for a, b in zip(found, expected, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_an_array_without_axes_is_read_and_written():
+    @kernel()
+    def total(x):
+        kept = np.zeros(())
+        kept[()] = x.sum()
+        return kept[()]
+
+    assert total(np.arange(4.0)) == 6.0

@@ -275,3 +275,14 @@ def test_friction_that_creeps_is_off_by_its_slip_velocity():
     )
     found = scene.trust(progress=False).results["slip"]
     assert found.value > 1e-3 and found.parts["smoothing"] >= found.value and found.verdict == "depends on the model"
+
+
+@pytest.mark.slow
+def test_chance_of_a_motion_whose_growth_ends_early():
+    """A mass on an upright bar for 5 s: a difference of 1e-12 grows by 1e6 alone, one of 1e-6 lays it down."""
+    scene = upright(0.0).replace(solve=refweb.Dynamic(duration=5.0))
+    lowest = scene.trust(progress=False).results["lowest"]
+    beside = refweb.Inline(points=[[0, 0, 0], [1e-6, 0, 1]], lines=[[0, 1]], supports=[0])
+    fallen = refweb.run(scene.replace(web=beside), progress=False).results["lowest"].value
+    assert fallen < -0.5 and lowest.value > 0.9
+    assert lowest.parts["chance"] > 1.0 and lowest.verdict in ("statistical", "depends on the model")
