@@ -160,9 +160,10 @@ CASES = [
     if (n == i % len(LAWS) if name in OF_ONE_LAW else law == "tension-only" or not on_lines(name, i))
 ]
 IN_TURN = [
-    pytest.param(name, i, law, marks=pytest.mark.slow if not on_lines(name, i) and n != i % len(LAWS) else ())
+    pytest.param(
+        name, i, law, marks=pytest.mark.slow if not on_lines(name, i) and law != [*LAWS][i % len(LAWS)] else ()
+    )
     for name, i, law in CASES
-    for n in [[*LAWS].index(law)]
 ]
 """Examples with their laws, of which the ordinary run takes one for each, in turn."""
 

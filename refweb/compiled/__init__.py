@@ -14,9 +14,9 @@ optimization takes 16 s of 88, its output of machine code 10, its passes per fun
 the rest is numba in Python, which takes 0.05 to 0.1 s for the smallest function and grows with lines. So the number of
 functions counts. No kernel takes more than 4 %. An expression of arrays, ``np.empty`` or ``reshape`` in a kernel
 compiles functions of numba as well, which takes 0.05 to 0.2 s for each set of options. Less optimization
-(``NUMBA_OPT=1``) saves 12 s and leaves most runs as quick, but contact with surface files takes 1.4 times as long. A
-profile: ``REFWEB_COMPILERS=1 REFWEB_CACHE=EMPTY python -m cProfile -o FILE -m refweb run SCENE``, in which Python takes
-twice its time.
+(``NUMBA_OPT=1``) saves 12 s and leaves most runs as quick, but contact with surface files takes 1.2 to 1.4 times as
+long. A profile: ``REFWEB_COMPILERS=1 REFWEB_CACHE=EMPTY python -m cProfile -o FILE -m refweb run SCENE``, in which
+Python takes twice its time.
 
 Room: the lowest, which imports nothing of refweb; other rooms take most of it through `refweb.kernels`, and rows from
 `refweb.compiled.rows`. A change of any file here, even of a comment, compiles all kernels of all users again: change

@@ -63,7 +63,7 @@ from numba.core.types.functions import BaseFunction
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, Signature, infer_global
 from numba.core.untyped_passes import InlineClosureLikes, MakeFunctionToJitFunction
 from numba.extending import intrinsic, models, register_model
-from numba.np.arrayobj import make_array
+from numba.np.arrayobj import fix_integer_index, load_item, make_array, store_item
 
 from . import keys, store
 
@@ -209,7 +209,7 @@ class _Lower(Lower):
             not isinstance(array, types.Array)
             or array.layout != "C"
             or not isinstance(array.dtype, types.Float | types.Integer | types.Boolean)
-            or not len(kinds) == array.ndim > 0
+            or len(kinds) != array.ndim
             or not all(isinstance(kind, types.Integer) for kind in kinds)
             or self.context.enable_boundscheck
         ):
@@ -221,23 +221,18 @@ class _Lower(Lower):
 
     def _item_pointer(self, array, indices):
         """Pointer to the number at indices of an array, which count from its end if they are negative."""
-        builder, position = self.builder, None
-        shape = builder.extract_value(array, _SHAPE)
-        for axis, (kind, value) in enumerate(indices):
-            size = builder.extract_value(shape, axis)
-            at = self.context.cast(builder, value, kind, types.intp if kind.signed else types.uintp)
-            if kind.signed:
-                at = builder.select(builder.icmp_signed("<", at, at.type(0)), builder.add(at, size), at)
-            position = at if position is None else builder.add(builder.mul(position, size), at)
-        return builder.gep(builder.extract_value(array, _DATA), [position])
+        builder, data = self.builder, self.builder.extract_value(array, _DATA)
+        shape = cgutils.unpack_tuple(builder, builder.extract_value(array, _SHAPE))
+        at = [fix_integer_index(self.context, builder, *index, n) for index, n in zip(indices, shape, strict=True)]
+        return cgutils.get_item_pointer2(self.context, builder, data, shape, None, "C", at)
 
     def lower_getitem(self, resty, expr, value, index, signature):
         """Read a number of an array."""
         array = self.typeof(value.name)
         if (indices := self._indices(array, index)) is None:
             return super().lower_getitem(resty, expr, value, index, signature)
-        position = self._item_pointer(self.loadvar(value.name), indices)
-        item = self.context.unpack_value(self.builder, array.dtype, position, align=None if array.aligned else 1)
+        pointer = self._item_pointer(self.loadvar(value.name), indices)
+        item = load_item(self.context, self.builder, array, pointer)
         return self.context.cast(self.builder, item, array.dtype, resty)
 
     def lower_setitem(self, target_var, index_var, value_var, signature):
@@ -246,9 +241,9 @@ class _Lower(Lower):
         number = isinstance(kind, types.Number | types.Boolean)
         if not number or (indices := self._indices(array, index_var)) is None:
             return super().lower_setitem(target_var, index_var, value_var, signature)
-        position = self._item_pointer(self.loadvar(target_var.name), indices)
+        pointer = self._item_pointer(self.loadvar(target_var.name), indices)
         value = self.context.cast(self.builder, self.loadvar(value_var.name), kind, array.dtype)
-        self.context.pack_value(self.builder, array.dtype, value, position, align=None if array.aligned else 1)
+        store_item(self.context, self.builder, array, value, pointer)
         return self.context.get_dummy_value()
 
     def incref(self, typ, val):
@@ -302,23 +297,21 @@ def _compiler_of(cache):
 
 
 _SCALARS_AND_ARRAYS = types.Number, types.Boolean, types.Array
-_roles: dict[type, int] = {}
 _VARIABLE, _INSTRUCTION, _SEQUENCE, _MAPPING, _NEITHER = range(5)
 
 
+@functools.cache
 def _role(kind):
     """Tell how `_add_variables` reads a value of a Python type."""
     for role, kinds in enumerate((numba_ir.Var, numba_ir.Inst, (list, tuple), dict)):
         if issubclass(kind, kinds):
-            return _roles.setdefault(kind, role)
-    return _roles.setdefault(kind, _NEITHER)
+            return role
+    return _NEITHER
 
 
 def _add_variables(value, variables):
     """Add to a list all variables in a part of an instruction of numba's intermediate code."""
-    role = _roles.get(type(value))
-    if role is None:
-        role = _role(type(value))
+    role = _role(type(value))
     if role == _VARIABLE:
         variables.append(value)
     elif role == _INSTRUCTION:

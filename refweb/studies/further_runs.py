@@ -176,7 +176,7 @@ class FurtherRuns:
         if text == HORIZON:
             self.solution.horizon = horizon(self.simulation, self.solution.results, None, tell)
         else:
-            lost = min((self._lost(o) for o in self.scene.observables if self._chaotic(o)), default=LOST)
+            lost = min(self._lost(o) for o in self.scene.observables if self._chaotic(o))
             sizes = np.geomspace(APART, min(10.0**-lost, APART), MEMBERS)
             self.solution.horizon |= ensemble(self.simulation, sizes, tell)
 

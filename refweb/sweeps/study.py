@@ -92,16 +92,28 @@ def read_parameters(name: str, given: Any, repeats: bool = False) -> dict[str, A
     if not isinstance(given, dict) or not given:
         raise InputError(f'{name} = {quote(given)} must be a table of values by path, "solve.duration" = [0.1, 0.2]')
     parameters = {path: _parameter(f"{name}: {short(path)}", value) for path, value in by_path(given)}
-    for path, values in parameters.items():
-        if not repeats and not isinstance(values, Range | Distribution):
-            _refuse_repeats(f"{name}: {short(path)}", [quote(value) for value in values])
+    if not repeats:
+        _refuse_equal_values(name, _lists(parameters))
     return parameters
 
 
-def _refuse_repeats(name, texts):
-    """Refuse cases that stand there twice, by their texts."""
-    if twice := [text for text, count in Counter(texts).items() if count > 1 and len(text) < 60]:
-        raise InputError(f"{name}: {twice[0]} stands there twice: each case is run once")
+def _lists(parameters):
+    """Lists of values among parameters, by path."""
+    return {path: values for path, values in parameters.items() if not isinstance(values, Range | Distribution)}
+
+
+def _refuse_equal_values(name, lists):
+    """Refuse an equal value twice of one list."""
+    for path, values in lists.items():
+        _refuse_repeats(f"{name}: {short(path)}", [values])
+
+
+def _refuse_repeats(name, lists):
+    """Refuse a case that stands there twice, in lists of values side by side; long values are not told apart."""
+    cases = Counter(zip(*([quote(value) for value in values] for values in lists), strict=True))
+    for case, count in cases.items():
+        if count > 1 and all(len(text) < 60 for text in case):
+            raise InputError(f"{name}: {', '.join(case)} stands there twice: each case is run once")
 
 
 _KEYS = {"from", "to", "count", "spacing", "distribution"}
@@ -328,12 +340,15 @@ class Study(Table):
             raise InputError(f'sample = "zip" needs as many values of each parameter: {text}')
 
     def _refuse_equal_cases(self):
-        """Refuse an equal value twice of one list; of a "zip", equal values of all lists together."""
-        texts = {path: [quote(value) for value in values] for path, values in self.listed.items()}
-        if self.sample == "zip":
-            texts = {" and ".join(texts): [", ".join(case) for case in zip(*texts.values(), strict=True)]}
-        for path, cases in texts.items():
-            _refuse_repeats(f"parameters: {short(path)}", cases)
+        """Refuse an equal value twice of one list; of a "zip", equal values of all lists together.
+
+        A range has no equal values, so that a zip with one has no equal cases.
+        """
+        lists = _lists(self.parameters)
+        if self.sample != "zip":
+            _refuse_equal_values("parameters", lists)
+        elif len(lists) == len(self.parameters):
+            _refuse_repeats(f"parameters: {short(' and '.join(lists))}", lists.values())
 
     def to_dict(self) -> dict[str, Any]:
         """The study as plain TOML values."""
