@@ -182,7 +182,7 @@ MIRRORS = {
     "dynamics/integrators/explicit_loop": "dynamics/integrators/test_nearby.py dynamics/test_dynamics.py "
     "dynamics/test_impact.py",
     "dynamics/integrators/energy_balance": "dynamics/test_agreement_by_chance.py test_readme.py "
-    "dynamics/test_corners.py dynamics/test_impact.py effects/test_moved_bodies.py",
+    "dynamics/test_corners.py dynamics/test_impact.py effects/test_moved_bodies.py effects/test_axles.py",
     "dynamics/integrators/ida": "dynamics/integrators/test_ida.py",
     "dynamics/integrators/yielding": "effects/test_plastic.py",
     "dynamics/integrators/averages": "dynamics/test_averages.py",
@@ -455,6 +455,8 @@ MUTANTS = [
     Mutant("dynamics/integrators/tangent", "            self._drive(t, t)\n", "            pass\n"),
     Mutant("dynamics/integrators/tangent", "-= h * (self.a - before[1])", "-= 0.0 * (self.a - before[1])"),
     Mutant("dynamics/integrators/energy_balance", "rounding ** (1 if system.works else 2)", "rounding**2"),
+    Mutant("dynamics/integrators/energy_balance", "rounding * _work_of_arms(system)", "0.0"),
+    Mutant("dynamics/integrators/energy_balance", "in {0.0, *system.corners.tolist()}", "in {0.0}"),
     Mutant("dynamics/linear_run", "self.at_snaps.update(", "set().update("),
     Mutant("dynamics/gradients", "error[:-shifts], largest[-shifts:]", "error[:-shifts], 0.0"),
     Mutant("dynamics/linear_run", "value + move, left + move", "value, left"),

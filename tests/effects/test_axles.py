@@ -59,6 +59,31 @@ def test_body_on_an_axle_is_a_physical_pendulum(method):
     assert result.solver["energy_drift"] < 1e-4
 
 
+@pytest.mark.parametrize(
+    "load", ["weight", {}, {"factor": [[0.0, 0.0], [1e-3, 1.0]]}], ids=["weight", "load", "rising"]
+)
+@pytest.mark.parametrize("method", ["central-difference", "order 4"])
+def test_pendulum_beside_its_equilibrium(load, method, angle=1e-9):
+    """The angle is a₀ cos(ω t), though its energy is less than the rounding of the work of the load."""
+    body = ROD | {"position": [3.0 - ARM * angle, 0.3, 0.0]}
+    rate, held = np.sqrt(MASS * G * ARM / MOMENT), WEB | {"supports": [0, 1, 2]}
+    tables = {"web": held, "gravity": {"acceleration": [0.0, 0.0, -G]}}
+    if load != "weight":
+        points = [[0, 0, 0], [1, 0, 0], [3.0 - ARM * angle, 0.3, 0.0]]
+        web = {"kind": "inline", "points": points, "lines": [[0, 1], [1, 2]], "natural_length": 4.0, "supports": [0]}
+        body, rate = ROD | {"position": [3.0, 0.3, ARM]}, np.sqrt(MASS * G * ARM / INERTIA[1])
+        pull = {"node": 2, "force": [0.0, 0.0, -MASS * G]} | load
+        tables = {
+            "web": web,
+            "cable": SOFT | {"law": "tension-only", "modulus": 1.0, "density": 1.0},
+            "load": [pull],
+            "attach": [{"body": "rod", "node": 2}],
+        }
+    result = solved(method, "axle_angle", body=[body], solve={"duration": 0.5, "step_size": 1e-3}, **tables)
+    turned = angle * (1.0 - np.cos(rate * 0.5))
+    assert result.results["axle_angle"].value == pytest.approx(-turned, rel=5e-3)  # a ramp of 1 ms, steps of 1 ms
+
+
 def test_period_of_the_pendulum():
     """4 K(k)/ω₀, after which it is back where it was, by order 6; 0.7 of the way to the top."""
     rate = np.sqrt(MASS * G * ARM / MOMENT)

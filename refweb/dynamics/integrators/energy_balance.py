@@ -51,13 +51,32 @@ if a load rises from zero on a web at rest, the first rows compare the errors of
 
 
 def least_energy(system):
-    """Least energy with which a drift is compared [J]: that of strains of a few roundings, over `DRIFT`.
+    """Least energy with which a drift is compared [J]: what a few roundings change, over `DRIFT`.
 
     A web at rest whose lines have exactly their natural length has only energies by rounding. Where supports or natural
-    lengths move, the forces of such strains do work on the way, which counts as one of the length of each line.
+    lengths move, the forces of such strains do work on the way, which counts as one of the length of each line. Nodes
+    that turn with a body, and its centre beside an axle, have displacements with the rounding of their arms. The work
+    of outer forces on them has that rounding too: of a pendulum near its equilibrium it is all that changes.
     """
     lines, rounding = system.net.line_data, 8.0 * np.finfo(float).eps
-    return float(0.5 * (lines.ea * lines.natural_length).sum() * rounding ** (1 if system.works else 2) / DRIFT)
+    strains = float(0.5 * (lines.ea * lines.natural_length).sum() * rounding ** (1 if system.works else 2))
+    return (strains + rounding * _work_of_arms(system)) / DRIFT
+
+
+def _work_of_arms(system):
+    """Largest sum of outer forces on rows that bodies carry, each times its arm [J], at any corner of their tables."""
+    arms = {body.row: body.arm for body in system.net.bodies if body.pivot is not None}
+    for body in system.net.bodies:
+        if not body.fixed:
+            arms.update(zip(body.carried, body.points, strict=True))
+    outer = [term for term in system.terms if not term.balance.internal]
+    if not arms or not outer:
+        return 0.0
+    lengths, still = np.linalg.norm(list(arms.values()), axis=1), np.zeros((system.rows, 3))
+    return max(
+        float(lengths @ np.linalg.norm(sum(system.force_of(f, t, still)[[*arms]] for f in outer), axis=1))
+        for t in {0.0, *system.corners.tolist()}
+    )
 
 
 def own_energies(total, system):
