@@ -993,6 +993,7 @@ MUTANTS = [
     Mutant("compiled/kernel", "if features is None or k.apart <= features", "if features is None or not k.apart"),
     Mutant("compiled/numba_internals", 'function.linkage = "internal"', "pass"),
     Mutant("compiled/numba_internals", "if inside or step not in", "if step not in"),
+    Mutant("compiled/numba_internals", "if known is not None:", "if False:"),
     Mutant("compiled/numba_internals", 'or array.layout != "C"', ""),
     Mutant("compiled/numba_internals", 'shape, None, "C", at)', 'shape, None, "F", at)'),
     Mutant("compiled/numba_internals", "if role == _SEQUENCE else", "if role == _MAPPING else"),

@@ -428,10 +428,10 @@ def dispatcher(function, given, cache) -> Any:
     def compile_alone(signature):
         if not given.get("forceinline"):
             signature = without_literals(signature)
-        known = made.overloads.get(tuple(sigutils.normalize_signature(signature)[0]))
-        if known is not None:
-            return known.entry_point
-        with lock:
+        with lock:  # an overload that two threads add is ambiguous, and each call looks for it anew
+            known = made.overloads.get(tuple(sigutils.normalize_signature(signature)[0]))
+            if known is not None:
+                return known.entry_point
             if (result := made._cache.load_overload(signature, made.targetctx)) is not None:
                 made.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
                 made.add_overload(result)

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 import types
 
 import numba
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from refweb.compiled import kernel as kernels
-from refweb.compiled import keys, store, watched
+from refweb.compiled import keys, numba_internals, store, watched
 from refweb.kernels import Matrix, Vector, kernel
 
 FACTORY = '''
@@ -231,6 +232,27 @@ def test_an_error_comes_through_a_call_by_address():
 @kernel(leaf=True, apart=())
 def takes_matrix(values: Matrix) -> int:
     return values.shape[0]
+
+
+def test_threads_that_call_a_kernel_for_the_first_time_at_once_compile_it_once(monkeypatch, tmp_path):
+    """Two machine codes of one signature would be ambiguous: numba would ask for the types again in each call."""
+    monkeypatch.setenv("REFWEB_CACHE", str(tmp_path))
+
+    @kernel()
+    def first(values):
+        return values[0]
+
+    threads = [threading.Thread(target=first, args=(np.ones(1),)) for _ in range(2)]
+    with numba_internals.lock:
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(0.5)  # until both wait for the lock
+    for thread in threads:
+        thread.join()
+    asked = []
+    monkeypatch.setattr(first._entry, "_compile_for_args", lambda *arguments: asked.append(arguments), raising=False)
+    assert first(np.full(1, 3.0)) == 3.0 and not asked
 
 
 def test_arguments_of_other_types_are_refused():
