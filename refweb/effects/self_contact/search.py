@@ -51,7 +51,9 @@ def middles(x, cells, data, buffer):
 @kernel()
 def boxes_of(width, buffer):
     """(least place, width of the cells of a grid, numbers along the axes); no cells where places are not finite."""
-    low, high, count = np.full(3, math.inf), np.full(3, -math.inf), np.ones(3, dtype=np.int64)
+    low, high, count = np.empty(3), np.empty(3), np.empty(3, dtype=np.int64)
+    for k in range(3):
+        low[k], high[k], count[k] = math.inf, -math.inf, 1
     for c in range(buffer.shape[0]):
         for k in range(3):
             low[k], high[k] = min(low[k], buffer[c, k]), max(high[k], buffer[c, k])
@@ -75,7 +77,10 @@ def boxes_of(width, buffer):
 @kernel()
 def sorted_by_box(low, width, count, buffer):
     """(elements in the order of boxes, where each box begins among them, and their rows of ``buffer``)."""
-    sorted_elements, start = np.empty(buffer.shape[0], dtype=np.int64), np.zeros(count.prod() + 1, dtype=np.int64)
+    sorted_elements = np.empty(buffer.shape[0], dtype=np.int64)
+    start = np.empty(count[0] * count[1] * count[2] + 1, dtype=np.int64)
+    for b in range(start.size):
+        start[b] = 0
     for c in range(buffer.shape[0]):
         at = 0
         for k in range(3):
@@ -84,7 +89,10 @@ def sorted_by_box(low, width, count, buffer):
         start[at + 1] += 1
     for b in range(1, start.size):
         start[b] += start[b - 1]
-    order, filled, rows = np.empty(buffer.shape[0], dtype=np.int64), start[:-1].copy(), np.empty(buffer.shape)
+    order, filled = np.empty(buffer.shape[0], dtype=np.int64), np.empty(start.size - 1, dtype=np.int64)
+    rows = np.empty((buffer.shape[0], buffer.shape[1]))
+    for b in range(filled.size):
+        filled[b] = start[b]
     for c in range(buffer.shape[0]):
         at = filled[sorted_elements[c]]
         order[at] = c
@@ -168,19 +176,23 @@ def fill(reach, count, start, order, rows, cells, data, pairs):
 @kernel()
 def pairs_within(skin, x, cells, data):
     """Numbers of all pairs of elements that may push each other when they come nearer by ``skin`` [m], shape (., 2)."""
-    pairs, buffer = np.empty((cells.shape[0] + 64, 2), dtype=np.int64), np.empty((cells.shape[0], 7))
+    none, buffer = np.empty((0, 2), dtype=np.int64), np.empty((cells.shape[0], 7))
     if cells.shape[0] < 2:
-        return pairs[:0]
+        return none
     reach = REACH * record_at(ELEMENT, data, 0, 0).touch + skin
     low, width, count = boxes_of(2.0 * middles(x, cells, data, buffer) + reach, buffer)
     if count[0] == 0:
-        return pairs[:0]
+        return none
     order, start, rows = sorted_by_box(low, width, count, buffer)
-    amount = fill(reach, count, start, order, rows, cells, data, pairs)
-    if amount > pairs.shape[0]:
-        pairs = np.empty((amount, 2), dtype=np.int64)
+    room = np.empty((cells.shape[0] + 64, 2), dtype=np.int64)
+    amount = fill(reach, count, start, order, rows, cells, data, room)
+    pairs = np.empty((amount, 2), dtype=np.int64)
+    if amount > room.shape[0]:
         fill(reach, count, start, order, rows, cells, data, pairs)
-    return pairs[:amount]
+        return pairs
+    for n in range(amount):  # numba's slices take longer to compile
+        pairs[n, 0], pairs[n, 1] = room[n, 0], room[n, 1]
+    return pairs
 
 
 @kernel()
