@@ -32,7 +32,9 @@ TABLES = {
 def made():
     """Calls of `Finding` in the package, with constant arguments as their values."""
     for path in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if "Finding(" not in (text := path.read_text(encoding="utf-8")):
+            continue
+        for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Finding":
                 yield [arg.value if isinstance(arg, ast.Constant) else None for arg in node.args]
 

@@ -732,6 +732,25 @@ def test_a_book_that_stays_open_fails(tmp_path, monkeypatch, capsys):
     assert threading.active_count() == 1
 
 
+def test_a_drift_names_the_table_whose_corner_is_on_the_way(monkeypatch):
+    """Not the rotation of the box, which could turn and does not."""
+    monkeypatch.setattr(central_difference, "DRIFT", 1e-6)
+    box = {"name": "box", "shape": "box", "size": [0.1, 0.1, 0.1], "mass": 1e-3, "position": [0, 3, 0]}
+    jump = {"body": "box", "force": [1, 0, 0], "factor": [[0, 0], [5.5e-3, 0], [5.6e-3, 1]]}
+    given = refweb.Scene.from_dict(
+        {
+            "web": {"kind": "inline", "points": [[0, 0, 0], [1, 0, 0]], "lines": [[0, 1]], "supports": [0, 1]},
+            "cable": {"law": "linear", "modulus": 1e6, "area": 1e-6, "density": 1000.0},
+            "body": [box | {"velocity": [1, 0, 0]}],
+            "load": [jump],
+            "solve": {"kind": "dynamic", "duration": 0.02, "step_size": 1e-3},
+            "accuracy": {"error": "none"},
+        }
+    )
+    with pytest.raises(EnergyDriftError, match="energy came in with a corner of the table of load;"):
+        refweb.run(given)
+
+
 def test_a_fixed_step_is_never_halved(monkeypatch):
     monkeypatch.setattr(central_difference, "DRIFT", 1e-9)
     steps = []

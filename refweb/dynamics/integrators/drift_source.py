@@ -3,7 +3,7 @@
 A kick, a drift and a kick change the kinetic energy by ½ (f₀ + f₁)·Δx of all forces at both ends of the drift, up to a
 part that two successive steps cancel. Therefore the drift of a cell in a step is ΔE + ½ (f₀ + f₁)·Δx with its forces f
 = −∂E/∂x. A cell that gains energy by the work of others has no drift. If no cell has a part in a drift, its source is a
-rotation of a body or a force that depends on velocity.
+corner of a table, a rotation of a body or a force that depends on velocity.
 
 `central_difference` alone calls it, for the text of an error. May change: all of it but the names `described_source`
 and `suspects`; no result depends on it. Tests: ``tests/results/test_results.py``.
@@ -34,11 +34,27 @@ def described_source(system, places, drift):
         Drift from t = 0 to the last time [J].
     """
     (term, cell), largest, since = _source_of(system, places)
-    others = [f'the rotation of body "{body.name}"' for body in system.net.bodies if body.turn is not None]
-    others += dict.fromkeys(f.name for f in system.terms if f.velocity.damping is not None)
+    others = _further_sources(system, places)
     if others and largest < PART * abs(drift) * (1.0 - since / places[-1][0]):
         return f"energy came in with {' or '.join(others)}"
     return f"energy came in with {term.name} at {_name_of(system, term, cell)}"
+
+
+def _further_sources(system, places):
+    """Sources beside cells, as a list: corners of tables on the way, bodies that turned, forces by velocity."""
+    (begin, before), (end, after) = places[0], places[-1]
+    corners = [
+        f"a corner of the table of {term.name}"
+        for term in system.terms
+        if any(begin <= t <= end for t in term.timing.times)
+    ]
+    turned = [
+        f'the rotation of body "{body.name}"'
+        for body in system.net.bodies
+        if body.turn is not None and not np.array_equal(before[[body.spin, body.turn]], after[[body.spin, body.turn]])
+    ]
+    damped = [term.name for term in system.terms if term.velocity.damping is not None]
+    return list(dict.fromkeys([*corners, *turned, *damped]))
 
 
 def _source_of(system, places):
