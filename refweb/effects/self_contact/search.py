@@ -184,14 +184,14 @@ def pairs_within(skin, x, cells, data):
     if count[0] == 0:
         return none
     order, start, rows = sorted_by_box(low, width, count, buffer)
-    room = np.empty((cells.shape[0] + 64, 2), dtype=np.int64)
-    amount = fill(reach, count, start, order, rows, cells, data, room)
+    first_pairs = np.empty((cells.shape[0] + 64, 2), dtype=np.int64)
+    amount = fill(reach, count, start, order, rows, cells, data, first_pairs)
     pairs = np.empty((amount, 2), dtype=np.int64)
-    if amount > room.shape[0]:
+    if amount > first_pairs.shape[0]:
         fill(reach, count, start, order, rows, cells, data, pairs)
         return pairs
     for n in range(amount):  # numba's slices take longer to compile
-        pairs[n, 0], pairs[n, 1] = room[n, 0], room[n, 1]
+        pairs[n, 0], pairs[n, 1] = first_pairs[n, 0], first_pairs[n, 1]
     return pairs
 
 
