@@ -447,6 +447,7 @@ def test_a_second_process_compiles_the_same_and_none_is_left(tmp_path, what, wor
     assert done.stdout.split()[-10:] == [str(2.0 * n) for n in range(10)]
 
 
+@pytest.mark.ordinary("comprehension")
 @pytest.mark.parametrize("what", ["range(3)", "[k for k in range(3)]"], ids=["plain", "comprehension"])
 def test_replacements_in_the_front_end_give_the_code_of_numba(tmp_path, what):
     lines = f"""
