@@ -121,7 +121,7 @@ class CentralDifference(Integrator):
         self._snapped = outs[0][:, SNAPPED] if jump else np.zeros(0)
         self._observed = Observed.of(probes, sums, len(outs), outs, self.model.contacts)
         self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])
-        self._events, self._least_energy = event_rows(events), least_energy(system)
+        self._events, self._least_energy = event_rows(events), least_energy(system, self.model.inertia.turns)
         self._taken, self._prepared = None, False
         self._kept: Any = ()
         self._history = History.empty(0, len(probes), system.terms)

@@ -6,7 +6,7 @@ part that two successive steps cancel. Therefore the drift of a cell in a step i
 corner of a table, a rotation of a body or a force that depends on velocity.
 
 `central_difference` alone calls it, for the text of an error. May change: all of it but the names `described_source`
-and `suspects`; no result depends on it. Tests: ``tests/results/test_results.py``.
+and `suspects`; no result depends on it. Tests: ``tests/results/test_results.py``, ``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ size) and ``work`` ends with that of motion: `rows`, `simpson_balance` and `Hist
 its value in words in ``validation/how_it_works.py``, which ``tests/test_readme.py`` compares. Kernels are called by
 `explicit_loop`, `step`, `dense_output`, `rows` and `simpson_balance`, which follow their arguments; another order of
 sums changes last bits of work. Must stay as well: all names that `explicit_loop`, `simpson_balance` and other files
-import. Tests: ``tests/dynamics/test_impact.py``, ``tests/dynamics/test_corners.py``.
+import. Tests: ``tests/dynamics/test_impact.py``, ``tests/dynamics/test_corners.py``, ``tests/effects/test_axles.py``.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ if a load rises from zero on a web at rest, the first rows compare the errors of
 """
 
 
-def least_energy(system):
+def least_energy(system, turns):
     """Least energy with which a drift is compared [J]: what a few roundings change, over `DRIFT`.
 
     A web at rest whose lines have exactly their natural length has only energies by rounding. Where supports or natural
@@ -60,23 +60,16 @@ def least_energy(system):
     """
     lines, rounding = system.net.line_data, 8.0 * np.finfo(float).eps
     strains = float(0.5 * (lines.ea * lines.natural_length).sum() * rounding ** (1 if system.works else 2))
-    return (strains + rounding * _work_of_arms(system)) / DRIFT
+    return (strains + rounding * _work_of_arms(system, turns)) / DRIFT
 
 
-def _work_of_arms(system):
+def _work_of_arms(system, turns):
     """Largest sum of outer forces on rows that bodies carry, each times its arm [J], at any corner of their tables."""
-    arms = {body.row: body.arm for body in system.net.bodies if body.pivot is not None}
-    for body in system.net.bodies:
-        if not body.fixed:
-            arms.update(zip(body.carried, body.points, strict=True))
-    outer = [term for term in system.terms if not term.balance.internal]
-    if not arms or not outer:
+    rows, arms = turns.carried[:, 0], np.linalg.norm(turns.arms, axis=1)
+    if not rows.size:
         return 0.0
-    lengths, still = np.linalg.norm(list(arms.values()), axis=1), np.zeros((system.rows, 3))
-    return max(
-        float(lengths @ np.linalg.norm(sum(system.force_of(f, t, still)[[*arms]] for f in outer), axis=1))
-        for t in {0.0, *system.corners.tolist()}
-    )
+    times = {0.0, *system.corners.tolist()}
+    return max(float(arms @ np.linalg.norm(system.outer_force(t)[rows], axis=1)) for t in times)
 
 
 def own_energies(total, system):

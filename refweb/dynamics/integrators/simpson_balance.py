@@ -155,9 +155,10 @@ class SimpsonBalance:
     """
 
     def __init__(self, system, hold, fast, uneven=UNEVEN):
-        self.system, self._hold, self.least_energy = system, hold, least_energy(system)
+        self.system, self._hold = system, hold
         self._uneven = np.array([UNEVEN, uneven])
         self._linear, self._turns = system.rows - system.net.spins, RigidRotations.of(system.net)
+        self.least_energy = least_energy(system, self._turns)
         self._still = system.net.mass[: self._linear].sum() * fast
         terms = system.terms
         self._lines = system.line_data(0.0).matrix.copy()
