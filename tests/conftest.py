@@ -42,7 +42,8 @@ MANY = 5000
 def pytest_collection_modifyitems(items):
     """Mark as slow the variants of a test that ``@pytest.mark.ordinary(...)`` does not name, by their ids or patterns.
 
-    The ordinary run keeps each value of each parameter in one variant at least; the slow one has all the others.
+    The ordinary run keeps each value of each parameter in one variant at least, and one of two that are alike, as CVODE
+    and IDA or meshes of one size; the slow one has all the others.
     """
     unused = {}
     for item in items:

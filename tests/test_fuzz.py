@@ -429,7 +429,7 @@ def fuzz(count):
 
 @pytest.mark.parametrize("kind", range(3), ids=["valid", "changed", "garbled"])
 def test_some_scenes(kind):
-    fuzz(150)[kind]()
+    fuzz(100)[kind]()
 
 
 @pytest.mark.slow

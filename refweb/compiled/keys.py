@@ -57,8 +57,9 @@ def code_of(code, docstring=None):
     return repr((code.co_code.hex(), constants, names, code.co_argcount, code.co_flags))
 
 
+@functools.cache
 def globals_in(code):
-    """Names of the globals that a code object and nested ones load, a set."""
+    """Names of the globals that a code object and nested ones load, a frozenset."""
     names, extended = set(), 0
     for operation, argument in zip(code.co_code[::2], code.co_code[1::2], strict=True):
         argument |= extended << 8
@@ -68,7 +69,7 @@ def globals_in(code):
     for constant in code.co_consts:
         if isinstance(constant, python.CodeType):
             names |= globals_in(constant)
-    return names
+    return frozenset(names)
 
 
 def captured(function):

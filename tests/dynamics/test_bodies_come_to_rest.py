@@ -40,6 +40,7 @@ def alone(method, **tables):
     )
 
 
+@pytest.mark.ordinary("central-difference", "cvode")
 @pytest.mark.parametrize("method", METHODS)
 def test_momenta_fade_at_the_rate(method):
     """exp(−γt) of momentum and angular momentum, whatever the tumbling does; what is lost is what was there."""

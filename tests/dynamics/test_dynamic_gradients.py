@@ -86,11 +86,7 @@ CASES = [  # law, effects, paths
 
 
 @pytest.mark.ordinary(
-    "tension-only-cable.modulus",
-    "table-load.0.force.2",
-    "tension-only-drag.normal",
-    "linear-motion.0.displacement.1.3",
-    "linear-reel.0.factor.1.1",
+    "tension-only-cable.modulus", "table-load.0.force.2", "linear-motion.0.displacement.1.3", "linear-reel.0.factor.1.1"
 )
 @pytest.mark.parametrize(("law", "effects", "paths"), CASES, ids=[f"{law}-{paths[0]}" for law, _, paths in CASES])
 def test_taylor_remainders(law, effects, paths):
@@ -565,6 +561,7 @@ def test_sizes_that_pass_0():
     assert float(gradient) == pytest.approx(exact, rel=0.15) and gradient.left[0] == pytest.approx(-float(gradient))
 
 
+@pytest.mark.slow
 def test_a_motion_that_stays_at_a_kink():
     """Lines at rest without strain, and a ball that just touches: a push and a pull move them otherwise, with no sign.
 

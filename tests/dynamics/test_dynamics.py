@@ -307,6 +307,7 @@ def test_rows_are_multiples_of_the_interval_and_the_end(duration, interval, last
     assert times[-1] == duration and len(times) == last + 1
 
 
+@pytest.mark.ordinary("central-difference", "ida")
 @pytest.mark.parametrize("method", ["central-difference", "cvode", "ida"])
 def test_momentum_is_that_of_what_is_free(method):
     """Σ m v of nodes that are neither held nor driven, whose masses here are those of two half lines each.

@@ -115,6 +115,7 @@ def test_a_passage_that_steps_resolve():
     assert float(gradient) == pytest.approx(wanted, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_snap_at_a_history_row():
     """Tension and its derivative are those of either side in run and refinement there: other rows are named."""
     scene = flight(2e-4)
@@ -147,6 +148,7 @@ def soft_snap(speed, time, start, gravity=5.0, end=0.03):
     return {"x": 1.0 + u + v * left - 0.5 * gravity * left**2, "v": v - gravity * left}
 
 
+@pytest.mark.ordinary("1.27")
 @pytest.mark.parametrize("phase", [1.27, 1.6, 1.88])
 def test_run_and_refinement_that_agree_by_chance(phase):
     """A soft snap lies alike in the steps of both runs; ± is what a snap a step later changes, and so is sound."""
@@ -333,6 +335,7 @@ CORNERS = {
 }
 
 
+@pytest.mark.ordinary("before it", "behind it")
 @pytest.mark.parametrize(("rows", "duration", "keys"), CORNERS.values(), ids=CORNERS)
 def test_corners_of_prescribed_motion(rows, duration, keys):
     """Results and derivatives are of the same side of a corner: a bar is linear in what its end is moved by.

@@ -298,6 +298,7 @@ def test_less_than_half_a_turn():
     assert run.results["pull"].value == pytest.approx(EA * strain, rel=1e-9)
 
 
+@pytest.mark.ordinary("0.4-central-difference", "-0.6-*")
 @pytest.mark.parametrize("method", ["central-difference", "cvode"])
 @pytest.mark.parametrize("turns", [0.4, -0.6])
 def test_half_a_turn_of_a_slack_thread_is_warned_of(turns, method):

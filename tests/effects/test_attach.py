@@ -243,7 +243,7 @@ def test_explicit_orders(order, exact):
     assert found[1].solver["energy_drift"] < found[0].solver["energy_drift"] < 1e-2
 
 
-@pytest.mark.ordinary("keys0", "keys1", "keys4")
+@pytest.mark.ordinary("keys1", "keys4")
 @pytest.mark.parametrize(
     "keys",
     [

@@ -104,7 +104,7 @@ def test_restitution(zeta):
     assert restitutions[-1] < 0.5 * share**2 and slope(restitutions, safeties) > 1.8
 
 
-@pytest.mark.ordinary("0.1-Cvode", "2.0-Ida")
+@pytest.mark.ordinary("0.1-Cvode")
 @pytest.mark.parametrize("method", [Cvode, Ida])
 @pytest.mark.parametrize("zeta", [0.1, 0.5, 2.0])
 def test_restitution_by_implicit_steps(method, zeta):

@@ -78,6 +78,7 @@ def test_ten_cycles_of_a_line_by_hand(law):
     assert [finding.code for finding in rest.findings] == ["monotone-loading", "not-proven"]  # it turns back
 
 
+@pytest.mark.ordinary("CentralDifference", "Ida")
 @pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
 def test_a_brake_stops_a_mass(method):
     """A line that pays out at constant force: the way is m v²/2F, and the elastic stretch; the rest is lost."""

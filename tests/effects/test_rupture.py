@@ -124,6 +124,7 @@ def test_order_across_a_break(order, counts):
         assert abs(slope - order) < 0.35  # of few steps, of which the last before the break is of any length
 
 
+@pytest.mark.ordinary("central-difference", "cvode")
 @pytest.mark.parametrize("method", METHODS)
 def test_cascade_of_three_lines(method):
     """Lines side by side of other lengths and strengths: one after another is taut and breaks; in closed form."""

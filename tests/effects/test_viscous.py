@@ -66,6 +66,7 @@ def vibration(e, rate, t):
     return scipy.linalg.expm(np.array(columns).T * t) @ np.array([e, rate, *z])
 
 
+@pytest.mark.ordinary("CentralDifference", "Cvode")
 @pytest.mark.parametrize("method", [CentralDifference, Cvode, Ida])
 def test_relaxation(method):
     """Held at a strain from the start: each arm fades as exp(−t/τ), and what it stored is dissipated."""

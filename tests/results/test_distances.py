@@ -63,6 +63,7 @@ def test_mouth_that_is_not_plane():
     np.testing.assert_allclose(found["mouth_perimeter"], 2.0 * np.sqrt(4.25) + 2.0 * np.sqrt(1.25), rtol=1e-15)
 
 
+@pytest.mark.ordinary("central-difference", "ida")
 @pytest.mark.parametrize("method", ["central-difference", "cvode", "ida"])
 def test_closing_mouth(method):
     """Corners that move inwards in a straight line, past slack lines: sides shrink with time, the area with its square;

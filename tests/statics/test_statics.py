@@ -113,7 +113,7 @@ def test_paper_webs_compared(smoothing, step):
     assert found["hexagon"].tension.max() < found["square"].tension.max() < found["triangle"].tension.max()
 
 
-@pytest.mark.ordinary("triangle", "square")
+@pytest.mark.ordinary("triangle")
 @pytest.mark.parametrize("mesh", MESHES)
 def test_smoothing_converges_to_tension_only_at_first_order(mesh):
     """|deflection(η) − deflection(0)| ~ η, of order 1 without a logarithm.

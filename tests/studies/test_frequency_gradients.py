@@ -180,6 +180,7 @@ def test_a_mass_on_crossing_strings():
         assert change == pytest.approx(1e-4 * step * side, rel=2e-3)  # by a step of 1e-3 of a root
 
 
+@pytest.mark.ordinary("12.0")
 @pytest.mark.parametrize("speed", [0.0, 3.0, 12.0])
 def test_a_mass_on_crossing_strings_that_turn(speed):
     """Seen from axes that turn, frequencies are √(k/m) ± Ω; at 12 rad/s Coriolis forces alone hold the mass.
