@@ -16,7 +16,7 @@ def on_count(summary):
     """Number of cases, and their status."""
     words = {"lost": "lost with their workers", "waiting": "not run yet"}
     text = ", ".join(f"{number} {words.get(status, status)}" for status, number in summary["count"].items())
-    return f"{summary['cases']} cases: {text}"
+    return f"{summary['cases']} case{'s' * (summary['cases'] != 1)}: {text}"
 
 
 def on_design(study):
@@ -35,7 +35,7 @@ def _varied(values):
     if "distribution" in values:
         keys = ", ".join(f"{key} = {value:g}" for key, value in values.items() if key != "distribution")
         return f"{values['distribution']}{', ' * bool(keys)}{keys}"
-    return f"{values['from']:g} … {values['to']:g}"
+    return f"{values['from']:g}" if values.get("count") == 1 else f"{values['from']:g} … {values['to']:g}"
 
 
 def of_group(of):
@@ -88,7 +88,7 @@ def rows_of_conditions(entry):
         chance = "not known" if share is None else f"{100.0 * share:.4g} %"
         lower, upper = of_condition.get("lower"), of_condition.get("upper")
         if lower is not None and lower != upper:
-            chance += f", from {100.0 * lower:.4g} to {100.0 * upper:.4g} %"
+            chance = f"{100.0 * lower:.4g} to {100.0 * upper:.4g} %, {chance} by values without ±"
         between = of_condition.get("interval")
         text = f"{100.0 * between[0]:.3g} … {100.0 * between[1]:.3g} %" if between else ""
         kinds = ("undecided", "failed", "unproven", "statistical")

@@ -138,7 +138,7 @@ class Sweep:
 
     def __repr__(self) -> str:
         text = ", ".join(f"{number} {status}" for status, number in self.count.items())
-        return f'<Sweep of "{self.title}": {len(self.cases)} cases, {text or "none run"}>'
+        return f'<Sweep of "{self.title}": {len(self.cases)} case{"s" * (len(self.cases) != 1)}, {text or "none run"}>'
 
 
 def row_of(study: Study, case: Any, known: dict[str, dict[str, Any]]) -> dict[str, Any]:

@@ -101,7 +101,7 @@ def rest():
     return refweb.run(hanging({"kind": "static"}))
 
 
-@pytest.mark.ordinary("cvode", "central-difference")
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_damped_comes_to_rest_where_statics_has_it(method, rest):
     """Three methods that know nothing of statics; the event ends the run when its energy has stayed below the share."""

@@ -324,7 +324,7 @@ STOPPED = [refweb.Event(name="down", kind="threshold", observe="x", value=-0.5 /
 DOWN = (np.pi + np.arcsin(0.5)) / RATE
 
 
-@pytest.mark.ordinary("central-difference", "ida")
+@pytest.mark.ordinary("central-difference")
 @pytest.mark.parametrize("solve", ROUGH, ids=NAMES)
 def test_a_run_stops_at_its_event(solve, tmp_path):
     """Last row, last frame, checkpoint and results are those of its time; what would have come later has not."""

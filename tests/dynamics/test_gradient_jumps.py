@@ -84,7 +84,7 @@ def test_a_damped_line_that_snaps_taut(start):
         assert solution.gradient("x", path).error[0] < 0.3 * abs(exact[key]["x"]), path
 
 
-@pytest.mark.ordinary("table")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "cable",
     [
@@ -252,7 +252,7 @@ JUST_TAUT = {
 }
 
 
-@pytest.mark.ordinary("pulled")
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", JUST_TAUT.values(), ids=JUST_TAUT)
 def test_a_line_that_is_just_taut_from_a_corner_on(effect):
     """A shorter line pulls the mass before the corner, and a longer one never does: refused; EA changes no time."""
@@ -266,6 +266,7 @@ def test_a_line_that_is_just_taut_from_a_corner_on(effect):
     assert abs(float(gradient)) <= gradient.error[0] < 1e-3 / MODULUS
 
 
+@pytest.mark.slow
 def test_a_line_that_snaps_taut_at_a_corner():
     """Its end is pulled on at half the speed: beside its end, which moves on evenly, the mass is on a dashpot."""
     effect = refweb.Motion(node=[0], displacement=[*PULLED, (0.15, -0.2, 0.0, 0.0)])

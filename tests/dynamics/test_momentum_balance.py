@@ -239,6 +239,7 @@ class Couple(refweb.Velocity):
         return ForceTerm("couple", cells, np.array([[0.1]]), couple, balance)
 
 
+@pytest.mark.ordinary("central-difference", "explicit-*", "adams", "bdf")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_kernel_that_gives_too_much(method, monkeypatch):
     """Weight times 1.01: the energy of the book is that of m g, and the work of a short fall is too little to tell."""
@@ -281,6 +282,7 @@ def test_a_run_is_repeated_as_long_as_it_pays(monkeypatch):
 # What is left
 
 
+@pytest.mark.ordinary("adams", "ida")
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_tolerances_and_what_is_allowed(method):
     """What is left falls with rtol, and is a tenth of what is allowed at most."""

@@ -64,7 +64,7 @@ def worst(phases, **solve):
     return max(shares), max(errors)
 
 
-@pytest.mark.ordinary("central-difference-phases0", "order 6-phases2", "ida-phases5")
+@pytest.mark.ordinary("central-difference-phases0", "order 6-phases2")
 @pytest.mark.parametrize(
     "name, phases", [(name, PHASES[:: 5 if name in ("bdf", "adams", "ida") else 1]) for name in METHODS]
 )

@@ -360,6 +360,7 @@ CAUGHT, THROWN = [[-0.8, 0.0, 0.19], [0.8, 0.05, 0.21]], [0.3, 0.2, 3.0]
 CAUGHT_LENGTH, SOFT = 1.62, 200.0
 
 
+@pytest.mark.ordinary("central-difference", "order *", "adams", "ida")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_ball_is_caught(caught, method):
     """All methods meet the program within ±, and keep energy, momentum and angular momentum."""

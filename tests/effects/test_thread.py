@@ -306,6 +306,7 @@ def thrown():
     return swing.y[:6, -1].reshape(2, 3)
 
 
+@pytest.mark.ordinary("central-difference", "order *", "adams", "ida")
 @pytest.mark.parametrize("method", METHODS)
 def test_methods_agree(thrown, method):
     """All methods meet an independent integration within ±."""

@@ -315,6 +315,7 @@ def kinds(seeds, **sizes):
     return Counter(found.values())
 
 
+@pytest.mark.slow
 def test_random_nets():
     """The word is right in all that are found."""
     found = kinds(range(40))

@@ -258,6 +258,7 @@ def test_taylor_of_effects(name):
         check_slopes(remainders(net(effects=(LOAD, *effects)), other))
 
 
+@pytest.mark.slow
 def test_bodies():
     """A platform on ropes: by its mass and place, by moduli of ropes as numbers of the scene and of each line."""
     scene = refweb.Scene.load("platform-on-ropes")

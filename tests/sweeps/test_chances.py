@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import beta, binom, norm
 
 import refweb
-from refweb.results.study_text import rows_of_conditions, rows_of_spread
+from refweb.results.study_text import on_design, rows_of_conditions, rows_of_spread
 from refweb.sweeps.chances import chances, clopper_pearson
 from refweb.sweeps.design import groups, points
 from refweb.sweeps.study import Study
@@ -209,7 +209,19 @@ def test_undecided_cases_count_either_way_in_lower_and_upper_shares():
     assert chance["lower"] == pytest.approx(3 / 9) and chance["upper"] == pytest.approx(6 / 9)
     assert chance["lower"] <= chance["share"] <= chance["upper"] and chance["share"] == pytest.approx(4 / 9)
     (row,) = rows_of_conditions(entry).rows
-    assert row[1] == "44.44 %, from 33.33 to 66.67 %" and "3 undecided" in row[4]
+    assert row[1] == "33.33 to 66.67 %, 44.44 % by values without ±" and "3 undecided" in row[4]
+
+
+def test_one_case_that_is_undecided_holds_in_anything_from_none_to_all():
+    study = Study(scene="s", parameters={"x": [0.4]}, conditions={"low": "y < 0.5"})
+    (entry,) = told(study, lambda v: v["x"], 0.15)
+    (row,) = rows_of_conditions(entry).rows
+    assert row[1] == "0 to 100 %, 100 % by values without ±"
+
+
+def test_a_range_of_one_value_is_that_value():
+    wide, one = ({"sample": "grid", "parameters": {"x": {"from": 0.1, "to": 0.3, "count": n}}} for n in (2, 1))
+    assert on_design(wide)[0] == "x (0.1 … 0.3)" and on_design(one)[0] == "x (0.1)"
 
 
 def test_arithmetic_of_results_is_undecided_within_what_their_errors_make_of_it():
