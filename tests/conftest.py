@@ -42,8 +42,9 @@ MANY = 5000
 def pytest_collection_modifyitems(items):
     """Mark as slow the variants of a test that ``@pytest.mark.ordinary(...)`` does not name, by their ids or patterns.
 
-    The ordinary run keeps each value of each parameter in one variant at least, and one of two that are alike, as CVODE
-    and IDA or meshes of one size; the slow one has all the others.
+    Of values that are alike, as CVODE and IDA or three meshes, the ordinary run may keep one alone; of others it has
+    each in one variant at least. The slow run has what is left. Bugs of ``tests/mutants.py`` are looked for by ordinary
+    tests: try those of a file before one of its tests is marked as slow.
     """
     unused = {}
     for item in items:

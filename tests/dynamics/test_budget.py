@@ -79,7 +79,6 @@ def test_a_run_is_not_begun_that_costs_too_much(plain, steps):
     assert spent == first + second and same(further, finer) and len(words(further)) == 1
 
 
-@pytest.mark.slow
 def test_the_budget_where_none_is_given(plain, steps, monkeypatch):
     """It is 20 times the first run, or a time that is larger: here a hundred steps, and then a million."""
     first, _ = plain[0]

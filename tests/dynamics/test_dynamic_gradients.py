@@ -85,7 +85,13 @@ CASES = [  # law, effects, paths
 ]
 
 
-@pytest.mark.ordinary("tension-only-cable.modulus", "linear-motion.0.displacement.1.3", "linear-reel.0.factor.1.1")
+@pytest.mark.ordinary(
+    "tension-only-cable.modulus",
+    "table-load.0.force.2",
+    "tension-only-drag.normal",
+    "linear-motion.0.displacement.1.3",
+    "linear-reel.0.factor.1.1",
+)
 @pytest.mark.parametrize(("law", "effects", "paths"), CASES, ids=[f"{law}-{paths[0]}" for law, _, paths in CASES])
 def test_taylor_remainders(law, effects, paths):
     """|J(p + h) − J(p) − h dJ/dp| falls as h² of each result: the slope is 2 unless rounding is left."""
@@ -507,7 +513,6 @@ def test_sizes_that_are_0():
         assert float(gradient) == gradient.error[0] == 0.0
 
 
-@pytest.mark.slow
 def test_where_two_lines_change_places():
     """The largest tension of the looser of two lines is where both are equal, whose time changes with the number.
 
@@ -560,7 +565,6 @@ def test_sizes_that_pass_0():
     assert float(gradient) == pytest.approx(exact, rel=0.15) and gradient.left[0] == pytest.approx(-float(gradient))
 
 
-@pytest.mark.slow
 def test_a_motion_that_stays_at_a_kink():
     """Lines at rest without strain, and a ball that just touches: a push and a pull move them otherwise, with no sign.
 
@@ -584,7 +588,6 @@ def test_a_motion_that_stays_at_a_kink():
         solution.gradient("place", "body.0.velocity.2")
 
 
-@pytest.mark.slow
 def test_run_and_step_refinement_of_different_peaks():
     """Peaks of two equal lines, of which the run takes one and its step refinement another: sides by differences."""
     scene, step = between_two_lines((0.0, 0.0, 0.3), duration=2.2), 1e-8

@@ -84,7 +84,7 @@ def test_a_damped_line_that_snaps_taut(start):
         assert solution.gradient("x", path).error[0] < 0.3 * abs(exact[key]["x"]), path
 
 
-@pytest.mark.slow
+@pytest.mark.ordinary("table")
 @pytest.mark.parametrize(
     "cable",
     [
@@ -115,7 +115,6 @@ def test_a_passage_that_steps_resolve():
     assert float(gradient) == pytest.approx(wanted, rel=1e-6)
 
 
-@pytest.mark.slow
 def test_a_snap_at_a_history_row():
     """Tension and its derivative are those of either side in run and refinement there: other rows are named."""
     scene = flight(2e-4)
@@ -148,7 +147,6 @@ def soft_snap(speed, time, start, gravity=5.0, end=0.03):
     return {"x": 1.0 + u + v * left - 0.5 * gravity * left**2, "v": v - gravity * left}
 
 
-@pytest.mark.ordinary("1.27")
 @pytest.mark.parametrize("phase", [1.27, 1.6, 1.88])
 def test_run_and_refinement_that_agree_by_chance(phase):
     """A soft snap lies alike in the steps of both runs; ± is what a snap a step later changes, and so is sound."""
@@ -252,7 +250,7 @@ JUST_TAUT = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.ordinary("pulled")
 @pytest.mark.parametrize("effect", JUST_TAUT.values(), ids=JUST_TAUT)
 def test_a_line_that_is_just_taut_from_a_corner_on(effect):
     """A shorter line pulls the mass before the corner, and a longer one never does: refused; EA changes no time."""
@@ -266,7 +264,6 @@ def test_a_line_that_is_just_taut_from_a_corner_on(effect):
     assert abs(float(gradient)) <= gradient.error[0] < 1e-3 / MODULUS
 
 
-@pytest.mark.slow
 def test_a_line_that_snaps_taut_at_a_corner():
     """Its end is pulled on at half the speed: beside its end, which moves on evenly, the mass is on a dashpot."""
     effect = refweb.Motion(node=[0], displacement=[*PULLED, (0.15, -0.2, 0.0, 0.0)])
@@ -336,7 +333,6 @@ CORNERS = {
 }
 
 
-@pytest.mark.ordinary("before it", "behind it")
 @pytest.mark.parametrize(("rows", "duration", "keys"), CORNERS.values(), ids=CORNERS)
 def test_corners_of_prescribed_motion(rows, duration, keys):
     """Results and derivatives are of the same side of a corner: a bar is linear in what its end is moved by.

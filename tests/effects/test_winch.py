@@ -247,7 +247,6 @@ def test_a_load_that_no_winch_carries(winch):
         refweb.run(given)
 
 
-@pytest.mark.slow
 def test_a_load_that_a_winch_pulls_in():
     """A weight below the tension of a winch has no equilibrium but at the drum."""
     given = scene(
@@ -338,7 +337,6 @@ def test_power(method):
     closed(history, 1e-4)
 
 
-@pytest.mark.ordinary("central-difference-*")
 @pytest.mark.parametrize(
     "method, end", [("central-difference", "first"), ("central-difference", "last"), ("adams", "last")]
 )

@@ -147,7 +147,6 @@ def test_a_needle_turns_as_a_symmetric_top():
     )
 
 
-@pytest.mark.ordinary("[0-2]")
 @pytest.mark.parametrize("seed", range(6))
 def test_no_point_is_faster_than_its_bound(seed):
     """All corners of a box of any inertia and axes, on its way, against the bound of the start; and within 4 of it."""

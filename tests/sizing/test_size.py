@@ -182,7 +182,7 @@ CHAIN = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.ordinary("1e-05")
 @pytest.mark.parametrize("start", [1e-5, 3e-5])
 def test_where_two_lines_share_the_largest_stress(start, tmp_path):
     """A chain of two lines with a load at each node is least where both have the stress of the limit.

@@ -25,7 +25,6 @@ def others(solution):
 # Webs of bars that buckle
 
 
-@pytest.mark.ordinary("0.05-steps1")
 @pytest.mark.parametrize("inward, steps", [(0.055, (1.0,)), (0.05, (0.0, 0.25)), (0.03, (0.0, 0.2))])
 def test_buckled_bars_do_not_rest_at_a_saddle(inward, steps):
     """Bars whose boundary moves in pass saddles of the energy, where the convex part of the tangent finds no way down.
@@ -315,7 +314,6 @@ def kinds(seeds, **sizes):
     return Counter(found.values())
 
 
-@pytest.mark.slow
 def test_random_nets():
     """The word is right in all that are found."""
     found = kinds(range(40))

@@ -16,7 +16,7 @@ def true_strain(one, other, natural):
         return float((mpmath.sqrt(sum(d * d for d in apart)) - natural) / natural)
 
 
-@pytest.mark.ordinary("1e-14-tension-only", "0.0001-tension-only")
+@pytest.mark.ordinary("1e-14-tension-only", "1e-10-tension-only", "0.0001-tension-only")
 @pytest.mark.parametrize("law", ["tension-only", "linear"])
 @pytest.mark.parametrize("strain", [1e-14, 1e-10, 1e-4])
 def test_their_error_is_that_of_rounding(strain, law):

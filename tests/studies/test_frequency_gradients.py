@@ -180,7 +180,6 @@ def test_a_mass_on_crossing_strings():
         assert change == pytest.approx(1e-4 * step * side, rel=2e-3)  # by a step of 1e-3 of a root
 
 
-@pytest.mark.ordinary("12.0")
 @pytest.mark.parametrize("speed", [0.0, 3.0, 12.0])
 def test_a_mass_on_crossing_strings_that_turn(speed):
     """Seen from axes that turn, frequencies are √(k/m) ± Ω; at 12 rad/s Coriolis forces alone hold the mass.
@@ -258,7 +257,6 @@ def test_taylor_of_effects(name):
         check_slopes(remainders(net(effects=(LOAD, *effects)), other))
 
 
-@pytest.mark.slow
 def test_bodies():
     """A platform on ropes: by its mass and place, by moduli of ropes as numbers of the scene and of each line."""
     scene = refweb.Scene.load("platform-on-ropes")
