@@ -213,7 +213,6 @@ def test_a_ball_that_falls_on_one_spring():
         assert gradient.error[0] < 0.05 * abs(exact)
 
 
-@pytest.mark.slow
 def test_a_stiffness_that_refweb_chose():
     """It goes as the energy of the ball, m v²/2, and does not know the tension of the line: a note says so.
 

@@ -169,7 +169,6 @@ def test_run_and_refinement_that_agree_by_chance(phase):
             assert abs(float(gradient) - exact) <= gradient.error[0] < 0.1 * abs(exact), (name, key)
 
 
-@pytest.mark.slow
 def test_the_largest_tension_is_that_of_the_snap():
     """With much damping it is EA/L τ v at the instant at which the line is taut, v² = v0² + 2 F (L − x0)/m."""
     load, numbers = refweb.Load(node=[1], force=(3.0, 0.0, 0.0)), TAUT | dict(time=0.08, force=3.0)

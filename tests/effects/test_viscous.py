@@ -291,7 +291,6 @@ SOFT = ((0.004, 0.0), (0.01, 2e3), (0.03, 2e4), (0.1, 4e4))
 """Strain and stress [Pa] of a measured rope that is slack at first."""
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("key", ["stress", "tension"])
 def test_short_arms_beside_a_curve(key):
     """They bear what lines of their moduli bear that stand beside those of the curve; a run starts from there."""
