@@ -27,8 +27,8 @@ THRESHOLDS = (50_000, 20, 100)
 """When Python looks for unreachable objects, see `gc.set_threshold`: imports make 100 000 that stay."""
 
 
-def parser():
-    """The `argparse.ArgumentParser` of all verbs."""
+def parser(names):
+    """The `argparse.ArgumentParser` of the verbs of these names."""
     top = argparse.ArgumentParser(
         prog="refweb",
         description="Equilibrium and dynamics of space webs: cable nets, often slack, flat and tensionless.",
@@ -37,8 +37,8 @@ def parser():
         "--version", action="store_true", help="show the versions of refweb and of what it stands on, and exit"
     )
     verbs = top.add_subparsers(dest="command", metavar="COMMAND", title="commands")
-    for name, reference in COMMANDS.items():
-        verb = load(reference)
+    for name in names:
+        verb = load(COMMANDS[name])
         text = (verb.__doc__ or "").strip().replace("``", "").replace("%", "%%")
         form = argparse.RawDescriptionHelpFormatter
         verb.add_arguments(verbs.add_parser(name, help=_help(verb), description=text, formatter_class=form))
@@ -65,7 +65,7 @@ def main(arguments=None):
         return 2
     for message in load_installed("verb") if name is None and "--version" not in given else ():
         print(f"refweb: {message}", file=sys.stderr)
-    top = parser()
+    top = parser([name] if name in COMMANDS else COMMANDS)
     if not exists:
         top.error(f"{short(name)}: there is no such command, {nearest(name, possible(COMMANDS))}")
     arguments = top.parse_args(given)

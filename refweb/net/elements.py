@@ -14,6 +14,8 @@ files import; `lumped_shares`, which `effects.reel`, `discretisation` and `stati
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 
@@ -37,10 +39,14 @@ def line_element(order):
     return CURVED[order]()
 
 
+@functools.cache
 def gauss(points):
-    """Gauss–Legendre quadrature on [0, 1]: points, shape (1, points), and weights of sum 1."""
+    """Gauss–Legendre quadrature on [0, 1]: points, shape (1, points), and weights of sum 1, both read-only."""
     places, weights = np.polynomial.legendre.leggauss(points)
-    return 0.5 * (places[None] + 1.0), 0.5 * weights
+    places, weights = 0.5 * (places[None] + 1.0), 0.5 * weights
+    places.setflags(write=False)
+    weights.setflags(write=False)
+    return places, weights
 
 
 def lumped_shares(element):

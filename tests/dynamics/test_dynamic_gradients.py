@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import refweb
 from refweb.__main__ import main
+from refweb.dynamics.integrators.tangent import mean_decay
 from refweb.errors import InputError
 from refweb.reference.paths import with_value
 
@@ -743,3 +745,13 @@ def test_errors_cover():
                 inside += abs(float(first) - float(last)) <= first.error[0]
                 count += 1
     assert count > 300 and inside >= 0.97 * count
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-2, 1.0, 40.0])
+def test_mean_decay_of_a_matrix(size):
+    """φ(Z) = Z⁻¹ (1 − e⁻ᶻ) by scipy's exponential, and by its series where Z is too small for that."""
+    Z = np.random.default_rng(0).standard_normal((5, 5))
+    Z = size * (Z @ Z.T + Z - Z.T) / np.linalg.norm(Z @ Z.T)
+    expected = np.linalg.solve(Z, np.eye(5) - expm(-Z)) if size > 1e-6 else np.eye(5) - 0.5 * Z
+    # Z⁻¹ magnifies the rounding of 1 − e⁻ᶻ by the condition of Z.
+    np.testing.assert_allclose(mean_decay(Z), expected, rtol=0, atol=1e-14 * np.linalg.cond(Z))

@@ -379,6 +379,22 @@ def test_a_pendulum_at_rest_hangs_below_its_axle():
     assert found["held"].value == pytest.approx(3.0 * G, rel=1e-12)
 
 
+def test_a_step_of_newton_moves_no_point_of_a_body_by_more_than_half_its_thickness():
+    """The farthest point of a rod on an axle is its arm and its extent away; only contact limits how far it moves."""
+    touching = {"web": WEB, "cable": SOFT, "body": [ROD], "contact": {"stiffness": 1e3}, "solve": {"kind": "static"}}
+    touching["gravity"] = {"acceleration": [0.0, 0.0, -G]}
+    system = refweb.Scene.from_dict(touching).build()
+    (rod,), step = system.net.bodies, np.zeros((system.rows, 3))
+    step[rod.spin] = (0.0, 1.5, 0.0)
+    share = system.largest_share(step.ravel()[system.free])
+    assert share * 1.5 * (ARM + rod.extent) == pytest.approx(0.5 * rod.thickness, rel=1e-12)
+    assert rod.extent == pytest.approx(0.5 * np.hypot(0.1, np.hypot(0.2, 0.6)), rel=0.1)  # of a box with round edges
+    free = refweb.Scene.from_dict({key: table for key, table in touching.items() if key != "contact"}).build()
+    alone = np.zeros((free.rows, 3))
+    alone[free.net.bodies[0].spin] = (0.0, 0.01, 0.0)
+    assert free.largest_share(alone.ravel()[free.free]) == 1.0
+
+
 @pytest.mark.slow
 def test_a_flap_that_falls_onto_a_rope():
     """It rests there, and does not step over the rope to hang; the other rest is told of.

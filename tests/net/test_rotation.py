@@ -1,5 +1,7 @@
 """Free bodies that turn, against closed forms; volumes and moments of inertia of solids."""
 
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
-from refweb.net.rigid_body import Grown, RigidBody, matrix_of
+from refweb.net.rigid_body import Axle, Grown, RigidBody, matrix_of
 from refweb.net.rotation import (
     RigidRotations,
     advance_rotation,
@@ -27,10 +29,12 @@ ROTORS = [((1.0, 2.0, 3.0), (0.3, 0.2, 2.0), 3.14488764157), ((1.0, 2.0, 3.0), (
 class Rotor:
     """One body alone: its rows, and what turns it."""
 
-    def __init__(self, moments_, omega, axes=None):
+    def __init__(self, moments_, omega, axes=None, axle=None):
         axes = np.eye(3) if axes is None else axes
         tensor = np.array(moments_) * np.eye(3) if np.ndim(moments_) == 1 else np.array(moments_)
         body = RigidBody("it", 0, Box(size=(0.1, 0.2, 0.3)), (0, 0, 0), False, axes, tensor, omega, True, 1, 2)
+        if axle is not None:
+            body = replace(body, axle=Axle(np.zeros(3), np.array(axle)))
         self.body, self.turns = body, RigidRotations.of(type("Net", (), {"bodies": (body,)}))
         self.x, self.v = np.zeros((2, 3, 3))
         self.v[1] = body.start_spin
@@ -168,6 +172,20 @@ def test_no_point_is_faster_than_its_bound(seed):
     axes = rotor.body.axes @ rotor.body.rotation(rotor.x).T
     rate = np.linalg.norm(np.cross(np.linalg.solve(tensor, axes @ moment), corners), axis=1).max()
     assert rate <= pushes(0, rotor.x, f, rotor.turns)[1] / rotor.body.moment * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_bounds_of_moments_about_principal_axes(axis):
+    """A moment about a principal axis: |m| over its inertia, times the distance of the corners; none across an axle."""
+    size, tensor, moment = np.array([0.1, 0.2, 0.3]), (1.0, 2.0, 3.0), -0.7
+    free, held = Rotor(tensor, (0.0, 0.0, 0.0)), Rotor(tensor, (0.0, 0.0, 0.0), axle=(0.0, 0.0, 1.0))
+    f = np.zeros((3, 3))
+    f[1, axis] = moment
+    corners = 0.5 * np.linalg.norm(np.delete(size, axis))
+    expected = abs(moment) / tensor[axis] * corners
+    assert pushes(0, free.x, f, free.turns)[1] / free.body.moment == pytest.approx(expected, rel=1e-12)
+    bound = pushes(0, held.x, f, held.turns)[1] / held.body.moment
+    assert bound == pytest.approx(expected if axis == 2 else 0.0, rel=1e-12, abs=1e-15)
 
 
 def test_quaternions_of_matrices():

@@ -18,6 +18,7 @@ from refweb.errors import InputError
 from refweb.registry import OBSERVABLES
 from refweb.results.probes import PLACE
 from refweb.results.state import State
+from refweb.statics.equilibrium import Equilibrium
 from refweb.system.system import System
 
 BODIES = (
@@ -115,6 +116,23 @@ def test_both_faces_agree(name):
             assert value[1] == where, observe
 
 
+def test_angular_momentum_of_a_body_in_a_state():
+    """I ω about each principal axis, by the sum over rows and by the kernel."""
+    box = refweb.Body(
+        name="box", shape="box", size=(0.2, 0.3, 0.4), mass=3.0, position=(2.0, 0.0, 1.0), inertia=(0.11, 0.13, 0.17),
+        angular_velocity=(5.0, -7.0, 11.0),
+    )  # fmt: skip
+    system = System(skew_net("linear"), [Elasticity(), box], np.zeros((6, 3), dtype=bool))
+    (body,), (x, v) = system.net.bodies, np.zeros((2, system.rows, 3))
+    v[body.spin] = body.start_spin
+    state = State(system, 0.0, x, v)
+    for axis, expected in zip("xyz", (0.11 * 5.0, -0.13 * 7.0, 0.17 * 11.0), strict=True):
+        observe = refweb.Observe(name="_", quantity="angular_momentum", body="box", component=axis)
+        observe.on(system)
+        assert observe.value(state)[0] == pytest.approx(expected, rel=1e-14)
+        assert probed(observe, state)[0] == pytest.approx(expected, rel=1e-14)
+
+
 UNKNOWN = (
     "kinetic_energy",
     "dissipated_energy",
@@ -159,3 +177,15 @@ def test_what_an_entry_says(name):
         given = WHERE[key][-1]
         with pytest.raises(InputError, match=f'{key} = .* has no meaning for quantity = "{name}"'):
             refweb.Observe(name="_", quantity=name, **given)
+
+
+@pytest.mark.parametrize("sizes, expected", [((2.0, 0.0, 0.0), 2.0), ((0.0, 3.0, 1.0), 9.0), ((2.0, 1.0, 3.0), 11.0)])
+def test_error_adds_what_the_residual_and_rounding_may_change(sizes, expected):
+    """Deviations of a displacement: that by the residual once, the largest by rounding of forces three times."""
+    system = System(skew_net("linear"), [Elasticity()], np.zeros((6, 3), dtype=bool))
+    observe, unit = refweb.Observe(name="_", quantity="displacement", node=2, component="x"), np.zeros((6, 3))
+    unit[2, 0] = 1e-6
+    deviations = np.array([size * unit for size in sizes])
+    rest = Equilibrium(1.0, np.zeros((6, 3)), np.zeros(9), np.zeros((6, 3)), deviations=deviations)
+    error = observe.observable.error(State(system, 0.0, rest.x, rest.x), rest)
+    assert error == pytest.approx(expected * 1e-6, rel=1e-9)

@@ -4,9 +4,12 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from scipy.linalg import eigvals
 from scipy.optimize import brentq
+from scipy.sparse import csr_array
 
 import refweb
+from refweb.statics.slowest_vibrations import slowest
 from validation.hard_cases.stability import RandomNet, word_on
 from validation.paper.example_3 import scene as bars_moved_in
 
@@ -338,3 +341,25 @@ def test_random_nets_of_more_unknowns_than_are_all_asked():
 def test_many_random_nets_of_more_unknowns():
     found = kinds(range(300), sizes=(38, 44))
     assert found["grows"] >= 50 and found["stable"] >= 80 and found["undecided"] <= 90
+
+
+@pytest.mark.parametrize("count, sign", [(6, 1.0), (6, -1.0), (120, 1.0)])
+def test_slowest_vibrations_of_matrices(count, sign):
+    """Beside all s of (s² M + s C + K) φ = 0 by scipy: the least are found, and those that grow are named."""
+    rng = np.random.default_rng(count)
+    skew = 0.2 * rng.standard_normal((count, count))
+    K = np.diag(1.0 + np.arange(count)) + skew - skew.T
+    M, C = np.diag(rng.uniform(0.5, 2.0, count)), sign * np.diag(rng.uniform(0.1, 0.4, count))
+
+    class Solver:
+        def solve(self, b, transposed=False):
+            return np.linalg.solve(K.T if transposed else K, b)
+
+    found = slowest(Solver(), csr_array(M), csr_array(C))
+    zero, one = np.zeros((count, count)), np.eye(count)
+    every = eigvals(np.block([[zero, one], [-K, -C]]), np.block([[one, zero], [zero, M]]))
+    every = every[np.argsort(abs(every))][: len(found.s)]
+    for s, grows in zip(found.s, found.grows, strict=True):
+        nearest = every[np.argmin(abs(every - s))]
+        assert abs(s - nearest) < 1e-5 * abs(s) and grows == (nearest.real > 0.0)
+    assert found.more == (count == 120)

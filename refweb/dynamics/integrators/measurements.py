@@ -17,7 +17,7 @@ import bisect
 import numpy as np
 
 from ...effects.base import CONTACT
-from .averages import HALVINGS, PARTS, PAYS, SETTLED, average, look_for_means, open_share
+from .averages import HALVINGS, PAYS, SETTLED, average, look_for_means, open_share
 from .extremes import (
     EDGE,
     Extremes,
@@ -113,21 +113,26 @@ class Measurements:
         )
 
     def _average(self, course, piece, end):
-        """Slide windows through a piece of a step that ends with the sample ``end``, ahead of a jump."""
-        averages, todo = course.averages, [(piece.start.time, end.time, end, HALVINGS, np.inf)]
+        """Slide windows through a piece of a step that ends with the sample ``end``, ahead of a jump.
+
+        Each part is looked at in its quarters, of which the half and the end are known samples.
+        """
+        begin, until = piece.start.time, end.time
+        middle = piece.middle if end is piece.end else piece.at(0.5 * (begin + until))
+        averages, todo = course.averages, [(begin, until, middle, end, HALVINGS, np.inf)]
         rest = self._where, self.observed, averages
         while todo:
-            begin, until, last, halvings, before = todo.pop()
-            inside = [piece.at(begin + (until - begin) * part / PARTS) for part in range(1, PARTS)]
-            for part, sample in enumerate((*inside, last), 1):
+            begin, until, middle, last, halvings, before = todo.pop()
+            quarter = 0.25 * (until - begin)
+            first, third = piece.at(begin + quarter), piece.at(until - quarter)
+            for part, sample in enumerate((first, middle, third, last), 1):
                 look_for_means(part, *self._state(sample), *rest)
             left = np.array([open_share(w) for w in averages.within])
             pays = (left > SETTLED * np.abs(averages.within).max(axis=1)) & (left < PAYS * before)
             if halvings and pays.any():
-                middle = inside[PARTS // 2 - 1]
                 todo += [
-                    (middle.time, until, last, halvings - 1, left),
-                    (begin, middle.time, middle, halvings - 1, left),
+                    (middle.time, until, third, last, halvings - 1, left),
+                    (begin, middle.time, first, middle, halvings - 1, left),
                 ]
                 continue
             _, *state = self._state(last)

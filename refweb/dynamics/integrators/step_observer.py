@@ -15,6 +15,7 @@ of the step-refinement run: its cost and ± follow. Must stay: public names and 
 from __future__ import annotations
 
 import contextlib
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -256,7 +257,7 @@ class StepObserver(Integrator):
         force = rows.ravel()[self.system.free]
         if self.rotations:
             self.rotations.leave_along_axles(force)
-        if self._wrong is None and not np.isfinite(force.sum()):
+        if self._wrong is None and not math.isfinite(force.sum()):
             self._wrong = t, rows
         return force
 

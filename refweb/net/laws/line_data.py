@@ -8,6 +8,7 @@ over lines read; new columns behind them, as effects add theirs by name; `LineDa
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -87,9 +88,9 @@ class LineData(np.recarray):
                 lines = lines.with_column(name, values)
         return lines
 
-    @property
+    @cached_property
     def matrix(self) -> NDArray[np.float64]:
-        """The numbers as kernels read them, shape (elements, columns)."""
+        """The numbers as kernels read them, shape (elements, columns), in the same memory."""
         return np.asarray(self).view(float).reshape(len(self), -1)
 
     def column(self, name: str) -> int:
