@@ -127,7 +127,7 @@ def test_angular_momentum_of_a_body_in_a_state():
     v[body.spin] = body.start_spin
     state = State(system, 0.0, x, v)
     for axis, expected in zip("xyz", (0.11 * 5.0, -0.13 * 7.0, 0.17 * 11.0), strict=True):
-        observe = refweb.Observe(name="_", quantity="angular_momentum", body="box", component=axis)
+        observe = refweb.Observe(name="_", quantity="total_angular_momentum", body="box", component=axis)
         observe.on(system)
         assert observe.value(state)[0] == pytest.approx(expected, rel=1e-14)
         assert probed(observe, state)[0] == pytest.approx(expected, rel=1e-14)
