@@ -49,7 +49,7 @@ MIRRORS = {
     "net/laws/curve": "net/test_curves.py effects/test_viscous.py",
     "net/laws/law": "how_to/test_law.py",
     "net/law_keys": "net/test_curves.py how_to/test_law.py effects/test_viscous.py",
-    "net/rigid_body": "effects/test_contact.py test_contract.py effects/test_tumbling.py",
+    "net/rigid_body": "effects/test_contact.py test_contract.py effects/test_tumbling.py effects/test_axles.py",
     "net/rotation": "net/test_rotation.py effects/test_tumbling.py effects/test_axles.py",
     "effects/axle": "effects/test_axles.py",
     "effects/motion": "effects/test_moved_bodies.py",
@@ -644,7 +644,8 @@ MUTANTS = [
     Mutant("effects/contact/penalty", "shows.force[k] += push * g[k]", "shows.force[k] -= push * g[k]"),
     Mutant("effects/contact_solver", "shows.force[k] -= past", "shows.force[k] += past"),
     Mutant("results/observables/distances", "m = n - 1 if n > 0 else rows.size - 1", "m = n - 1 if n > 0 else 0"),
-    Mutant("results/observables/angular_momentum", "(moment * state.v[row] for", "(state.v[row] for"),
+    Mutant("results/observables/angular_momentum", "sum((body.spin_about_centre(state.x, state.v) for", "sum((0.0 for"),
+    Mutant("net/rigid_body", "self.axes.T @ self.inertia @ self.mobility @ self.axes", "self.moment * np.eye(3)"),
     Mutant("effects/orbit", "np.diag([3.0, 0.0, -1.0])", "np.diag([2.0, 0.0, -1.0])"),
     Mutant("effects/pressure", "d0 += couple * x[column, 0]", "d0 -= couple * x[column, 0]"),
     Mutant(

@@ -372,6 +372,16 @@ class RigidBody:
         return 0.5 * (tensor + tensor.T)
 
     @property
+    def spin_momentum(self) -> NDArray[np.float64]:
+        """The angular momentum about its centre over the velocity of its row of rotation, shape (3, 3) [kg m²].
+
+        This matrix is along x, y and z at the start and turns with a body on an axle; otherwise it is `moment` times 1.
+        """
+        if not self.axle:
+            return self.moment * np.eye(3)
+        return self.axes.T @ self.inertia @ self.mobility @ self.axes
+
+    @property
     def start_spin(self) -> tuple[float, float, float] | NDArray[np.float64]:
         """Velocity of its row of rotation at the start [rad/s], see `refweb.net.rotation`; a tuple or an ndarray."""
         if not self.tumbles or self.axle:
@@ -393,6 +403,13 @@ class RigidBody:
             return np.zeros(3) if self.spin is None else v[self.spin]
         axes = self.axes @ self.rotation(x).T
         return axes.T @ (self.mobility @ (axes @ v[self.spin]))
+
+    def spin_about_centre(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Its angular momentum about its centre of mass [N m s], arguments as of `turning`; 0 of one that is fixed."""
+        if self.spin is None:
+            return np.zeros(3)
+        turned = self.rotation(x) if self.axle else np.eye(3)
+        return turned @ (self.spin_momentum @ (turned.T @ v[self.spin]))
 
     def surface(
         self, centre: NDArray[np.float64] | Sequence[float], rotation: NDArray[np.float64] | None = None

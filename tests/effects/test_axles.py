@@ -145,6 +145,38 @@ def test_an_axle_bears_what_a_body_gives_across_it(method):
     assert found["moment"].value == pytest.approx(np.linalg.norm(exact), rel=2 * tolerance)
 
 
+@pytest.mark.parametrize("arm", [(0.0, 0.0, 0.0), (0.2, -0.2, 0.1)])
+def test_angular_momentum_about_a_skew_axle(arm):
+    """About its centre it is R I n ω, which is not along the axle; R turns by α t²/2 and ω is α t."""
+    n, arm, end = np.array([1.0, 2.0, 2.0]) / 3.0, np.array(arm), 0.9
+    axle = {"point": [0.0, 4.0, 0.0], "direction": n.tolist(), "torque": 0.7}
+    body = ROD | {"position": (arm + [0.0, 4.0, 0.0]).tolist(), "axle": axle}
+    looked = [
+        {"name": f"{quantity} {c}", "quantity": quantity, "body": "rod", "component": c}
+        for quantity in ("angular_momentum", "total_angular_momentum") for c in "xyz"
+    ]  # fmt: skip
+    solution = solved("order 4", *looked, body=[body], solve={"duration": end})
+    alpha = 0.7 / (n @ np.diag(INERTIA) @ n + MASS * (arm @ arm))
+    expected = Rotation.from_rotvec(0.5 * alpha * end**2 * n).apply(np.array(INERTIA) * n * alpha * end)
+    found = [solution.results[f"angular_momentum {c}"].value for c in "xyz"]
+    np.testing.assert_allclose(found, expected, rtol=1e-7)
+    if not arm.any():  # the centre rests, and the web as well, so that the sum has no other part
+        every = [solution.results[f"total_angular_momentum {c}"].value for c in "xyz"]
+        np.testing.assert_allclose(every, expected, rtol=1e-7)
+    state = solution.state
+    for name, value in zip((f"angular_momentum {c}" for c in "xyz"), expected, strict=True):
+        observe = next(o for o in solution.scene.observe if o.name == name)
+        assert observe.value(state)[0] == pytest.approx(value, rel=1e-7)
+
+
+def test_angular_momentum_of_a_moved_body_is_refused():
+    looked = {"name": "it", "quantity": "angular_momentum", "body": "rod"}
+    body = {key: value for key, value in ROD.items() if key not in ("mass", "inertia", "axle")}
+    motion = [{"body": "rod", "rotation": [[0, 0, 0, 0], [1, 0.3, 0.5, 0]]}]
+    with pytest.raises(refweb.errors.InputError, match='"rod" is turned by .* has no inertia'):
+        solved("order 4", looked, body=[body], motion=motion, solve={"duration": 0.1})
+
+
 def test_a_number_is_a_torque_that_stays():
     body = WHEEL | {"axle": {"direction": [1.0, 2.0, 2.0], "torque": 0.7}}
     found = solved("order 4", "axle_angle", body=[body], solve={"duration": 0.5}).results

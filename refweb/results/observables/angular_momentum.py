@@ -18,6 +18,7 @@ from ...messages import quote
 from ..probes import PROBE, Probe, component_of
 from .nodal import Nodal
 from .observable import Value
+from .rotation import turned_with
 
 if TYPE_CHECKING:
     from ...system.system import System
@@ -38,7 +39,7 @@ class TotalAngularMomentum(Nodal):
     dynamic = True
 
     def _parts(self, system):
-        """Masses and reference positions of rows (rows, 4), rows that count, and rows of rotation with moments."""
+        """Masses and reference positions of rows (rows, 4), rows that count, and the bodies that turn."""
         net, observe = system.net, self.observe
         refuse_flows(net, f"quantity = {quote(observe.quantity)}")
         linear = system.rows - net.spins
@@ -48,17 +49,16 @@ class TotalAngularMomentum(Nodal):
         counted = np.arange(linear) if every else self.rows(system)
         named = net.bodies if every else self.bodies(net)
         turning = [body for body in named if body.spin is not None and not body.prescribed]
-        moments = [(b.spin, b.moment_about_centre) for b in turning]
-        return np.column_stack([masses, net.points[:linear]]), counted, moments
+        return np.column_stack([masses, net.points[:linear]]), counted, turning
 
     def of(self, state: State) -> Value:
         """Value by sums over rows."""
-        numbers, counted, spins = self._parts(state.system)
+        numbers, counted, turning = self._parts(state.system)
         mass, linear = numbers[:, :1], len(numbers)
         position, speed = (all_of[:linear] - (mass * all_of[:linear]).sum(axis=0) / mass.sum() for all_of in (
             state.position, state.v))  # fmt: skip
         total = np.cross(position, mass * speed)[counted].sum(axis=0)
-        total += sum((moment * state.v[row] for row, moment in spins), np.zeros(3))
+        total += sum((body.spin_about_centre(state.x, state.v) for body in turning), np.zeros(3))
         return Value(float(self.sizes(total[None])[0]), None)
 
     def position(self, system: System, at: int) -> int | None:
@@ -67,16 +67,17 @@ class TotalAngularMomentum(Nodal):
 
     def probe(self, system: System) -> Probe:
         """Make the probe of x and v."""
-        numbers, counted, spins = self._parts(system)
-        moments = np.array([[moment, 0.0, 0.0, 0.0] for _, moment in spins]).reshape(-1, 4)
-        rows = [self.component, len(numbers), len(counted), *counted, *(row for row, _ in spins)]
-        return Probe(angular_momentum, rows, np.vstack([numbers, moments]))
+        numbers, counted, turning = self._parts(system)
+        spins = [row for body in turning for row in (body.spin, body.turn if body.axle else -1)]
+        matrices = [np.pad(body.spin_momentum, ((0, 0), (0, 1))) for body in turning]
+        rows = [self.component, len(numbers), len(counted), *counted, *spins]
+        return Probe(angular_momentum, rows, np.vstack([numbers, *matrices]))
 
 
 @kernel(PROBE)
 def angular_momentum(t, x, v, f, lines, rows, data, where):
-    """``rows`` is (component, linear rows, count, counted rows, rows of spin), data (mass, reference position) of all
-    linear rows, then (moment, 0, 0, 0) of rows of spin."""
+    """``rows`` is (component, linear rows, count, counted rows, two rows of rotation of each body), data (mass,
+    reference position) of all linear rows, then three rows of each body: its `RigidBody.spin_momentum`."""
     total, linear, count = 0.0, rows[1], rows[2]
     c, w, a = np.zeros(3), np.zeros(3), np.zeros(3)
     for r in range(linear):
@@ -90,7 +91,8 @@ def angular_momentum(t, x, v, f, lines, rows, data, where):
             i, j = (k + 1) % 3, (k + 2) % 3
             term = (data[r, 1 + i] + x[r, i] - c[i] / total) * (v[r, j] - w[j] / total)
             a[k] += data[r, 0] * (term - (data[r, 1 + j] + x[r, j] - c[j] / total) * (v[r, i] - w[i] / total))
-    for n in range(3 + count, rows.size):
+    for n in range((rows.size - 3 - count) // 2):
+        spin = turned_with(linear + 3 * n, rows[3 + count + 2 * n], rows[4 + count + 2 * n], x, v, data)
         for k in range(3):
-            a[k] += data[linear + n - 3 - count, 0] * v[rows[n], k]
+            a[k] += spin[k]
     return component_of(rows[0], a[0], a[1], a[2])

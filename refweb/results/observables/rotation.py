@@ -116,15 +116,24 @@ class AngularMomentum(Turning):
 
     unit = "N m s"
 
+    def on(self, system: System) -> None:
+        """Refuse a body that tables turn, whose inertia is not known."""
+        super().on(system)
+        body = self.body(system.net)
+        if body.moved and body.spin is not None:
+            raise InputError(
+                f'quantity = "angular_momentum": body = "{body.name}" is turned by [[motion]] and has no inertia: take '
+                '"angular_velocity" times its moment of inertia'
+            )
+
     def of(self, state: State) -> Value:
         """Value by the velocity of its row of rotation."""
-        body = self.body(state.system.net)
-        return self._sized(np.zeros(3) if body.spin is None else body.moment * state.v[body.spin])
+        return self._sized(self.body(state.system.net).spin_about_centre(state.x, state.v))
 
     def probe(self, system: System) -> Probe:
-        """Make the probe of v alone."""
-        body = self.body(system.net)
-        return Probe(angular_momentum, self.rows(system), np.array([[body.moment if body.spin is not None else 0.0]]))
+        """Make the probe of v, and on an axle of x."""
+        body, (component, spin, turn) = self.body(system.net), self.rows(system)
+        return Probe(angular_velocity, [component, spin, turn if body.axle else -1], body.spin_momentum)
 
 
 @kernel(PROBE)
@@ -151,27 +160,28 @@ def orientation(t, x, v, f, lines, rows, data, where):
     return (w * r + a * q - b * p + c * d) / size
 
 
+@kernel(leaf=True)
+def turned_with(first, s, q, x, v, data):
+    """R W Rᵀ v of a body with rows of rotation s and q; the rows of W begin at ``first`` in data. R is 1 if q < 0."""
+    w = v[s, 0], v[s, 1], v[s, 2]
+    matrix = (
+        (data[first, 0], data[first, 1], data[first, 2]),
+        (data[first + 1, 0], data[first + 1, 1], data[first + 1, 2]),
+        (data[first + 2, 0], data[first + 2, 1], data[first + 2, 2]),
+    )
+    if q < 0:
+        return times(matrix, w)
+    turned = matrix_at(x, s, q)
+    return times(turned, times(matrix, times_transposed(turned, w)))
+
+
 @kernel(PROBE)
 def angular_velocity(t, x, v, f, lines, rows, data, where):
-    """Kernel of R W Rᵀ v; ``rows`` is (component, rows of rotation), data W along the axes of space at the start."""
-    s = rows[1]
-    if s < 0:
+    """Kernel of R W Rᵀ v; ``rows`` is (component, rows of rotation), data W along the axes of space at the start.
+
+    Without the second row of rotation R is 1.
+    """
+    if rows[1] < 0:
         return 0.0
-    w = v[s, 0], v[s, 1], v[s, 2]
-    if rows[2] >= 0:
-        turned = matrix_at(x, s, rows[2])
-        p = times_transposed(turned, w)
-        mobility = (
-            (data[0, 0], data[0, 1], data[0, 2]),
-            (data[1, 0], data[1, 1], data[1, 2]),
-            (data[2, 0], data[2, 1], data[2, 2]),
-        )
-        w = times(turned, times(mobility, p))
+    w = turned_with(0, rows[1], rows[2], x, v, data)
     return component_of(rows[0], w[0], w[1], w[2])
-
-
-@kernel(PROBE)
-def angular_momentum(t, x, v, f, lines, rows, data, where):
-    """Kernel of data times v."""
-    s = rows[1]
-    return 0.0 if s < 0 else data[0, 0] * component_of(rows[0], v[s, 0], v[s, 1], v[s, 2])
