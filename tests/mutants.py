@@ -645,6 +645,7 @@ MUTANTS = [
     Mutant("effects/contact_solver", "shows.force[k] -= past", "shows.force[k] += past"),
     Mutant("results/observables/distances", "m = n - 1 if n > 0 else rows.size - 1", "m = n - 1 if n > 0 else 0"),
     Mutant("results/observables/angular_momentum", "sum((body.spin_about_centre(state.x, state.v) for", "sum((0.0 for"),
+    Mutant("results/observables/angular_momentum", "momentum += system.mass", "momentum -= system.mass"),
     Mutant("net/rigid_body", "self.axes.T @ self.inertia @ self.mobility @ self.axes", "self.moment * np.eye(3)"),
     Mutant("effects/orbit", "np.diag([3.0, 0.0, -1.0])", "np.diag([2.0, 0.0, -1.0])"),
     Mutant("effects/pressure", "d0 += couple * x[column, 0]", "d0 -= couple * x[column, 0]"),

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 class TotalAngularMomentum(Nodal):
     """Σ m (r − r_c) × (v − v_c) plus the spin of bodies; r_c and v_c are those of the centre of mass of all.
 
+    Consistent mass couples the nodes of an element in this sum.
     By default it is that of web and free bodies together. With ``node`` or ``body`` it is the part of these; ``node =
     "all"`` is the part of the web. Supported nodes count with their masses, at rest or moving, while fixed bodies do
     not count. The total is constant if no force acts from outside and there is no support. In ``[frame]`` and
@@ -57,7 +58,10 @@ class TotalAngularMomentum(Nodal):
         mass, linear = numbers[:, :1], len(numbers)
         position, speed = (all_of[:linear] - (mass * all_of[:linear]).sum(axis=0) / mass.sum() for all_of in (
             state.position, state.v))  # fmt: skip
-        total = np.cross(position, mass * speed)[counted].sum(axis=0)
+        momentum, system = mass * speed, state.system
+        if system.net.consistent_minus_lumped is not None:
+            momentum += system.mass.passed_on(np.pad(speed, ((0, system.net.spins), (0, 0))))[:linear]
+        total = np.cross(position, momentum)[counted].sum(axis=0)
         total += sum((body.spin_about_centre(state.x, state.v) for body in turning), np.zeros(3))
         return Value(float(self.sizes(total[None])[0]), None)
 
@@ -70,15 +74,28 @@ class TotalAngularMomentum(Nodal):
         numbers, counted, turning = self._parts(system)
         spins = [row for body in turning for row in (body.spin, body.turn if body.axle else -1)]
         matrices = [np.pad(body.spin_momentum, ((0, 0), (0, 1))) for body in turning]
-        rows = [self.component, len(numbers), len(counted), *counted, *spins]
-        return Probe(angular_momentum, rows, np.vstack([numbers, *matrices]))
+        cells, coupled, coupling = self._coupling(system.net, counted)
+        rows = [self.component, len(numbers), len(counted), len(turning), coupled, *counted, *spins, *cells]
+        return Probe(angular_momentum, rows, np.vstack([numbers, *matrices, coupling]))
+
+    def _coupling(self, net, counted):
+        """Rows of the elements one after another, how many each has, and consistent less lumped mass, rows of 4.
+
+        Rows of the mass of nodes that do not count are 0; all are empty where mass is lumped.
+        """
+        if net.consistent_minus_lumped is None:
+            return [], 0, np.zeros((0, 4))
+        coupled = net.cells.shape[1]
+        mass = np.where(np.isin(net.cells, counted)[:, :, None], net.consistent_minus_lumped, 0.0)
+        return net.cells.ravel(), coupled, np.pad(mass.reshape(-1, coupled), ((0, 0), (0, 4 - coupled)))
 
 
 @kernel(PROBE)
 def angular_momentum(t, x, v, f, lines, rows, data, where):
-    """``rows`` is (component, linear rows, count, counted rows, two rows of rotation of each body), data (mass,
-    reference position) of all linear rows, then three rows of each body: its `RigidBody.spin_momentum`."""
-    total, linear, count = 0.0, rows[1], rows[2]
+    """``rows`` is (component, linear rows, count, bodies, nodes of an element or 0, counted rows, two rows of rotation
+    of each body, nodes of elements), data (mass, reference position) of all linear rows, three rows of each body: its
+    `RigidBody.spin_momentum`, then consistent less lumped mass of the elements, a row for each of their nodes."""
+    total, linear, count, bodies, coupled = 0.0, rows[1], rows[2], rows[3], rows[4]
     c, w, a = np.zeros(3), np.zeros(3), np.zeros(3)
     for r in range(linear):
         total += data[r, 0]
@@ -86,13 +103,22 @@ def angular_momentum(t, x, v, f, lines, rows, data, where):
             c[k] += data[r, 0] * (data[r, 1 + k] + x[r, k])
             w[k] += data[r, 0] * v[r, k]
     for n in range(count):
-        r = rows[3 + n]
+        r = rows[5 + n]
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
             term = (data[r, 1 + i] + x[r, i] - c[i] / total) * (v[r, j] - w[j] / total)
             a[k] += data[r, 0] * (term - (data[r, 1 + j] + x[r, j] - c[j] / total) * (v[r, i] - w[i] / total))
-    for n in range((rows.size - 3 - count) // 2):
-        spin = turned_with(linear + 3 * n, rows[3 + count + 2 * n], rows[4 + count + 2 * n], x, v, data)
+    for n in range(bodies):
+        spin = turned_with(linear + 3 * n, rows[5 + count + 2 * n], rows[6 + count + 2 * n], x, v, data)
         for k in range(3):
             a[k] += spin[k]
+    first, at = 5 + count + 2 * bodies, linear + 3 * bodies
+    for n in range(rows.size - first):  # row n of the masses of elements, by columns to the nodes of the same element
+        r, begin = rows[first + n], first + n - n % coupled
+        for m in range(coupled):
+            s, mass = rows[begin + m], data[at + n, m]
+            for k in range(3):
+                i, j = (k + 1) % 3, (k + 2) % 3
+                term = (data[r, 1 + i] + x[r, i] - c[i] / total) * v[s, j]
+                a[k] += mass * (term - (data[r, 1 + j] + x[r, j] - c[j] / total) * v[s, i])
     return component_of(rows[0], a[0], a[1], a[2])
