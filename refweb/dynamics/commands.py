@@ -259,8 +259,7 @@ class Inputs:
 
     def _write(self, writes):
         for array, part, numbers in writes:
-            address = array.__array_interface__["data"][0]  # an array may be a new view at each command
-            self._first.setdefault(address, (array, array.copy()))
+            self._first.setdefault(id(array), (array, array.copy()))
             array[part] = numbers
         self._system.forget_lengths()
 

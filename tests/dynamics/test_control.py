@@ -427,6 +427,12 @@ def test_fuel_of_nodes_that_nothing_flies_is_refused():
     scene(observe=SPENT, load=both, web=free, support=rail).build()
     with pytest.raises(InputError, match="node 0 is supported or moved by a table along x, so that no thrust flies"):
         scene(observe=SPENT, load=both, web=free, support=[{"nodes": [0], "components": ["x"]}]).build()
+    given = scene(observe=SPENT, load=both, web=free, support=[{"nodes": [0], "components": ["x"]}]).to_dict()
+    given["control"][0] |= {"measures": ["x", "y"], "rates": [], "law": "pid", "parameters": {"proportional": 1.0}}
+    given["control"][0] |= {"measures": ["x", "y", "z"], "target": ["x", "y", "z"]}
+    given["observe"] = [*scene().to_dict()["observe"], *SPENT[2:3]]
+    del given["control"][0]["direction"]
+    refweb.Scene.from_dict(given).build()  # node 0 flies along y and z
     ship = {"name": "ship", "shape": "box", "size": [1, 1, 1], "mass": 8.0, "position": [0.5, 0, 0]}
     carried = dict(body=[ship], attach=[{"body": "ship", "node": 1}], point_mass=[{"node": 1, "mass": 1.0}])
     with pytest.raises(InputError, match='"delta_v" has no meaning for node = 1, which a body carries'):

@@ -1157,3 +1157,24 @@ def test_a_chosen_stiffness_does_not_depend_on_the_machine(monkeypatch):
         assert any("repeated with stiffness" in text for text in solution.warnings)
         found.append((solution.lines["stiffness"], *(result.value for result in solution.results.values())))
     assert found[0] == found[1] == found[2]
+
+
+def test_no_point_that_may_touch_comes_nearer_to_an_axis_than_its_bound():
+    """Random pairs of elements whose nodes move by half of the approach; ends reach out by the distance of touch."""
+    rng, near = np.random.default_rng(0), 0
+    for _ in range(300):
+        (p, u, w), touch, approach = rng.standard_normal((3, 3)), 0.1, 0.3 * rng.random()
+        bound = search.axes_apart(tuple(p), tuple(u), tuple(w), touch, approach)
+        places = np.array([p, p + u, 0.0 * p, w])
+        for _ in range(40):
+            way = rng.standard_normal((4, 3))
+            a, b, c, d = places + 0.5 * approach * way / np.linalg.norm(way, axis=1)[:, None]
+            for begin, end, first, last in ((a, b, c, d), (c, d, a, b)):
+                points, axis = begin + np.linspace(0.0, 1.0, 50)[:, None] * (end - begin), (last - first)
+                length = np.linalg.norm(axis)
+                along = (points - first) @ axis / length
+                apart = np.linalg.norm(points - first - along[:, None] * axis / length, axis=1)
+                apart = apart[(along >= -touch) & (along <= length + touch)].min(initial=np.inf)
+                assert apart >= bound * (1.0 - 1e-12)
+                near += apart < bound + approach
+    assert near > 100  # so that the bound is near what happens
