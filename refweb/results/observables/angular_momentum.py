@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 class TotalAngularMomentum(Nodal):
     """Σ m (r − r_c) × (v − v_c) plus the spin of bodies; r_c and v_c are those of the centre of mass of all.
 
-    Consistent mass couples the nodes of an element in this sum.
     By default it is that of web and free bodies together. With ``node`` or ``body`` it is the part of these; ``node =
     "all"`` is the part of the web. Supported nodes count with their masses, at rest or moving, while fixed bodies do
-    not count. The total is constant if no force acts from outside and there is no support. In ``[frame]`` and
-    ``[orbit]`` velocities are relative to the rotating axes, and the total is not constant.
+    not count. Consistent mass couples the nodes of an element. The total is constant if no force acts from outside and
+    there is no support. In ``[frame]`` and ``[orbit]`` velocities are relative to the rotating axes, and the total is
+    not constant.
     """
 
     unit = "N m s"
