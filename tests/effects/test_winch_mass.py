@@ -382,6 +382,30 @@ def test_beside_a_reel_and_on_a_body():
     assert mass == pytest.approx(MASS + 0.5 * DENSE * (length + 1.15 * built), rel=1e-6)
 
 
+def test_both_ends_of_a_thread_are_alike():
+    """A load on a thread that is wound at its last end moves as on the same thread from its other end."""
+    found = []
+    for nodes, end in (([0, 1, 2], "first"), ([2, 1, 0], "last")):
+        given = {
+            "web": {"kind": "inline", "points": [[0, 0, 0], [0.7, 0.1, -0.2], [0.9, 0, -1.0]], "lines": [[0, 1]]},
+            "supports": {"nodes": [0, 1]},
+            "cable": CABLE,
+            "thread": [{"name": "rope", "nodes": nodes, **CABLE}],
+            "winch": [{"thread": "rope", "end": end, "tension": 30.0, "mass": "follows"}],
+            "point_mass": [{"node": 2, "mass": MASS}],
+            "gravity": {"acceleration": [0.0, 0.0, -9.81]},
+            "observe": [{"name": axis, "quantity": "position", "node": 2, "component": axis} for axis in "xyz"],
+            "accuracy": {"error": "none"},
+            "solve": {"kind": "dynamic", "duration": 0.2, "step_size": 1e-4},
+        }
+        run = refweb.run(refweb.Scene.from_dict(given))
+        state = run.state
+        masses = state.system.at(state.time, state.x).net.mass[:3]
+        found.append([*(run.results[axis].value for axis in "xyz"), *masses, run.solver["momentum_drift"]])
+    np.testing.assert_allclose(found[1][:-1], found[0][:-1], rtol=1e-9)
+    assert max(found[0][-1], found[1][-1]) < 1e-9
+
+
 @pytest.mark.slow
 def test_a_drawstring_of_a_free_net():
     """A closed thread that rubs at its rings and slips on a winch at one of them: methods agree, balances close."""
