@@ -83,7 +83,10 @@ def decided(scene, system):
         return Choice(given_to(scene, "central-difference"), why)
     damped, slow = _damped(system, bound), seconds > QUICK_RUN and steps > STEP_OF_CVODE * corners
     if slow and damped > DAMPED_BY:
-        why = f"damping makes explicit steps {damped:.3g} times shorter ({price}), and ends the waves they would follow"
+        causes = {term.name for term in system.terms if term.velocity.bound is not None}
+        ends = ", and ends the waves they would follow"
+        cause, ends = ("Coriolis forces make", "") if causes <= {"frame", "orbit"} else ("damping makes", ends)
+        why = f"{cause} explicit steps {damped:.3g} times shorter ({price}){ends}"
         return Choice(given_to(scene, "cvode", family="adams"), why)
     if slow and _quiet(scene, system):
         why = f"only tables over time move it from its equilibrium, without waves that would need {price}"
