@@ -14,6 +14,7 @@ from scipy.special import beta
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects.contact.contact_points import places
+from refweb.effects.contact.nearest_point import lightness
 from refweb.results.state import State
 
 GRAVITY = 9.81
@@ -857,3 +858,13 @@ def test_bound_of_contact_bounds(shape, exponent, mass):
         fastest = np.linalg.eigvals(tangent).real.max()
         shares.append(0.5 * CentralDifference(system).bound(x, reach=0.0) * np.sqrt(fastest))
     assert max(shares) <= 1.0 + 1e-12 and (mass < 1.0 or max(shares) > 0.2)
+
+
+@pytest.mark.parametrize(
+    "nodes, body, expected",
+    [((2.0, 5.0), 3.0, np.sqrt(2.0 / 3.0)), ((0.0, 5.0), 20.0, 0.5), ((9.0, 12.0), 3.0, 1.0), ((0.0, 0.0), 3.0, 1.0),
+     ((2.0, 5.0), 0.0, 0.0)],
+)  # fmt: skip
+def test_scale_of_a_body_by_the_lightest_node_it_touches(nodes, body, expected):
+    """√(lightest/body), at most 1; nodes without mass do not count, and a body without mass has none."""
+    assert lightness(np.array([*nodes, body]), np.array([[0, 1, 2]], dtype=np.int32), 0, 2) == expected

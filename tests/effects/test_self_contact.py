@@ -231,6 +231,12 @@ def test_friction_of_lines_that_do_not_roll():
         np.testing.assert_allclose(force[2:].sum(axis=0), drag, atol=1e-12 * normal)
         moment = np.cross(pair.points, force).sum(axis=0)
         np.testing.assert_allclose(moment, np.cross([0.0, 0.0, 0.15], drag), atol=1e-12 * normal)
+    along = np.array([np.cos(1.1), np.sin(1.1), 0.0])  # which crosses at 0.35 of one line and at 0.25 of the other
+    ends = [[-0.7, 0.0, 0.0], [1.3, 0.0, 0.0], *([0.0, 0.0, 0.15] + np.outer([-0.5, 1.5], along))]
+    pair, speed = Pair(np.array(ends), rolling=False), np.array([0.03, 0.01, 0.0])
+    force, _ = pair.rub(REST, np.array([0 * speed, 0 * speed, speed, speed]))
+    shares = force @ force[2:].sum(axis=0) / np.sum(force[2:].sum(axis=0) ** 2)
+    np.testing.assert_allclose(shares, [-0.65, -0.35, 0.75, 0.25], atol=1e-12)
 
 
 @pytest.mark.parametrize("angle", [np.pi / 2, 1.0, 2.5])
