@@ -558,6 +558,15 @@ class BreakLimits:
         """True if any limit is finite."""
         return self.strains is not None or bool(np.isfinite(self.limits).any())
 
+    @property
+    def breakable(self) -> NDArray[np.bool_]:
+        """True for each element that may break."""
+        mask = np.isfinite(self.limits)
+        if self.strains is not None:
+            mask |= np.isfinite(self.strains)
+        mask[[element for _, element in self.times]] = True
+        return mask
+
     def shares(self, per_cell: PerCell) -> NDArray[np.float64]:
         """Tension of each element over its limit, or strain over its limit where that is larger, shape (elements,)."""
         shares = per_cell.tension / self.limits

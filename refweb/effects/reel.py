@@ -37,8 +37,9 @@ class Reel(Table):
     mass : {"stays", "follows"}
         "stays": nodes keep their mass. "follows": a line has the mass of its natural length. Material leaves and comes
         through the drum, at the velocity of the drum's node, with its momentum and its energy, which counts as
-        ``work``. Point masses and bodies keep theirs, a body with the share of a line's end on it. Forces of the
-        size ρA (dL/dt)², of material that slides along the line, are left out.
+        ``work``. So does its weight: energies by place are those of the masses at t = 0. Point masses and bodies keep
+        theirs, a body with the share of a line's end on it. Forces of the size ρA (dL/dt)², of material that slides
+        along the line, are left out. The lines may not break.
     drum : int, str or list, optional
         Node at the drum, with ``mass = "follows"``: one of each connected part of the lines. By default the one that is
         supported, moved or on a body.

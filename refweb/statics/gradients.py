@@ -314,7 +314,7 @@ class Gradients:
         for term in system.terms:
             if term.name not in KNOWN:
                 raise InputError(f"by line and group [{term.name}] is not taken: name one number of the scene")
-        if net.flows:
+        if system.net.flows:
             raise InputError('by line and group [[reel]] mass = "follows" is not taken: name one number of the scene')
         if path != "cable.modulus" and system.carried.any() and self.linear.weight:
             raise InputError("by line and group mass beside [[attach]] is not taken: name one number of the scene")

@@ -40,6 +40,7 @@ import scipy.linalg
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
+from ..effects.base import refuse_flows
 from ..errors import InputError
 from ..messages import nearest, short
 from ..statics.adjoint import MASSES, Sensitivity
@@ -198,7 +199,9 @@ class FrequencyGradients(Gradients):
         self._spectrum, self._seed, self._groups = modes.spectra[-1], modes.scene.seed, {}
 
     def _refuse_unknown(self, result):
-        if NAME.fullmatch(result) is None:
+        if NAME.fullmatch(result) is not None:
+            refuse_flows(self.state.system.net, f"a gradient of {result}")
+        else:
             names = [*self._observed, *(f"frequency_{n}" for n in range(1, len(self._spectrum.squared) + 1))]
             if result not in self._observed:
                 raise InputError(f'result "{short(result)}" is none of these modes, {nearest(result, names)}')

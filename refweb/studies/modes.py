@@ -251,7 +251,8 @@ def _follow(result, rest, number, tell):
 
             raise no_modes(rest, equilibrium)
         tell(f"step {equilibrium.step:g}, modes", len(result.spectra) / len(steps))
-        computed = spectrum(rest, equilibrium.step, equilibrium.x, number, scene.seed)
+        as_it_stands = rest.at(equilibrium.step, equilibrium.x)  # with the masses of that time
+        computed = spectrum(as_it_stands, equilibrium.step, equilibrium.x, number, scene.seed)
         result.state = State(rest, equilibrium.step, equilibrium.x)
         if result.spectra:
             result.spectra[-1] = replace(result.spectra[-1], shapes=None)

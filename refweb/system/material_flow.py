@@ -39,12 +39,13 @@ class MaterialFlow:
     Raises
     ------
     InputError
-        For lines without a node that is that of a drum, or with several.
+        For lines without a node that is that of a drum, or with several, and for lines that may break.
     """
 
     def __init__(self, system):
         self._net, self._system = system.net, system
         net = system.net
+        _refuse_breaks(system)
         self.flows, self._wound = [], [flow for flow in net.flows if flow.wound]
         for flow in net.flows:
             if not flow.wound:
@@ -131,6 +132,19 @@ def _joined(parts):
 
     none = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 2), dtype=int), np.zeros((0, 2))
     return Passages(*(np.concatenate(arrays) for arrays in zip(none, *parts, strict=True)))
+
+
+def _refuse_breaks(system):
+    """Refuse lines that are broken or may break: a break would cut them off from the drum of their material."""
+    net, weakness = system.net, system.weakness
+    at_risk = np.zeros(len(net.cells), dtype=bool) if weakness is None else weakness.breakable
+    at_risk[net.broken] = True
+    for flow in net.flows:
+        for line in np.intersect1d(net.line[at_risk], flow.lines)[:1]:
+            raise InputError(
+                f'line {line} is broken or may break, and its mass = "follows": material would go on to come over the '
+                'break. Give mass = "stays", or this line no break'
+            )
 
 
 def _drums(system, flow):

@@ -4,6 +4,7 @@ import nets
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import refweb
@@ -353,6 +354,61 @@ def test_it_is_resumed_bit_for_bit_and_its_frames_have_the_mass_of_their_time(tm
     for name, values in whole.history.items():
         np.testing.assert_array_equal(resumed.history[name], values)
     assert whole.state.system.at(1.0).net.mass.sum() == pytest.approx(MASS + 1.1 * DENSE, rel=1e-14)
+
+
+def paid_out(**tables):
+    """A line of 1 m and 1 kg/m that hangs, or stands out in axes that turn, and is 3 m long in the equilibrium."""
+    points = [[0.5, 0, 0], [1.5, 0, 0]] if "frame" in tables else [[0, 0, 0], [0, 0, -1.0]]
+    given = {
+        "web": {"kind": "inline", "points": points, "lines": [[0, 1]], "supports": [0]},
+        "cable": {"law": "tension-only", "modulus": 1e8, "area": 1e-4, "density": 1e4},
+        "reel": [{"lines": [0], "mass": "follows", "factor": [[0.0, 1.0], [2.0, 3.0]]}],
+        "solve": {"kind": "static", "load_steps": [2.0]},
+        "observe": [{"name": "pull", "quantity": "tension"}],
+        **tables,
+    }
+    return refweb.Scene.from_dict(given)
+
+
+def test_frequencies_are_those_of_the_mass_there_is():
+    """√(k/m) of 1.5 kg on 1e4/3 N/m, and pendulums √(g/l); in axes that turn by Ω along z a pendulum of l that hangs
+    out from a support at a has Ω √((a + l)/l) along the axis."""
+    length = 3.0 * (1.0 + 15.0 / 1e4)
+    hanging = refweb.modes(paid_out(gravity={"acceleration": [0, 0, -10.0]}), progress=False)
+    expected = np.sqrt([10.0 / length, 10.0 / length, 1e4 / 3.0 / 1.5]) / (2.0 * np.pi)
+    np.testing.assert_allclose(hanging.table["frequency"], expected, rtol=1e-9)
+    turning = refweb.modes(paid_out(frame={"angular_velocity": [0, 0, 3.0]}), progress=False)
+    length = brentq(lambda long: 1e4 * (long / 3.0 - 1.0) - 1.5 * 9.0 * (0.5 + long), 3.0, 3.1)
+    along = 3.0 * np.sqrt((0.5 + length) / length) / (2.0 * np.pi)
+    np.testing.assert_allclose(turning.table["frequency"][1], along, rtol=1e-9)
+    with pytest.raises(InputError, match="a gradient of frequency_3 takes masses that stay"):
+        hanging.gradient("frequency_3", "cable.density")
+
+
+RATES = [("cable.density", 1.5e-3), ("cable.area", 1.5e5), ("cable.prestrain", -15.0)]
+
+
+@pytest.mark.parametrize("path, expected", RATES)
+def test_gradients_at_rest_are_by_the_mass_there_is(path, expected):
+    """The pull is 1.5 ρ A g l of what has been paid out, which a prestrain shortens."""
+    solution = refweb.run(paid_out(gravity={"acceleration": [0, 0, -10.0]}))
+    gradient = solution.gradient("pull", path)
+    assert float(gradient.value[0]) == pytest.approx(expected, rel=1e-8)
+    with pytest.raises(InputError, match="by line and group .* is not taken"):
+        solution.gradient("pull", "cable.area", by="line")
+
+
+@pytest.mark.parametrize("quantity", ["potential_energy", "total_energy"])
+def test_energies_by_place_are_refused(quantity):
+    scene = paid_out(gravity={"acceleration": [0, 0, -10.0]}, observe=[{"name": "it", "quantity": quantity}])
+    with pytest.raises(InputError, match=f'quantity = "{quantity}" takes masses that stay'):
+        refweb.run(scene)
+
+
+@pytest.mark.parametrize("rupture", [{"at": [[0, 1.0]]}, {"strength": 1e9}])
+def test_lines_that_may_break_are_refused(rupture):
+    with pytest.raises(InputError, match='line 0 is broken or may break, .* Give mass = "stays"'):
+        paid_out(solve={"kind": "dynamic", "duration": 1.0}, rupture=rupture).build()
 
 
 def test_shipped_tether():

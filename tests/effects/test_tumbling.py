@@ -1,5 +1,6 @@
 """Contact of bodies that turn in space: forces from energies, tangents, bounds, hits off-centre, books, tables."""
 
+import itertools
 from types import SimpleNamespace
 
 import meshio
@@ -12,7 +13,10 @@ from scipy.spatial.transform import Rotation
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.rotations import Rotations
+from refweb.effects.contact.pair import lever
+from refweb.net.rigid_body import RigidBody
 from refweb.net.rotation import quaternion_rate
+from refweb.net.shapes.box import Box
 from refweb.system.system import System
 
 CHEST = dict(name="chest", shape="box", size=(0.6, 0.5, 0.7), axes=[(3.0, 1.0, 0.0), (-1.0, 3.0, 0.0)], rounding=0.2)
@@ -439,3 +443,19 @@ def test_a_capsule_moves_as_a_cylinder_with_caps():
         assert solution.bodies["pill"]["overlap"] > 1e-3  # it is caught
     np.testing.assert_allclose(ends[1].x, ends[0].x, rtol=0, atol=1e-9)
     np.testing.assert_allclose(ends[1].v, ends[0].v, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_lever_of_a_body_is_at_least_that_of_any_push(seed):
+    """√(I (y × g)·J⁻¹(y × g)) of all corners of a box and of random directions g, and within 2 of the largest."""
+    rng = np.random.default_rng(seed)
+    big = np.sort(rng.uniform(0.2, 1.0, 3))
+    turn = Rotation.random(random_state=seed).as_matrix()
+    tensor = turn @ np.diag([big[0], big[1], min(big[2], big[0] + big[1])]) @ turn.T
+    size = rng.uniform(0.1, 1.0, 3)
+    body = RigidBody("it", 0, Box(size=tuple(size)), (0, 0, 0), False, np.eye(3), tensor, (0, 0, 0), True, 1, 2)
+    corners = 0.5 * size * np.array(list(itertools.product((-1, 1), repeat=3)))
+    directions = rng.standard_normal((500, 3))
+    arms = np.cross(corners[:, None], directions / np.linalg.norm(directions, axis=1)[:, None]).reshape(-1, 3)
+    largest = np.sqrt((arms @ body.mobility * arms).sum(axis=1).max())
+    assert largest <= lever(body) <= 2.0 * largest

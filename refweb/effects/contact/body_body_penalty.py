@@ -144,7 +144,7 @@ def add_rates(rates, steep, speed, mass, cells, data, c):
         if lever > 0.0:
             rates[b] = max(rates[b] + steep * total / lever, (10.0 * speed / thick) ** 2 * mass[b])
         if turned > 0.0:
-            rates[cells[c, 2 + 2 * side]] += steep * total * turned * math.sqrt(mass[cells[c, 2 + 2 * side]])
+            rates[cells[c, 2 + 2 * side]] += steep * total * turned * mass[cells[c, 2 + 2 * side]]
 
 
 @kernel(NEAR)

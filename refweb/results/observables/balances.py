@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...effects.base import refuse_flows
 from ...errors import InputError
 from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
@@ -21,6 +22,11 @@ if TYPE_CHECKING:
     from ...statics.equilibrium import Equilibrium
     from ...system.system import System
     from ..state import State
+
+
+BY_PLACE = ("potential_energy", "frame_energy", "orbit_energy")
+"""Energies that follow from masses and places. Columns of a history have those of the masses at t = 0 where masses
+follow: what is added has its weight in ``work``."""
 
 
 def weights(system: System, column: str) -> NDArray[np.float64]:
@@ -61,9 +67,12 @@ class Booked(Observable):
         return ANY if self.signed else NOT_NEGATIVE
 
     def on(self, system: System) -> None:
-        """Refuse a column that no effect writes to."""
+        """Refuse a column that no effect writes to, and energies by place with masses that follow."""
         if self.needs and self.observe.quantity not in [f.balance.column for f in system.terms]:
             raise InputError(f'quantity = "{self.observe.quantity}" needs {self.needs} in the scene')
+        places = [f for f in system.terms if f.balance.column in BY_PLACE]
+        if self.observe.quantity in BY_PLACE or self.observe.quantity == "total_energy" and places:
+            refuse_flows(system.net, f'quantity = "{self.observe.quantity}"')
 
     def of(self, state: State) -> Value:
         """Value from the energies of the state, without kinetic energy."""
