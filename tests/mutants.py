@@ -992,6 +992,7 @@ MUTANTS = [
         "scene",
         'if self.supports is not None:\n            given["supports"]',
         'if self.supports:\n            given["supports"]',
+        "a table is never false",
     ),
     # Machine code
     Mutant("compiled/keys", "constants = constants[1:]", "pass"),

@@ -95,7 +95,6 @@ def counted():
     _nrt_python.memsys_disable_stats()
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("counted")
 def test_what_kernels_put_into_a_table_is_given_back_with_it():
     def made():

@@ -19,7 +19,7 @@ from scipy.integrate import DOP853
 import refweb
 from refweb.__main__ import main
 from refweb.dynamics import schedule, simulation
-from refweb.dynamics.history import SPREAD, Watch
+from refweb.dynamics.history import Watch
 from refweb.dynamics.integrators import central_difference
 from refweb.dynamics.integrators.central_difference import CentralDifference, EnergyDriftError
 from refweb.dynamics.integrators.integrator import History
@@ -536,8 +536,8 @@ def test_errors_are_the_difference_to_a_finer_run():
             near = (times >= begin * result.time) & (times <= end * result.time)
             means.append(np.sqrt((apart[near] ** 2).mean()) if near.any() else 0.0)
         difference = max(abs(result.value - by_hand.results[name].value), *means)
-        # With errors a h² and a (2h/3)² the first is their difference over 1 − 4/9.
-        np.testing.assert_allclose(result.error, SPREAD * difference / (1.0 - 4.0 / 9.0), rtol=1e-9)
+        # With errors a h² and a (2h/3)² the first is their difference over 1 − 4/9; ± is three times that.
+        np.testing.assert_allclose(result.error, 3.0 * difference / (1.0 - 4.0 / 9.0), rtol=1e-9)
 
 
 def test_errors_cover_the_truth_on_a_smooth_motion():
@@ -549,7 +549,7 @@ def test_errors_cover_the_truth_on_a_smooth_motion():
     true = refweb.run(scene(safety=0.05, **taut)).results["z"].value
     # The run that stands for the limit errs itself by 1 %, and the next order of the error is (ωh)² ≤ 1/4 at most.
     # Where the difference is small at the end, its mean before counts, in a vibration at most some four times that.
-    assert 0.75 < error / SPREAD / abs(value - true) < 4.0
+    assert 0.75 < error / 3.0 / abs(value - true) < 4.0
 
 
 @pytest.mark.parametrize("interval", [2e-4, 5e-4, 1.2e-3, 2.1e-3, 1e-2])

@@ -346,6 +346,8 @@ def test_a_frame_keeps_its_broken_lines(tmp_path, method):
     assert found.results["tension"].value == 0.0 and found.results["strain"].value <= 0.0
     assert found.state.tension[1] == found.state.strain[1] == 0.0
     assert found.breaks == [] and found.broken_before == [1]
+    again = refweb.run(pulled([0.005], web=web, duration=0.01, method=method))
+    assert again.breaks == [] and again.results["z"].value == z.value  # what is broken does not break at a time
     assert "1 line before the run began: 1" in dict(on_run(found.summary()))["broken"]
     read = refweb.load(tmp_path / "again")
     assert read.broken_before == [1] and read.state.tension[1] == 0.0
