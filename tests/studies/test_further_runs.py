@@ -219,7 +219,6 @@ def test_a_branch_that_is_kept_by_symmetry_alone_has_an_error_of_chance():
     assert apart > 100.0 * straight.error and found.parts["chance"] > 0.5 * apart and found.error > apart
 
 
-@pytest.mark.slow
 def test_chance_holds_branches_that_are_left_by_any_small_difference():
     """A massive end pushes a light hub, exactly in line. The place of the end depends on when the hub leaves the line.
 
@@ -277,7 +276,6 @@ def test_friction_that_creeps_is_off_by_its_slip_velocity():
     assert found.value > 1e-3 and found.parts["smoothing"] >= found.value and found.verdict == "depends on the model"
 
 
-@pytest.mark.slow
 def test_chance_of_a_motion_whose_growth_ends_early():
     """A mass on an upright bar for 5 s: a difference of 1e-12 grows by 1e6 alone, one of 1e-6 lays it down."""
     scene = upright(0.0).replace(solve=refweb.Dynamic(duration=5.0))
