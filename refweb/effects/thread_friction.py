@@ -53,6 +53,8 @@ from .thread_slips import (
     BEFORE,
     HEAD,
     KAPPA,
+    LENGTH,
+    LONGER,
     MODE,
     RATE,
     ROWS,
@@ -62,6 +64,7 @@ from .thread_slips import (
     TENSION,
     choose,
     eliminate,
+    gained,
     layout_kernels,
     matrix,
     natural,
@@ -72,6 +75,11 @@ from .thread_slips import (
 
 LEAST = 1e-300
 """Least time of a step in which slips are found [s]."""
+STILL = 0.1
+"""Share of the change of Y in a step that movements may make where it counts as that of a winch alone."""
+EVEN = 1e-4
+"""Relative change of Y in a step up to which the trapezoidal rule is as good as the difference of strain energies: its
+error is a twelfth of the square."""
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -106,7 +114,7 @@ class FrictionKernels(NamedTuple):
 @functools.cache
 def kernels(law, record, width):
     """The `FrictionKernels` of the parameters of `refweb.effects.thread.kernels`."""
-    energy_density, segment = law.energy_density, segment_kernel(width)
+    energy_density, stress, segment = law.energy_density, law.stress, segment_kernel(width)
     find_slips = return_mapping(law, record, width)
     first_of, _, turn_of = layout_kernels(width)
 
@@ -135,13 +143,57 @@ def kernels(law, record, width):
         return w[TENSION, s] * (1.0 + strain) - energy_density(strain, line)
 
     @kernel()
+    def pull_before(data, c, w, s):
+        """(Y, strain energy) of segment s at the slips before and its length now; NaN for energy without a length."""
+        line, gain = record_at(record, data, c, 0), gained(w, s, BEFORE)
+        long = w[LENGTH, s] - w[LONGER, s] + gain
+        if not long > 0.0:
+            return 0.0, math.nan
+        strain = (w[LONGER, s] - gain) / long
+        density = energy_density(strain, line)
+        return stress(strain, line) * (1.0 + strain) - density, long * density
+
+    @kernel()
+    def taken_at_once(data, c, w, now, before, paid_out, rings):
+        """Energy that a winch takes in a step with Y ``now`` and ``before`` at it, both at the present lengths.
+
+        It is what the strain energy loses, less what rings lose by the trapezoidal rule; of small changes of Y it is
+        the trapezoidal rule itself.
+        """
+        even, line = 0.5 * (now + before) * paid_out, record_at(record, data, c, 0)
+        if abs(now - before) <= EVEN * (abs(now) + abs(before)):
+            return even
+        energy, pulls = 0.0, np.empty(w.shape[1])
+        for s in range(w.shape[1]):
+            pulls[s], stored = pull_before(data, c, w, s)
+            energy += stored - natural(w, s) * energy_density(strain_of(w, s), line)
+        for r in range(rings - 1):
+            last = gap(data, c, w, rings, r)
+            first = pulls[(r + 1) % w.shape[1]] - pulls[r]
+            energy -= 0.5 * (last + (first if first * last > 0.0 else last)) * (w[SLIP, r] - w[BEFORE, r])
+        return energy if math.isfinite(energy) else even
+
+    @kernel()
     def taken_now(x, cells, data, c, w, rings):
-        """Energy that the winch of cell c has taken, over EA."""
+        """Energy that the winch of cell c has taken, over EA.
+
+        It is that at the present lengths where these are the reason for next to nothing of the change of Y, as where a
+        tension is set, else by the trapezoidal rule.
+        """
         row, last, ea = int(data[c, first_of(cells)]), rings - 1, line_at(data, c).ea
-        paid_out = (w[SLIP, last] - internal_number(x, row, last)) * (w[HEAD, 0] - w[TAIL, 0])
-        now, before = pulled_over(data, c, w) / ea, internal_number(x, row, 2 * rings - 1)
-        mean = now if before == 0.0 else 0.5 * (now + before)
-        return internal_number(x, row, 2 * rings + 2) + mean * paid_out
+        w[BEFORE, last] = internal_number(x, row, last)
+        paid_out = (w[SLIP, last] - w[BEFORE, last]) * (w[HEAD, 0] - w[TAIL, 0])
+        if paid_out == 0.0:
+            return internal_number(x, row, 2 * rings + 2)
+        now, before = pulled_over(data, c, w), ea * internal_number(x, row, 2 * rings - 1)
+        at_once = pull_before(data, c, w, 0 if w[HEAD, 0] > 0.0 else w.shape[1] - 1)[0]
+        if before == 0.0:
+            begins = internal_number(x, row, 2 * rings + 1) == 0.0
+            before = at_once if begins or at_once == 0.0 else now
+        energy = 0.5 * (now + before) * paid_out
+        if abs(at_once - before) <= STILL * abs(now - before):
+            energy += taken_at_once(data, c, w, now, at_once, paid_out, rings) - 0.5 * (now + at_once) * paid_out
+        return internal_number(x, row, 2 * rings + 2) + energy / ea
 
     @kernel()
     def lost_now(x, cells, data, c, w, rings):

@@ -602,3 +602,56 @@ def test_shipped_scene():
     assert rim[:, 2].min() > debris[2] + 0.3  # its radius
     # The net is 1.9 m wide: a mouth of half of that is closed by more than the winch takes in.
     assert np.ptp(rim[:, :2], axis=0).max() < 0.5 * 1.9 and run.results["debris_speed"].value > 0.0
+
+
+def jumping(winch, prestrain, on="thread", mass=1e6, **tables):
+    """A mass too heavy to move on a taut rope of 2 m and 1 kN, whose winch has a tension of its own."""
+    rope = {"law": "tension-only", "modulus": 1e8, "area": 1e-5, "density": 0.0}
+    given = {
+        "web": {"kind": "inline", "points": [[0, 0, 0], [0, 0, -2.0]], "lines": [[0, 1]], "supports": [0]},
+        "cable": {**rope, "prestrain": prestrain},
+        "winch": [{"lines": 0, **winch}],
+        "point_mass": [{"node": 1, "mass": mass}],
+        "observe": [{"name": "held", "quantity": "strain_energy"}],
+        "output": {"interval": 0.01},
+        "solve": {"kind": "dynamic", "duration": 0.02},
+        **tables,
+    }
+    if on == "thread":
+        given["web"] |= {"points": [[0, 0, 0], [0, 0, -2.0], [5, 0, 0], [6, 0, 0]], "lines": [[2, 3]]}
+        given["web"]["supports"] = [0, 2, 3]
+        given["cable"] = rope
+        given["thread"] = [{"name": "rope", "nodes": [0, 1], **rope, "prestrain": prestrain}]
+        given["winch"] = [{"thread": "rope", "end": "first", **winch}]
+    return refweb.Scene.from_dict(given)
+
+
+@pytest.mark.parametrize("on", ["thread", "lines"])
+@pytest.mark.parametrize("winch", [{"tension": 10.0}, {"tension": 200.0}, {"speed": 0.0, "limit": 10.0}])
+def test_energy_of_a_winch_that_starts_at_another_tension(winch, on):
+    """It takes at once what the strain energy ½ EA ε² L loses, of ε = 0.1 and L = 2/1.1 m at the start."""
+    found = {name: values[-1] for name, values in refweb.run(jumping(winch, 0.1, on)).history.items()}
+    held = 0.5 * 1e3 * 0.1**2 * 2.0 / 1.1
+    left = found["strain_energy"] + found["kinetic_energy"]
+    assert found["winch_energy"] == pytest.approx(held - left, rel=1e-6)
+
+
+@pytest.mark.parametrize("first, then, prestrain", [(10.0, 100.0, 0.01), (1.0, 150.0, 1e-3), (100.0, 5.0, 0.1)])
+def test_energy_closes_where_a_tension_is_set(first, then, prestrain):
+    run = refweb.start(jumping({"tension": first}, prestrain))
+    run.advance()
+    run.set("winch.0.tension", then)
+    run.advance()
+    history = run.finish().history
+    held = history["strain_energy"]
+    assert history["winch_energy"][-1] == pytest.approx(held[0] - held[-1], rel=1e-6)
+    size = np.abs(history["winch_energy"]).max()
+    np.testing.assert_allclose(history["total_energy"], history["total_energy"][0], atol=1e-6 * size)
+
+
+def test_a_limit_may_be_controlled():
+    """A limit is above 0, also where it is tried."""
+    control = [{"name": "c", "law": "pid", "parameters": {"proportional": 1.0}, "period": 0.01, "target": 50.0,
+                "sets": "winch.0.limit", "measures": ["held"]}]  # fmt: skip
+    history = refweb.run(jumping({"speed": 0.1, "limit": 200.0}, 0.01, mass=2.0, control=control)).history
+    assert np.isfinite(history["winch_energy"]).all()
