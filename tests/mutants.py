@@ -609,7 +609,7 @@ MUTANTS = [
     Mutant("effects/winch", "holds = self.tension, self.tension", "holds = -math.inf, self.tension"),
     Mutant("effects/winch", "(thread.friction[start:] + thread.friction[:start])[:-1]", "thread.friction[:-1]"),
     Mutant("effects/winch", "vectors=np.roll(thread.vectors, -start, axis=0)", "vectors=thread.vectors"),
-    Mutant("effects/thread_friction", "mean = now if before == 0.0 else 0.5 * (now + before)", "mean = 0.5 * now"),
+    Mutant("effects/thread_friction", "energy = 0.5 * (now + before) * paid_out", "energy = now * paid_out"),
     Mutant("effects/thread_friction", "total += 0.5 * (before + now) *", "total += now *"),
     Mutant(
         "effects/thread_friction",
