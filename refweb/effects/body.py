@@ -161,7 +161,8 @@ class Body(Table):
         Initial angular velocity along x, y and z [rad/s]; for a ring along its normal.
     inertia : float or list, optional
         Moments of inertia about its centre [kg m²]: one number, three about its axes, or the symmetric 3 × 3 tensor
-        along them; for a ring that about its normal. By default those of a uniform solid, and m r² for a ring.
+        along them; for a ring that about its normal. By default those of a uniform solid with its rounded edges, and
+        m r² for a ring.
     fixed : bool
         True if it does not move.
     axle : BodyAxle, optional

@@ -81,8 +81,8 @@ class Winch(Table):
         ``start = "equilibrium"`` as well, but for one with a ``speed_limit``, which begins as the web is.
     power : float, optional
         Power that the web gets [W], without the strain energy of what is wound; negative to pay out. The speed is power
-        over tension, up to ``speed_limit``. A load that sinks at a constant power goes faster and faster, up to the
-        limit. In statics, and with ``start = "equilibrium"``, the winch stays as it is.
+        over T + T²/(2 EA) of the tension T, up to ``speed_limit``. A load that sinks at a constant power goes faster
+        and faster, up to the limit. In statics, and with ``start = "equilibrium"``, the winch stays as it is.
     speed_limit : float, optional
         Largest speed with ``tension`` or ``power`` [m/s], in and out; by default none. With ``tension`` the tension is
         lower or higher at it. ``power`` needs one, since a slack thread has no tension.

@@ -347,7 +347,6 @@ def test_a_body_that_is_fixed_elsewhere_than_before_is_named(tmp_path):
     assert len(said) == 1 and said[0].startswith('body "box" is fixed, and its node 1 jumps by 0.005 m to it at t = 0')
 
 
-@pytest.mark.slow
 def test_an_axle_takes_what_turns_about_it(tmp_path):
     """A box that turns about x goes on at its speed, on an axle along x and free again; other axles refuse it."""
     chain = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1])

@@ -152,3 +152,17 @@ def test_threads_share_a_system():
         np.testing.assert_allclose(force, -pull * np.array(place) / far, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(K, rates + slope * along + pull / far * (np.eye(3) - along), rtol=1e-12, atol=1e-9)
         np.testing.assert_allclose(C, time * rates, rtol=1e-12, atol=1e-9)
+
+
+def test_consistent_mass_of_one_line():
+    """M = m/6 (2 1; 1 2): momenta of both ends, and half of a jump of one end that the free other takes back."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]]),
+        cable=refweb.Cable(law="linear", modulus=1e6, area=1e-4, density=6e4),
+        effects=[refweb.Motion(node=0, displacement=[(0.0, 0.0, 0.0, 0.0), (1.0, 0.1, 0.2, 0.3)])],
+        solve=refweb.Dynamic(duration=1.0, method="cvode", mass="consistent"),
+    )
+    mass, v = scene.build().mass, np.array([[1.0, -2.0, 3.0], [0.5, 0.0, -1.0]])
+    np.testing.assert_allclose(mass.momentum(v), np.array([[2.0, 1.0], [1.0, 2.0]]) @ v, rtol=1e-14)
+    jump = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(mass.kick(jump), [jump[0], -0.5 * jump[0]], rtol=1e-14)
