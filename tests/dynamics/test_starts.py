@@ -371,6 +371,10 @@ def test_an_axle_takes_what_turns_about_it(tmp_path):
     ):
         with pytest.raises(refweb.InputError, match=f'body "box" ({why})'):
             turned("refused", tmp_path / "free", 1e-3, axle=axle, angular_velocity=(0.0, 0.0, 0.0))
+    swung = {"axle": {"direction": (1.0, 0.0, 0.0), "point": (0.0, 0.1, 5.0)}}  # beside the centre
+    turned("swung", "web", **swung)
+    heavier = dict(inertia=(0.01, 0.02, 0.02), angular_velocity=(0.0, 0.0, 0.0), **swung)
+    np.testing.assert_allclose(turned("heavier", tmp_path / "swung", **heavier)["speed"], 2.0, rtol=1e-9)
     turned("tumbling", "web", 1e-3, angular_velocity=(2.0, 0.0, 1e-4))
     with pytest.raises(refweb.InputError, match="turns about an axis"):
         turned("refused", tmp_path / "tumbling", 1e-3, axle={"direction": (1.0, 0.0, 0.0)})
