@@ -296,8 +296,8 @@ def check(scene: Scene, system: System) -> None:
     for number, made in enumerate(controllers):
         sets = made.control.sets
         with refused_at(f"[[control]] {number + 1}"):
-            number = 1.0 if sets.endswith(".limit") else 0.0  # a limit is above 0
-            inputs.checked(Command(0.0, sets, [0.0] * 3 if made.vector else number))
+            trial = 1.0 if sets.endswith(".limit") else 0.0  # a limit is above 0
+            inputs.checked(Command(0.0, sets, [0.0] * 3 if made.vector else trial))
             inputs.refuse_factor(sets)
     for observe in (observe for observe in scene.observables if observe.control is not None):
         with refused_at(f"[[observe]] {quote(observe.name)}"):

@@ -16,7 +16,7 @@ from ..net.rotation_bounds import carry_rates
 from ..registry import INTEGRATORS
 from ..results.units import prefixed
 from .budget import steps_with_twin
-from .method_choice import step_price
+from .method_choice import TURNING, step_price
 from .schedule import Counts
 
 TELLING = 0.95
@@ -50,7 +50,7 @@ def ruling(integrator, system, reach, speed):
     term = terms[int((lossy if damped else stiff)[:, worst].argmax())]
     row = int(moving[worst])
     if damped:
-        name = f"Coriolis forces of [{term.name}]" if term.name in ("frame", "orbit") else term.name
+        name = f"Coriolis forces of [{term.name}]" if term.name in TURNING else term.name
         by = f"{name} at {system.row_name(row)}"
     elif term.over_lines:
         of_it = [row, *(node for body in net.bodies if row in (body.row, body.spin) for node in body.carried)]

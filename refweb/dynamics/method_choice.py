@@ -17,8 +17,8 @@ web that settles, damped by its material   3.2 s                1.0 s      0.67 
 =========================================  ===================  =========  ===========  ========
 
 May change: constants, which are measured, and words of reasons: another choice changes digits of a result within its ±.
-Must stay: `decided`, `Choice`, `given_to` and `step_price`, which `method_fallback`, `expected_cost`, `studies` and
-``refweb check`` use; a chosen method takes the scene. Reasons stand in ``run.json``. Tests:
+Must stay: `decided`, `Choice`, `given_to`, `TURNING` and `step_price`, which `method_fallback`, `expected_cost`,
+`studies` and ``refweb check`` use; a chosen method takes the scene. Reasons stand in ``run.json``. Tests:
 ``tests/dynamics/test_fallback.py``, ``tests/studies/test_cost.py``.
 """
 
@@ -50,6 +50,8 @@ STEP_OF_CVODE = 100.0
 """Explicit steps that cost as much as one step of CVODE, which takes at least one step to each corner of a table."""
 QUICK_RUN = 0.5
 """CPU time of an explicit run [s] below which no other method is tried."""
+TURNING = ("frame", "orbit")
+"""Names of terms whose forces by velocity are Coriolis forces."""
 DAMPED_BY = 5.0
 """Factor by which damping shortens explicit steps, above which another method is used."""
 
@@ -83,10 +85,11 @@ def decided(scene, system):
         return Choice(given_to(scene, "central-difference"), why)
     damped, slow = _damped(system, bound), seconds > QUICK_RUN and steps > STEP_OF_CVODE * corners
     if slow and damped > DAMPED_BY:
-        causes = {term.name for term in system.terms if term.velocity.bound is not None}
-        ends = ", and ends the waves they would follow"
-        cause, ends = ("Coriolis forces make", "") if causes <= {"frame", "orbit"} else ("damping makes", ends)
-        why = f"{cause} explicit steps {damped:.3g} times shorter ({price}){ends}"
+        shorter = f"explicit steps {damped:.3g} times shorter ({price})"
+        if any(term.velocity.bound is not None and term.name not in TURNING for term in system.terms):
+            why = f"damping makes {shorter}, and ends the waves they would follow"
+        else:
+            why = f"Coriolis forces make {shorter}"
         return Choice(given_to(scene, "cvode", family="adams"), why)
     if slow and _quiet(scene, system):
         why = f"only tables over time move it from its equilibrium, without waves that would need {price}"

@@ -154,17 +154,16 @@ class Rupture(Table):
         for i, (line, _) in enumerate(self._due):
             if line >= count:
                 raise InputError(f"at[{i}][0] = {line:g} is not a line, must be 0 … {count - 1}")
-        strains = self._strains(net)
-        due = {line for line, _ in self._due}
-        for line in [n for lines, _ in net.wound for n in lines.tolist() if np.isfinite(limits[n]) or n in due][:1]:
+        elements = net.middle_of([line for line, _ in self._due])
+        middles = [(time, int(element)) for (_, time), element in zip(self._due, elements, strict=True)]
+        weakness = BreakLimits(limits, tuple(sorted(middles)), self._strains(net))
+        breakable = weakness.breakable
+        for line in net.line[[n for wound, _ in net.wound for n in wound.tolist() if breakable[n]][:1]]:
             raise InputError(f"line {line} is on a [[winch]] and does not break: give it no strength or time")
-        if not self._due and strains is None and not np.isfinite(limits).any():
+        if not self._due and not weakness.watched:
             raise InputError(
                 "strength is missing: give it here, in [cable] or in their groups, or give at = [[line, t]]"
             )
-        elements = net.middle_of([line for line, _ in self._due])
-        middles = [(time, int(element)) for (_, time), element in zip(self._due, elements, strict=True)]
-        weakness = BreakLimits(limits, tuple(sorted(middles)), strains)
         if net.quasi_static:
             return weakness
         return [held_energy(net), weakness]

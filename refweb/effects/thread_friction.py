@@ -136,9 +136,14 @@ def kernels(law, record, width):
         return rings - (data[c, first_of(cells) + 1] > 1.0)
 
     @kernel()
+    def at_winch(w):
+        """Number of the segment at a winch."""
+        return 0 if w[HEAD, 0] > 0.0 else w.shape[1] - 1
+
+    @kernel()
     def pulled_over(data, c, w):
         """Configurational force Y at a winch."""
-        s, line = 0 if w[HEAD, 0] > 0.0 else w.shape[1] - 1, record_at(record, data, c, 0)
+        s, line = at_winch(w), record_at(record, data, c, 0)
         strain = strain_of(w, s)
         return w[TENSION, s] * (1.0 + strain) - energy_density(strain, line)
 
@@ -154,16 +159,15 @@ def kernels(law, record, width):
         return stress(strain, line) * (1.0 + strain) - density, long * density
 
     @kernel()
-    def taken_at_once(data, c, w, now, before, paid_out, rings):
-        """Energy that a winch takes in a step with Y ``now`` and ``before`` at it, both at the present lengths.
+    def left_out(data, c, w, now, before, paid_out, rings):
+        """Energy that a winch takes beside the trapezoidal rule, with Y ``now`` and ``before`` at the present lengths.
 
-        It is what the strain energy loses, less what rings lose by the trapezoidal rule; of small changes of Y it is
-        the trapezoidal rule itself.
+        The strain energy loses what the winch takes and what rings lose, which is by the trapezoidal rule. 0 for small
+        changes of Y.
         """
-        even, line = 0.5 * (now + before) * paid_out, record_at(record, data, c, 0)
+        line, energy, pulls = record_at(record, data, c, 0), -0.5 * (now + before) * paid_out, np.empty(w.shape[1])
         if abs(now - before) <= EVEN * (abs(now) + abs(before)):
-            return even
-        energy, pulls = 0.0, np.empty(w.shape[1])
+            return 0.0
         for s in range(w.shape[1]):
             pulls[s], stored = pull_before(data, c, w, s)
             energy += stored - natural(w, s) * energy_density(strain_of(w, s), line)
@@ -171,7 +175,7 @@ def kernels(law, record, width):
             last = gap(data, c, w, rings, r)
             first = pulls[(r + 1) % w.shape[1]] - pulls[r]
             energy -= 0.5 * (last + (first if first * last > 0.0 else last)) * (w[SLIP, r] - w[BEFORE, r])
-        return energy if math.isfinite(energy) else even
+        return energy if math.isfinite(energy) else 0.0
 
     @kernel()
     def taken_now(x, cells, data, c, w, rings):
@@ -186,13 +190,13 @@ def kernels(law, record, width):
         if paid_out == 0.0:
             return internal_number(x, row, 2 * rings + 2)
         now, before = pulled_over(data, c, w), ea * internal_number(x, row, 2 * rings - 1)
-        at_once = pull_before(data, c, w, 0 if w[HEAD, 0] > 0.0 else w.shape[1] - 1)[0]
+        at_once = pull_before(data, c, w, at_winch(w))[0]
         if before == 0.0:
             begins = internal_number(x, row, 2 * rings + 1) == 0.0
             before = at_once if begins or at_once == 0.0 else now
         energy = 0.5 * (now + before) * paid_out
         if abs(at_once - before) <= STILL * abs(now - before):
-            energy += taken_at_once(data, c, w, now, at_once, paid_out, rings) - 0.5 * (now + at_once) * paid_out
+            energy += left_out(data, c, w, now, at_once, paid_out, rings)
         return internal_number(x, row, 2 * rings + 2) + energy / ea
 
     @kernel()

@@ -201,10 +201,9 @@ class FrequencyGradients(Gradients):
     def _refuse_unknown(self, result):
         if NAME.fullmatch(result) is not None:
             refuse_flows(self.state.system.net, f"a gradient of {result}")
-        else:
+        elif result not in self._observed:
             names = [*self._observed, *(f"frequency_{n}" for n in range(1, len(self._spectrum.squared) + 1))]
-            if result not in self._observed:
-                raise InputError(f'result "{short(result)}" is none of these modes, {nearest(result, names)}')
+            raise InputError(f'result "{short(result)}" is none of these modes, {nearest(result, names)}')
 
     def _responses(self, result):
         if NAME.fullmatch(result) is None:

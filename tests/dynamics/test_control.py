@@ -428,8 +428,8 @@ def test_fuel_of_nodes_that_nothing_flies_is_refused():
     with pytest.raises(InputError, match="node 0 is supported or moved by a table along x, so that no thrust flies"):
         scene(observe=SPENT, load=both, web=free, support=[{"nodes": [0], "components": ["x"]}]).build()
     given = scene(observe=SPENT, load=both, web=free, support=[{"nodes": [0], "components": ["x"]}]).to_dict()
-    given["control"][0] |= {"measures": ["x", "y"], "rates": [], "law": "pid", "parameters": {"proportional": 1.0}}
-    given["control"][0] |= {"measures": ["x", "y", "z"], "target": ["x", "y", "z"]}
+    given["control"][0] |= {"measures": ["x", "y", "z"], "rates": [], "target": ["x", "y", "z"]}
+    given["control"][0] |= {"law": "pid", "parameters": {"proportional": 1.0}}
     given["observe"] = [*scene().to_dict()["observe"], *SPENT[2:3]]
     del given["control"][0]["direction"]
     refweb.Scene.from_dict(given).build()  # node 0 flies along y and z

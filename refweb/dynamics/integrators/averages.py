@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 CELLS = 1024
 """Number of cells of a window. The mean of a sine over a whole period is off its largest value by 4e-12 of that."""
 PARTS = 4
-"""Number of equal parts of a step of higher order at whose ends a value is looked at."""
+"""Number of equal parts of a step of higher order at whose ends a value is looked at: `measurements` takes quarters."""
 SETTLED, HALVINGS = 1e-8, 10
 """Share of the values of a step that its integral may leave open before it is halved, and how often it may be."""
 PAYS = 0.75

@@ -90,13 +90,21 @@ class TotalAngularMomentum(Nodal):
         return net.cells.ravel(), coupled, np.pad(mass.reshape(-1, coupled), ((0, 0), (0, 4 - coupled)))
 
 
+@kernel(leaf=True)
+def add_moment(a, r, u, x, data, c, total):
+    """Add (r − r_c) × u of a row to a, with the momentum u and r_c times the mass of all."""
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        a[k] += (data[r, 1 + i] + x[r, i] - c[i] / total) * u[j] - (data[r, 1 + j] + x[r, j] - c[j] / total) * u[i]
+
+
 @kernel(PROBE)
 def angular_momentum(t, x, v, f, lines, rows, data, where):
     """``rows`` is (component, linear rows, count, bodies, nodes of an element or 0, counted rows, two rows of rotation
     of each body, nodes of elements), data (mass, reference position) of all linear rows, three rows of each body: its
     `RigidBody.spin_momentum`, then consistent less lumped mass of the elements, a row for each of their nodes."""
     total, linear, count, bodies, coupled = 0.0, rows[1], rows[2], rows[3], rows[4]
-    c, w, a = np.zeros(3), np.zeros(3), np.zeros(3)
+    c, w, a, u = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     for r in range(linear):
         total += data[r, 0]
         for k in range(3):
@@ -105,20 +113,18 @@ def angular_momentum(t, x, v, f, lines, rows, data, where):
     for n in range(count):
         r = rows[5 + n]
         for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            term = (data[r, 1 + i] + x[r, i] - c[i] / total) * (v[r, j] - w[j] / total)
-            a[k] += data[r, 0] * (term - (data[r, 1 + j] + x[r, j] - c[j] / total) * (v[r, i] - w[i] / total))
+            u[k] = data[r, 0] * (v[r, k] - w[k] / total)
+        add_moment(a, r, u, x, data, c, total)
     for n in range(bodies):
         spin = turned_with(linear + 3 * n, rows[5 + count + 2 * n], rows[6 + count + 2 * n], x, v, data)
         for k in range(3):
             a[k] += spin[k]
     first, at = 5 + count + 2 * bodies, linear + 3 * bodies
     for n in range(rows.size - first):  # row n of the masses of elements, by columns to the nodes of the same element
-        r, begin = rows[first + n], first + n - n % coupled
+        begin = first + n - n % coupled
+        u[:] = 0.0
         for m in range(coupled):
-            s, mass = rows[begin + m], data[at + n, m]
             for k in range(3):
-                i, j = (k + 1) % 3, (k + 2) % 3
-                term = (data[r, 1 + i] + x[r, i] - c[i] / total) * v[s, j]
-                a[k] += mass * (term - (data[r, 1 + j] + x[r, j] - c[j] / total) * v[s, i])
+                u[k] += data[at + n, m] * v[rows[begin + m], k]
+        add_moment(a, rows[first + n], u, x, data, c, total)
     return component_of(rows[0], a[0], a[1], a[2])

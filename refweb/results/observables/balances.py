@@ -70,8 +70,7 @@ class Booked(Observable):
         """Refuse a column that no effect writes to, and energies by place with masses that follow."""
         if self.needs and self.observe.quantity not in [f.balance.column for f in system.terms]:
             raise InputError(f'quantity = "{self.observe.quantity}" needs {self.needs} in the scene')
-        places = [f for f in system.terms if f.balance.column in BY_PLACE]
-        if self.observe.quantity in BY_PLACE or self.observe.quantity == "total_energy" and places:
+        if self.observe.quantity in BY_PLACE:
             refuse_flows(system.net, f'quantity = "{self.observe.quantity}"')
 
     def of(self, state: State) -> Value:
@@ -138,6 +137,12 @@ class DissipatedEnergy(Booked):
 
 class TotalEnergy(Booked):
     """Sum of stored energies, in dynamics with the kinetic energy."""
+
+    def on(self, system: System) -> None:
+        """Refuse energies by place in it with masses that follow."""
+        super().on(system)
+        if any(f.balance.column in BY_PLACE for f in system.terms):
+            refuse_flows(system.net, f'quantity = "{self.observe.quantity}"')
 
     def error(self, state: State, equilibrium: Equilibrium) -> float | None:
         """The estimate; None where it depends on the load steps."""
