@@ -22,6 +22,7 @@ import warnings
 from .errors import InputError
 from .messages import nearest, short
 from .registry import COMMANDS, known, load, load_installed, possible, registered_packages
+from .threads import use_one
 
 THRESHOLDS = (50_000, 20, 100)
 """When Python looks for unreachable objects, see `gc.set_threshold`: imports make 100 000 that stay."""
@@ -126,8 +127,9 @@ def _reason(error):
 
 
 def alone():
-    """Run `main` in a process of its own, which looks for unreachable objects seldom and, at its end, not at all."""
+    """Run `main` in a process of its own: with one thread of each library, and little garbage collection."""
     gc.set_threshold(*THRESHOLDS)
+    use_one()
     try:
         return main()
     finally:

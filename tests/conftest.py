@@ -1,7 +1,7 @@
 """Processes that tests start run the code under test, from whatever folder: not what is installed beside it.
 
-They compile without a second process: the workers of the tests fill the cores. And they read bytecode that the first
-of them has written, which takes each 0.4 s less than to read sources.
+They compile without a second process, and libraries have one thread: the workers of the tests fill the cores. And they
+read bytecode that the first of them has written, which takes each 0.4 s less than to read sources.
 """
 
 import fnmatch
@@ -12,6 +12,9 @@ import sys
 
 import pytest
 
+from refweb.threads import use_one
+
+use_one()
 _before = os.environ.get("PYTHONPATH")
 os.environ["PYTHONPATH"] = os.pathsep.join([str(pathlib.Path(__file__).parents[1]), *([_before] if _before else [])])
 os.environ.setdefault("REFWEB_COMPILERS", "1")

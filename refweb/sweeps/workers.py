@@ -5,9 +5,9 @@ find the job that kills its worker among those that ran at the same time. A job 
 up.
 
 May change: private functions, `TRIES` and `GLANCE`. Must stay: each outcome once from `through`; of an executor of a
-user only ``submit``, standard futures and, where it exists, ``_max_workers`` are used; `THREADS`, by which rows are the
-same in all processes; `crew_of`, which `sizing.size` and `sweep` import; `Processes`, which `sizing.runs` imports;
-`cluster`, which `commands.arguments` imports. Tests: ``tests/sweeps/test_workers.py``.
+user only ``submit``, standard futures and, where it exists, ``_max_workers`` are used; one thread of each library, by
+which rows are the same in all processes; `crew_of`, which `sizing.size` and `sweep` import; `Processes`, which
+`sizing.runs` imports; `cluster`, which `commands.arguments` imports. Tests: ``tests/sweeps/test_workers.py``.
 """
 
 from __future__ import annotations
@@ -23,14 +23,13 @@ from typing import Any
 
 from ..errors import InputError, SolverError
 from ..messages import one_line, quote
+from ..threads import VARIABLES
 from .case import Outcome, solve
 
 TRIES = 3
 """Number of workers that a job may kill before it is given up."""
 GLANCE = 0.5
 """Longest time between two checks for finished jobs [s]."""
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""Environment variables for the number of threads of libraries."""
 
 
 def cores():
@@ -76,7 +75,7 @@ class Processes:
 
         if self.pool is None:
             parent, self._alive = multiprocessing.Pipe(duplex=False)
-            options = {"initializer": _watch, "initargs": (parent,), "env": dict.fromkeys(THREADS, "1")}
+            options = {"initializer": _watch, "initargs": (parent,), "env": dict.fromkeys(VARIABLES, "1")}
             self.pool = loky.ProcessPoolExecutor(self.parallel, **options)
         can_block = hasattr(signal, "pthread_sigmask")  # until `_watch` runs
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if can_block else None

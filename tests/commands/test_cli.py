@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import os
 import pathlib
 import re
 import subprocess
@@ -336,6 +337,24 @@ def test_import_is_lazy():
     names = loaded("import refweb; refweb.__version__, dir(refweb)")
     assert not {"numpy", "pyvista", "matplotlib", "numba", "meshio", "sksundae"} & names
     assert {name for name in names if name.startswith("refweb")} == {"refweb", "refweb.registry"}
+
+
+def test_libraries_have_one_thread_unless_more_are_asked_for():
+    """OpenBLAS takes two threads for products of vectors longer than 10 000, and their sum has other last digits."""
+    code = """if True:
+        import os, sys
+        from refweb.__main__ import alone
+        sys.argv[1:] = ["--version"]
+        before = len(os.listdir("/proc/self/task")) if os.path.isdir("/proc/self/task") else 1
+        assert not {"numpy"} & set(sys.modules) and alone() == 0
+        import numpy
+        numpy.ones(20_000) @ numpy.ones(20_000)
+        after = len(os.listdir("/proc/self/task")) if os.path.isdir("/proc/self/task") else 1
+        print(os.environ["OPENBLAS_NUM_THREADS"], os.environ["OMP_NUM_THREADS"], after - before)"""
+    free = {name: value for name, value in os.environ.items() if not name.endswith("_THREADS")}
+    for asked, words in ({}, "1 1 0"), ({"OMP_NUM_THREADS": "2"}, "1 2 "):
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env={**free, **asked})
+        assert done.returncode == 0 and done.stdout.splitlines()[-1].startswith(words), done
 
 
 def test_unknown_name_of_the_package():

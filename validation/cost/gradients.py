@@ -9,12 +9,12 @@ time, minimum of several runs, in one process with one thread.
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[name] = "1"
+from refweb.threads import use_one
+
+use_one()
 
 import refweb  # noqa: E402
 

@@ -13,12 +13,12 @@ CPU time of one thread, compilation left out; the minimum of `REPEATS` runs wher
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[name] = "1"
+from refweb.threads import use_one
+
+use_one()
 
 import numpy as np  # noqa: E402
 

@@ -13,13 +13,13 @@ the counts of factorizations do not.
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import time
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[name] = "1"
+from refweb.threads import use_one
+
+use_one()
 
 import numpy as np  # noqa: E402
 

@@ -9,13 +9,13 @@ minimum of several runs that alternate, in one process with one thread; with the
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from contextlib import contextmanager
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[name] = "1"
+from refweb.threads import use_one
+
+use_one()
 
 import qdldl  # noqa: E402
 

@@ -11,13 +11,13 @@ to the finest run of the same case. Order 1 with lumped mass is integrated by ce
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from dataclasses import replace
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[name] = "1"
+from refweb.threads import use_one
+
+use_one()
 
 import numpy as np  # noqa: E402
 

@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from refweb.threads import VARIABLES
+
 ROOT = pathlib.Path(__file__).parents[2]
 PROGRAMS = pathlib.Path(__file__).parent / "programs"
 COMPLAINT = re.compile(r"(?i)\b(error|warning|fail\w*|singular|diverge\w*|not converge\w*|nan)\b")
@@ -43,7 +45,7 @@ def machine(python=sys.executable, limit=300.0):
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     libraries = pathlib.Path(done.stdout.strip()).parent / "lib"
     environment = dict(os.environ)
-    environment |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    environment |= dict.fromkeys(VARIABLES, "1")
     for name, folder in (("PYTHONPATH", ROOT), ("LD_LIBRARY_PATH", libraries)):
         environment[name] = os.pathsep.join(filter(None, (str(folder), os.environ.get(name))))
     return Machine(python, environment, limit)
