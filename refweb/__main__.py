@@ -22,7 +22,7 @@ import warnings
 from .errors import InputError
 from .messages import nearest, short
 from .registry import COMMANDS, known, load, load_installed, possible, registered_packages
-from .threads import use_one
+from .sweeps.threads import use_one
 
 THRESHOLDS = (50_000, 20, 100)
 """When Python looks for unreachable objects, see `gc.set_threshold`: imports make 100 000 that stay."""

@@ -12,7 +12,7 @@ import sys
 
 import pytest
 
-from refweb.threads import use_one
+from refweb.sweeps.threads import use_one
 
 use_one()
 _before = os.environ.get("PYTHONPATH")

@@ -582,7 +582,7 @@ ABSENT = (
     "inner_stages", "advance_rotation", "carry_nodes", "move_supports", "set_lengths", "set_masses", "exchange_masses",
     "viscous_kick", "contact_kick", "narrow_all", "step_by_pairs",
     "take_pairs", "stays_free", "set_push", "average", "note_events", "look_at_books", "book_powers",
-    "add_half_steps", "turning", "relax", "set_growth",
+    "add_half_steps", "turning", "more_kinetic", "relax", "set_growth",
 )  # fmt: skip
 """Kernels of the loop that a plain impact has no use for: stages, bodies that turn or carry, motion, reels, damping,
 friction, lines on lines, integrated impulses, averages, events, energies as observables, angular momentum, arms."""
@@ -601,11 +601,14 @@ def machine_code(*changes):
     return [name.removeprefix("refweb.").rpartition(".")[0] for name in done.stdout.split()]
 
 
-def test_a_plain_impact_has_machine_code_of_nothing_else():
+@pytest.mark.parametrize("method, least", [("central-difference", 30), ("cvode", 10)])
+def test_a_plain_impact_has_machine_code_of_nothing_else(method, least):
+    """The loop of explicit steps, and the books of dense output."""
     plain = "scene = scene.replace(observe=(refweb.Observe(name='d', quantity='displacement', reduce='max'),))"
-    names = machine_code(plain)
-    assert 30 < len(names) <= MANY, len(names)
-    assert not set(ABSENT) & {name.rpartition(".")[2] for name in names}
+    names = machine_code(plain, f"scene = scene.replace(solve=type(scene.solve)(duration=2e-3, method={method!r}))")
+    assert least < len(names) <= MANY, len(names)
+    called = {name.rpartition(".")[2] for name in names}
+    assert {"note_momentum", "book_energies"} <= called and not set(ABSENT) & called
 
 
 def test_a_check_has_no_machine_code_of_the_loop():

@@ -23,8 +23,8 @@ from typing import Any
 
 from ..errors import InputError, SolverError
 from ..messages import one_line, quote
-from ..threads import VARIABLES
 from .case import Outcome, solve
+from .threads import VARIABLES
 
 TRIES = 3
 """Number of workers that a job may kill before it is given up."""

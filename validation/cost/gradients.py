@@ -12,7 +12,7 @@ from __future__ import annotations
 import sys
 import time
 
-from refweb.threads import use_one
+from refweb.sweeps.threads import use_one
 
 use_one()
 

@@ -17,7 +17,7 @@ import subprocess
 import sys
 import time
 
-from refweb.threads import use_one
+from refweb.sweeps.threads import use_one
 
 use_one()
 

@@ -13,7 +13,7 @@ import sys
 import time
 from contextlib import contextmanager
 
-from refweb.threads import use_one
+from refweb.sweeps.threads import use_one
 
 use_one()
 

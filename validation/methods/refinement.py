@@ -15,7 +15,7 @@ import sys
 import time
 from dataclasses import replace
 
-from refweb.threads import use_one
+from refweb.sweeps.threads import use_one
 
 use_one()
 

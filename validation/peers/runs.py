@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refweb.threads import VARIABLES
+from refweb.sweeps.threads import VARIABLES
 
 ROOT = pathlib.Path(__file__).parents[2]
 PROGRAMS = pathlib.Path(__file__).parent / "programs"

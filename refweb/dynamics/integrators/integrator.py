@@ -128,7 +128,7 @@ class IntegratorState:
     @property
     def stopped(self) -> bool:
         """True if an event has ended the run."""
-        return bool(ended_by(self.events))
+        return len(self.events) > 0 and bool(ended_by(self.events))
 
     @property
     def drift(self) -> float:

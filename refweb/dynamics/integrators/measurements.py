@@ -127,7 +127,7 @@ class Measurements:
             first, third = piece.at(begin + quarter), piece.at(until - quarter)
             for part, sample in enumerate((first, middle, third, last), 1):
                 look_for_means(part, *self._state(sample), *rest)
-            left = np.array([open_share(w) for w in averages.within])
+            left = np.array([open_share.py_func(values) for values in averages.within.tolist()])
             pays = (left > SETTLED * np.abs(averages.within).max(axis=1)) & (left < PAYS * before)
             if halvings and pays.any():
                 todo += [

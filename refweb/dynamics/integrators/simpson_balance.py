@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...compiled.kernel import prepare
 from ...errors import EnergyDriftError, IntegrationError
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, Arrays, Functions
 from ...net.rotation import RigidRotations, more_kinetic
@@ -176,6 +177,8 @@ class SimpsonBalance:
         self._pushing = [terms[i] for i in self._outside.pushing]
         self._supported, self._fixed = system.supported, np.flatnonzero(system.fixed)
         self._axes = self._fixed % 3
+        has = (("turning", self._turns.moment), ("angular", self._outside.axes))
+        prepare([book_energies, open_balance, note_momentum], {name for name, of_it in has if len(of_it)})
 
     def rates(self, sample):
         """The `Rates` of a sample."""
@@ -260,7 +263,7 @@ class SimpsonBalance:
         t, x, v, system, total = sample.time, sample.x, sample.v, self.system, np.zeros(len(self.system.terms) + 3)
         if system.net.factors:
             self._lines[:] = system.line_data(t).matrix
-        book_energies(t, x, v, system.net.mass, self._turns, *self._terms, work, self._working, total)
+        book_energies.call(t, x, v, system.net.mass, self._turns, *self._terms, work, self._working, total)
         total[-3] = self.kinetic(t, x, v)
         total[-1] = step
         return total
@@ -271,14 +274,16 @@ class SimpsonBalance:
 
     def open(self, course, energies):
         """Note the energy and the momentum at the start of a course."""
-        open_balance(course.x, self._momenta(course.time, course.x, course.v), self._outside, course.ledger)
+        open_balance.call(course.x, self._momenta(course.time, course.x, course.v), self._outside, course.ledger)
         course.energy, stored = own_energies(energies, self.system)
         course.largest = max(stored, self.least_energy)
 
     def impulses(self, course, row):
         """Write momentum, impulse of the supports and of all else from outside [N s], held against each other."""
         momenta = self._momenta(course.time, course.x, course.v)
-        note_momentum(course.time, course.x, momenta, course.impulse, self._outside, course.ledger, self._still, row)
+        note_momentum.call(
+            course.time, course.x, momenta, course.impulse, self._outside, course.ledger, self._still, row
+        )
 
     def note_largest(self, course, energies):
         """Note the largest energy of a course."""

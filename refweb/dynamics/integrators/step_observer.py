@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from ...results.probes import Probe
     from ...system.system import System
     from .integrator import Sum
+    from .passages import Passages
 
 PATIENCE = 1000
 """Number of steps in turn of which a row would take more than `MAX_STEPS_PER_ROW`; at a start they are short."""
@@ -180,7 +181,7 @@ class StepObserver(Integrator):
         self._book = SimpsonBalance(system, self.hold, max(fast, self.atol_velocity / rtol), **even)
         self._measurements = Measurements(probes, sums, self._book)
         self._limits = StepLimits(system, self.rotations, lambda t: self.state(t, *self.interpolated(t))[0])
-        self._monitors = self._measurements, self._limits.passages
+        self._monitors: tuple[Measurements | Passages, ...] = self._measurements, self._limits.passages
         self._yielding = None
         if system.followers:
             from .yielding import Yielding
@@ -324,10 +325,15 @@ class StepObserver(Integrator):
         self._enter(course)
 
     def refined(self, by: float | None = None) -> Self:
-        """The method with tolerances that are ``by`` times as small, by default `TWIN_TOLERANCES`."""
+        """The method with tolerances that are ``by`` times as small, by default `TWIN_TOLERANCES`.
+
+        It does not look for passages: those of the first run are what a solution tells.
+        """
         (observed, keys), share = self._made_of, 1.0 / (TWIN_TOLERANCES if by is None else by)
         finer = {key: share * keys[key] for key in ("atol_position", "atol_velocity") if keys.get(key)}
-        return type(self)(*observed, **{**keys, **finer, "rtol": share * self.rtol})
+        method = type(self)(*observed, **{**keys, **finer, "rtol": share * self.rtol})
+        method._monitors = (method._measurements,)
+        return method
 
     def error_share(self, course: IntegratorState, finer: IntegratorState) -> float:
         """Error of a finer run over that of this one: it goes with the tolerance to the power 2/3 at order 2."""

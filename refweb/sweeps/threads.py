@@ -6,7 +6,7 @@ the same time by the clock. The sum of several threads differs in its last digit
 not depend on the machine.
 
 May change: `VARIABLES`, where a library brings another one. Must stay: nothing is imported that loads such a library,
-which reads its variable only once; `refweb.__main__`, `sweeps.workers`, tests and validation import both names. Tests:
+which reads its variable only once; `refweb.__main__`, `workers`, tests and validation import both names. Tests:
 ``tests/commands/test_cli.py``, ``tests/sweeps/test_workers.py``.
 """
 
