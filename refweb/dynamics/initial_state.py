@@ -75,13 +75,11 @@ def remarks_on(start, system):
     before = np.zeros((system.rows, 3)) if start.x is None else start.x
     driven = before.copy()
     system.drive(0.0, driven)
-    inner = [
-        (term.contact.with_lines, system.energy_of(term, 0.0, driven)) for term in system.terms if term.balance.internal
-    ]
+    inner = [term for term in system.terms if term.balance.internal]
     rounding = 1e-14 * max(np.ptp(system.net.points, axis=0).max(), np.abs(before).max())
     moved = np.flatnonzero((np.abs(driven - before) > rounding).any(axis=1))
     if len(moved):
-        stored = sum(energy.sum() for _, energy in inner)
+        stored = sum(system.energy_of(term, 0.0, driven).sum() for term in inner)
         by = "[[motion]]" if system.drives and not system.carried[moved[0]] else "[[attach]]"
         text = f"{by} has moved {system.row_name(moved[0])} at t = 0 already"
         for body in (body for body in system.net.bodies if body.fixed and moved[0] in body.carried):
@@ -95,7 +93,8 @@ def remarks_on(start, system):
         worst = int(off.argmax())
         text = f"node {worst} is held where the start has it, {off[worst]:.4g} m off its place in this scene"
         yield Finding("moved-at-start", text, "supports")
-    pushed = np.concatenate([np.zeros(0), *(energy for contact, energy in inner if contact)])
+    touching = [term for term in inner if term.contact.with_lines]
+    pushed = np.concatenate([np.zeros(0), *(system.energy_of(term, 0.0, driven) for term in touching)])
     if pushed.max(initial=0.0) > 0.0:
         line = system.net.line[int(pushed.argmax()) % len(system.net.line)]
         text = f"a body overlaps the web at the start, most at line {line}: contact starts with {pushed.sum():.4g} J"

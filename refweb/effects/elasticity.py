@@ -134,7 +134,8 @@ def force_by_blocks(law):
 
     It has the sums of `kernels` in the same order, in three loops over each block: over nodes, over elements, whose
     strains and tensions take all lanes of the processor as it has no branch, and over nodes. Elements that follow each
-    other often share their first node, whose force is not written in between.
+    other often share their first node, whose force is not written in between. To leave out the sums of blocks without
+    tension gains nothing: ahead of a wave tensions are tiny, but not 0.
     """
     stress = law.stress
 

@@ -1,9 +1,9 @@
 """Threads of libraries: one each, as far as nothing else is asked for.
 
 OpenBLAS takes all cores for the product of two vectors of more than 10 000 numbers. Its threads look for the next
-product in a loop before they sleep, so that a CVODE run of 10 167 unknowns takes 30 s of CPU time in place of 15, and
-the same time by the clock. The sum of several threads differs in its last digits with their number; that of one does
-not depend on the machine.
+product in a loop before they sleep: with one product in each evaluation, a CVODE run of 10 167 unknowns takes 30 s of
+CPU time in place of 15, and the same time by the clock. The sum of several threads differs in its last digits with
+their number; that of one does not depend on the machine.
 
 May change: `VARIABLES`, where a library brings another one. Must stay: nothing is imported that loads such a library,
 which reads its variable only once; `refweb.__main__`, `workers`, tests and validation import both names. Tests:
