@@ -24,7 +24,7 @@ from typing import Any
 from ..errors import InputError, SolverError
 from ..messages import one_line, quote
 from .case import Outcome, solve
-from .threads import VARIABLES
+from .threads import ONE_THREAD
 
 TRIES = 3
 """Number of workers that a job may kill before it is given up."""
@@ -75,7 +75,7 @@ class Processes:
 
         if self.pool is None:
             parent, self._alive = multiprocessing.Pipe(duplex=False)
-            options = {"initializer": _watch, "initargs": (parent,), "env": dict.fromkeys(VARIABLES, "1")}
+            options = {"initializer": _watch, "initargs": (parent,), "env": ONE_THREAD}
             self.pool = loky.ProcessPoolExecutor(self.parallel, **options)
         can_block = hasattr(signal, "pthread_sigmask")  # until `_watch` runs
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if can_block else None

@@ -345,12 +345,12 @@ def test_libraries_have_one_thread_unless_more_are_asked_for():
         import os, sys
         from refweb.__main__ import alone
         sys.argv[1:] = ["--version"]
-        before = len(os.listdir("/proc/self/task")) if os.path.isdir("/proc/self/task") else 1
+        count = lambda: len(os.listdir("/proc/self/task")) if os.path.isdir("/proc/self/task") else 1
+        before = count()
         assert not {"numpy"} & set(sys.modules) and alone() == 0
         import numpy
         numpy.ones(20_000) @ numpy.ones(20_000)
-        after = len(os.listdir("/proc/self/task")) if os.path.isdir("/proc/self/task") else 1
-        print(os.environ["OPENBLAS_NUM_THREADS"], os.environ["OMP_NUM_THREADS"], after - before)"""
+        print(os.environ["OPENBLAS_NUM_THREADS"], os.environ["OMP_NUM_THREADS"], count() - before)"""
     free = {name: value for name, value in os.environ.items() if not name.endswith("_THREADS")}
     for asked, words in ({}, "1 1 0"), ({"OMP_NUM_THREADS": "2"}, "1 2 "):
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env={**free, **asked})

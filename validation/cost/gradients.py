@@ -9,12 +9,13 @@ time, minimum of several runs, in one process with one thread.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 
-from refweb.sweeps.threads import use_one
+from refweb.sweeps.threads import ONE_THREAD
 
-use_one()
+os.environ |= ONE_THREAD
 
 import refweb  # noqa: E402
 

@@ -13,13 +13,14 @@ the counts of factorizations do not.
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
 
-from refweb.sweeps.threads import use_one
+from refweb.sweeps.threads import ONE_THREAD
 
-use_one()
+os.environ |= ONE_THREAD
 
 import numpy as np  # noqa: E402
 

@@ -9,13 +9,14 @@ minimum of several runs that alternate, in one process with one thread; with the
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from contextlib import contextmanager
 
-from refweb.sweeps.threads import use_one
+from refweb.sweeps.threads import ONE_THREAD
 
-use_one()
+os.environ |= ONE_THREAD
 
 import qdldl  # noqa: E402
 

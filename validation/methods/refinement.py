@@ -11,13 +11,14 @@ to the finest run of the same case. Order 1 with lumped mass is integrated by ce
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from dataclasses import replace
 
-from refweb.sweeps.threads import use_one
+from refweb.sweeps.threads import ONE_THREAD
 
-use_one()
+os.environ |= ONE_THREAD
 
 import numpy as np  # noqa: E402
 

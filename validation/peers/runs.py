@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refweb.sweeps.threads import VARIABLES
+from refweb.sweeps.threads import ONE_THREAD
 
 ROOT = pathlib.Path(__file__).parents[2]
 PROGRAMS = pathlib.Path(__file__).parent / "programs"
@@ -44,8 +44,7 @@ def machine(python=sys.executable, limit=300.0):
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     libraries = pathlib.Path(done.stdout.strip()).parent / "lib"
-    environment = dict(os.environ)
-    environment |= dict.fromkeys(VARIABLES, "1")
+    environment = {**os.environ, **ONE_THREAD}
     for name, folder in (("PYTHONPATH", ROOT), ("LD_LIBRARY_PATH", libraries)):
         environment[name] = os.pathsep.join(filter(None, (str(folder), os.environ.get(name))))
     return Machine(python, environment, limit)

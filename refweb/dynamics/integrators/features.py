@@ -2,11 +2,16 @@
 
 May change: how a feature is counted. Must stay: each name in ``apart`` of a kernel of the loop is a key here, and
 counts above 0 in every run that may call that kernel: a run ends where it calls one whose feature is missing. A new
-name stands in the list of the docstring as well. Tests: ``tests/test_pay_for_what_you_call.py``, by which a run has no
-kernel that it does not need.
+name stands in the list of the docstring as well; `of_balances`, which `simpson_balance` imports. Tests:
+``tests/test_pay_for_what_you_call.py``, by which a run has no kernel that it does not need.
 """
 
 from __future__ import annotations
+
+
+def of_balances(turns, outside):
+    """Names of those that balances of energy and momentum ask for, a set: ``turning`` and ``angular``."""
+    return {name for name, counted in (("turning", turns.moment), ("angular", outside.axes)) if len(counted)}
 
 
 def features(scheme, model, observed, events):
@@ -33,7 +38,6 @@ def features(scheme, model, observed, events):
         "averages": len(windows.slots),
         "looks": len(observed.followed) + len(observed.sums) + len(windows.slots),
         "events": len(events),
-        "turning": len(inertia.turns.moment),
         "carried": len(inertia.turns.carried),
         "driven": len(inertia.driven) + len(model.motions.kernels) + (model.lengths.growth >= 0),
         "lengths": len(model.lengths.elements),
@@ -47,7 +51,6 @@ def features(scheme, model, observed, events):
         "pushing": len(outside.pushing),
         "damped": len(outside.damped),
         "booked": len(terms.powers) + len(model.lengths.elements) + len(outside.pushing),
-        "angular": len(outside.axes),
         "near": len(model.nearby.terms),
         "pairs": len(model.nearby.at),
         "ccd": len(model.ccd.checks),
@@ -55,4 +58,4 @@ def features(scheme, model, observed, events):
         "body_ccd": model.ccd.bodies,
         "contacts": len(model.contacts.terms),
     }
-    return {name for name, count in has.items() if count}
+    return {name for name, count in has.items() if count} | of_balances(inertia.turns, outside)

@@ -127,7 +127,8 @@ class Measurements:
             first, third = piece.at(begin + quarter), piece.at(until - quarter)
             for part, sample in enumerate((first, middle, third, last), 1):
                 look_for_means(part, *self._state(sample), *rest)
-            left = np.array([open_share.py_func(values) for values in averages.within.tolist()])
+            shares = map(open_share.py_func, averages.within.tolist())  # a few sums, not worth an entry of machine code
+            left = np.array(list(shares))
             pays = (left > SETTLED * np.abs(averages.within).max(axis=1)) & (left < PAYS * before)
             if halvings and pays.any():
                 todo += [

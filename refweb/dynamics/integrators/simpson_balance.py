@@ -30,6 +30,7 @@ from ...errors import EnergyDriftError, IntegrationError
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, Arrays, Functions
 from ...net.rotation import RigidRotations, more_kinetic
 from .energy_balance import DRIFT, book_energies, drifts_away, least_energy, no_energy, own_energies
+from .features import of_balances
 from .momentum_balance import Outside, note_momentum, open_balance
 
 UNEVEN = 1e-3
@@ -177,8 +178,7 @@ class SimpsonBalance:
         self._pushing = [terms[i] for i in self._outside.pushing]
         self._supported, self._fixed = system.supported, np.flatnonzero(system.fixed)
         self._axes = self._fixed % 3
-        has = (("turning", self._turns.moment), ("angular", self._outside.axes))
-        prepare([book_energies, open_balance, note_momentum], {name for name, of_it in has if len(of_it)})
+        prepare([book_energies, open_balance, note_momentum], of_balances(self._turns, self._outside))
 
     def rates(self, sample):
         """The `Rates` of a sample."""
