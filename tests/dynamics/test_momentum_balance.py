@@ -256,7 +256,7 @@ def test_a_kernel_that_gives_too_much(method, monkeypatch):
 def test_steps_that_pass_over_a_pulse(method, monkeypatch):
     """Steps that know of no corners miss it whole, with its work: no other book sees that."""
     monkeypatch.setattr(System, "corners", np.zeros(0))
-    monkeypatch.setattr(StepLimits, "stop", lambda self, t, x, v, end: np.inf)
+    monkeypatch.setattr(StepLimits, "stop", lambda self, t, x, v, end, step: np.inf)
     with pytest.raises(EnergyDriftError, match="momentum drift (1|0.[1-9])"):
         refweb.run(scene(method, pulse(1e-8)))
 

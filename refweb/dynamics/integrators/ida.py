@@ -320,13 +320,13 @@ class Ida(Sundials):
 
     def _one_step(self, stop, end):
         try:
-            reached = self._solution(end, "onestep", float(stop) if np.isfinite(stop) else None)
+            reached = super()._one_step(stop, end)
         except Stopped:
             self._refuse_adrift()
             raise
         if self._massless or self._links:
-            self._inspect(reached.t, reached.y, reached.yp)
-        return float(reached.t)
+            self._inspect(reached, self._end.y, self._end.yp)
+        return reached
 
     def _inspect(self, t, y, yp):
         """Check the end of a step: positions of nodes without mass, and errors of the lengths of links."""

@@ -300,29 +300,37 @@ def note_momentum(
 
     ``support`` is the impulse of the supports, ``floor`` the momentum that a drift is held against at least.
     """
-    now, size = np.zeros(3), floor + outside.rounding * t / CLOSURE
+    size = floor + outside.rounding * t / CLOSURE
     moving = size
+    for k in range(3):
+        row[k] = 0.0
     impulse_until(t, x, outside, row[6:])
     for r in range(outside.mass.size):
         for k in range(3):
-            now[k] += p[r, k]
+            row[k] += p[r, k]
             moving += abs(p[r, k])
     for r in range(outside.inverse_reach.size):
         for k in range(3):
             moving += outside.inverse_reach[r] * abs(p[outside.mass.size + r, k])
     left = 0.0
     for k in range(3):
-        row[k], row[3 + k] = now[k], support[k]
+        row[3 + k] = support[k]
         row[6 + k] += ledger.pushed[k] - ledger.given[k]
         moving += abs(row[3 + k]) + abs(row[6 + k])
-        left = max(left, abs(now[k] - ledger.first[0, k] - row[3 + k] - row[6 + k]))
+        left = max(left, abs(row[k] - ledger.first[0, k] - row[3 + k] - row[6 + k]))
     ledger.left[0], ledger.largest[0] = max(ledger.left[0], left), max(ledger.largest[0], moving)
     if outside.axes.shape[0]:
-        total, far = turning(x, p, outside, now)
-        left = 0.0
-        for n in range(outside.axes.shape[0]):
-            left = max(left, abs(now[n] - ledger.first[1, n]))
-        ledger.left[1], ledger.largest[1] = max(ledger.left[1], left), max(ledger.largest[1], total + far * size)
+        note_turning(x, p, outside, ledger, size)
+
+
+@kernel(apart=("angular",))
+def note_turning(x: Matrix, p: Matrix, outside: Outside, ledger: MomentumBalance, size: float) -> None:
+    """Hold the angular momentum of momenta ``p`` against the book; a drift of ``size`` is not counted [N s]."""
+    now, left = np.zeros(3), 0.0
+    total, far = turning(x, p, outside, now)
+    for n in range(outside.axes.shape[0]):
+        left = max(left, abs(now[n] - ledger.first[1, n]))
+    ledger.left[1], ledger.largest[1] = max(ledger.left[1], left), max(ledger.largest[1], total + far * size)
 
 
 def refuse_open_momentum(course, limit, remedy):

@@ -16,6 +16,9 @@ import numpy as np
 from .integrator import SAME
 from .passages import TRAVEL, Passages
 
+GROWTH = 10.0
+"""Largest size of a step over that of the last one, as SUNDIALS allows it behind a first step."""
+
 
 class StepLimits:
     """The limits of steps of one system.
@@ -50,16 +53,21 @@ class StepLimits:
         at = np.searchsorted(self._corners, t * (1.0 - SAME))
         return at < len(self._corners) and bool(self._corners[at] <= t * (1.0 + SAME))
 
-    def stop(self, t, x, v, end):
-        """Time that a step from a state must not pass, on the way to ``end`` [s]; infinite where nothing limits it."""
+    def stop(self, t, x, v, end, step=0.0):
+        """Time that a step from a state must not pass, on the way to ``end`` [s]; infinite where nothing limits it.
+
+        Distances from bodies are left out where `GROWTH` times the last ``step`` [s] passes through no body: to find
+        them takes 0.1 ms in hexagon-impact.
+        """
         ahead = np.searchsorted(self._corners, t * (1.0 + SAME), side="right")
         stop = self._corners[ahead] if ahead < len(self._corners) else np.inf
         if np.isfinite(self._thickness):
-            moving, gap = v[: self._moving], self._gap(x)
-            speed = math.sqrt(np.einsum("ij,ij->i", moving, moving).max())
+            moving, path = v[: self._moving], TRAVEL * self._thickness
+            speed = 2.0 * math.sqrt(np.einsum("ij,ij->i", moving, moving).max())
             if self._rotations:
-                speed = max(speed, self._rotations.speed(x, v))
-            speed, path = 2.0 * speed, max(TRAVEL * self._thickness, 0.5 * gap)
+                speed = max(speed, 2.0 * self._rotations.speed(x, v))
+            if path < GROWTH * step * speed or not step > 0.0:
+                path = max(path, 0.5 * self._gap(x))
             stop = min(stop, t + path / speed) if speed > 0.0 else stop
         stop = min(stop, t + self.passages.soon(x, v))
         return t + SAME * end if stop - t < SAME * end else stop

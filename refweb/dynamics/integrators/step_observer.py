@@ -23,6 +23,7 @@ import numpy as np
 
 from ...effects.base import refuse_flows
 from ...errors import InputError, IntegrationError
+from ...kernels import kernel
 from ...system.mass import refuse_massless
 from .energy_balance import DRIFT, refuse_open
 from .events import event_rows, search
@@ -53,6 +54,13 @@ their natural lengths change: the energy that they lose depends on the path."""
 TWIN_TOLERANCES = 10.0
 """Tolerances of a run over those of its twin: by less, both may take the same steps, which are changed by factors of
 up to 2."""
+
+
+@kernel(leaf=True)
+def fill_free(x, v, free, all_x, all_v):
+    """Put displacements and velocities of the unknowns to their places; numpy takes three times as long for them."""
+    for n in range(free.size):
+        all_x[free[n]], all_v[free[n]] = x[n], v[n]
 
 
 class Stopped(Exception):
@@ -243,7 +251,7 @@ class StepObserver(Integrator):
         """Displacement [m] and velocity [m/s] of all rows, shape (rows, 3), for those of the unknowns."""
         system = self.system
         all_x, all_v = self._reference.copy(), np.zeros((system.rows, 3))
-        all_x.ravel()[system.free], all_v.ravel()[system.free] = x, v
+        fill_free(x, v, system.free, all_x.ravel(), all_v.ravel())
         system.drive(t, all_x, all_v)
         return all_x, all_v
 
@@ -382,7 +390,7 @@ class StepObserver(Integrator):
     def _take_step(self, course: ObservedState, end):
         """Take a step of the method, not beyond a corner of a table, nor further than a body can be passed."""
         turned = self._yielding is not None and self._yielding.turned_back()
-        stop = self._limits.stop(course.time, course.x, course.v, end)
+        stop = self._limits.stop(course.time, course.x, course.v, end, course.step)
         ahead = max(end, course.time + 1e-3 * end)  # from a corner it may be too near for a first step to be chosen
         if turned or self.restarts and course.nsteps and self._limits.at_corner(course.time):
             self._enter(course)  # and the first step is chosen whatever the rows are

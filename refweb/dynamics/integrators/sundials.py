@@ -199,7 +199,7 @@ class Sundials(StepObserver):
         options = dict(max_order=self.max_order, rtol=self.rtol, max_num_steps=10_000_000, **self.linear_options())
         with _heard(), _quiet():
             self._solver = self._made(**options)
-            _checked(self._solver.init_step(t, *self._initial(t, x, v)))
+            self._end = _checked(self._solver.init_step(t, *self._initial(t, x, v)))
         self._reached, self._unready = t, self.linear_solver == "sparse"
         if self._unready:  # SUNDIALS cannot free what SuperLU_MT has not factorized yet: a run may end before that
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._solver))
@@ -218,11 +218,12 @@ class Sundials(StepObserver):
 
     def _one_step(self, stop, end):
         """Take a step; return its time."""
-        return float(self._solution(end, "onestep", float(stop) if np.isfinite(stop) else None).t)
+        self._end = _checked(self._solver.step(end, "onestep", float(stop) if np.isfinite(stop) else None))
+        return float(self._end.t)
 
-    def _solution(self, t, mode="normal", stop=None):
-        """Solution of the solver at a time, or at the end of a step towards it."""
-        return _checked(self._solver.step(t, mode, stop))
+    def _solution(self, t):
+        """Solution of the solver at a time within the last step, or at its end."""
+        return self._end if t == self._end.t else _checked(self._solver.step(t))
 
 
 class Symmetric(Factor):

@@ -99,7 +99,10 @@ def test_limits_of_steps():
         x, v = np.zeros((2, system.rows, 3))
         assert StepLimits(system).stop(0.0, x, v, 1.0) == np.inf
         v[3] = 0.0, 3.0, 4.0
-        assert StepLimits(system).stop(0.25, x, v, 1.0) == pytest.approx(0.25 + way / 10.0, rel=1e-12)
+        for step in (0.0, 1.0):
+            assert StepLimits(system).stop(0.25, x, v, 1.0, step) == pytest.approx(0.25 + way / 10.0, rel=1e-12)
+        near = 0.25 + TRAVEL * 0.05 / 10.0  # far enough for a step that may be ten times the last one
+        assert StepLimits(system).stop(0.25, x, v, 1.0, 1e-5) == pytest.approx(near, rel=1e-12)
 
 
 @pytest.mark.parametrize("method, keys", [(Cvode, {"family": "adams", "max_order": 5}), (Ida, {"max_order": 3})])
