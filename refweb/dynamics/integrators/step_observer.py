@@ -53,7 +53,8 @@ HALVINGS, HALVINGS_BY_PATH = 8, 14
 their natural lengths change: the energy that they lose depends on the path."""
 TWIN_TOLERANCES = 10.0
 """Tolerances of a run over those of its twin: by less, both may take the same steps, which are changed by factors of
-up to 2."""
+up to 2. By 5, runs with a twin by BDF cost 15 % less, and of 1059 results of random impacts, oscillators and nets one
+is off by 1.3 times ±; by 4, of 36 results by IDA with rtol = 1e-6 three are, by up to 5.5 times. By 10 none is."""
 
 
 @kernel(leaf=True)
