@@ -217,8 +217,9 @@ class Runs:
                 self._table.add(row)
             before = f", {self.recorded} recorded before" if self.recorded else ""
             unfinished -= 1
-            left, most = self.problem.sizing.runs - len(self.asked) + unfinished, self.problem.sizing.runs
-            self.tell(f"{self.fresh} runs{before}, at most {left} left", 1.0 - left / most)
+            limit = self.problem.sizing.runs
+            left = limit - len(self.asked) + unfinished
+            self.tell(f"{self.fresh} runs{before}, at most {left} left", 1.0 - left / limit)
 
     def _judge(self, design, cases):
         """The `Judged` of a design."""

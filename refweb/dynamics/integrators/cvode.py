@@ -32,7 +32,11 @@ from .sundials import Sundials, Symmetric
 SHORT = 1.0
 """γω of a step up to which corrector iterations are cheaper without any factorization."""
 STILL = 1e-3
-"""Displacement by accelerations within a step, over the tolerance, below which no system is solved."""
+"""Displacement by accelerations within a step, over the tolerance, below which nothing moves: no system is solved."""
+SUDDEN, ATTEMPTS = 1e3, 6
+"""Growth of the largest acceleration from one set-up to the next that shows a first contact, and how often a long step
+into it is tried without a matrix: iterations do not converge, and the step becomes a quarter as long at once. A step
+with the matrix of its length converges, has too large an error, and is shortened as well."""
 RENEWED = 50
 """Evaluations of forces after which ω is estimated again."""
 
@@ -86,6 +90,7 @@ class Cvode(Sundials):
         if self._sparing:
             self.choice += f"; none where a step is short, γω ≤ {SHORT:g}"
         self._gamma, self._plain, self._set_up_at, self._due = None, False, None, 0
+        self._rest, self._tried = np.inf, 0  # largest acceleration at the last set-up at rest, and attempts since then
         self._factored = None  # γ of the factors, None where these are of another tangent
         if self._consistent:
             self._mass_values = system.mass.values.copy()
@@ -133,9 +138,16 @@ class Cvode(Sundials):
     def set_up(self, t, y, yp, jok, jnew, gamma):
         """Factorize M + γC + γ²K; K and C are kept where CVODE allows."""
         may = self._sparing and not (self._plain and t == self._set_up_at)  # else iterations have not converged
-        known, self._still = self._gamma is not None, may and self._nothing_moves(yp, gamma)
+        largest = np.abs(yp[self.unknowns :]).max(initial=0.0) if may else np.inf
+        known, self._still = self._gamma is not None, gamma * gamma * largest <= STILL * self.atol_position
         self._plain = known and may and self._short(gamma)
         jnew[0] = 0
+        if self._still:
+            self._rest, self._tried = largest, 0
+        elif known and may and not self._plain and largest > SUDDEN * self._rest and self._tried < ATTEMPTS:
+            self._tried += 1
+            self._gamma, self._set_up_at, self._plain, jnew[0] = gamma, t, True, 1  # the step is shortened at once
+            return
         if not known or not jok and not (self._plain and self.stats["nfev"] < self._due):
             self._stiffness, self._damping = self._tangent(t, y)
             self._factored = None
@@ -149,12 +161,8 @@ class Cvode(Sundials):
             self._factorize_step(gamma)
             self._factored = None if self.system.net.flows else gamma
 
-    def _nothing_moves(self, yp, gamma):
-        """Tell if accelerations change nothing within a step beyond the tolerance, as before a first contact."""
-        return gamma * gamma * np.abs(yp[self.unknowns :]).max(initial=0.0) <= STILL * self.atol_position
-
     def _short(self, gamma):
-        """Tell if corrector iterations converge well without a matrix, by a bound on γ|J| where anything moves."""
+        """Tell if nothing moves, or corrector iterations converge well without a matrix, by a bound on γ|J|."""
         if self._still:
             return True
 

@@ -312,6 +312,20 @@ def test_long_steps_are_factorized():
     assert solver.stats["nfev"] < 3 * run.nsteps
 
 
+def test_a_first_contact_asks_for_no_matrix():
+    """A web at rest that a ball meets within a long step, beside a run that factorizes each step."""
+    ball = refweb.Body(name="ball", radius=0.1, mass=1.0, position=(0.01, 0.02, -0.11), velocity=(0.0, 0.0, 2.0))
+    ends, runs = [0.02], {}
+    for name in ("auto", "block"):
+        system = small([ball, refweb.Contact(stiffness=1e4)], size=8)
+        runs[name] = ran(system, ends, rtol=1e-6, linear_solver=name)
+    (solver, run, _), (other, beside, _) = runs["auto"], runs["block"]
+    assert solver.stats["nlu"] == 0 < other.stats["nlu"]
+    assert solver.stats["nfev"] < 1.2 * other.stats["nfev"]
+    way = np.abs(beside.x[:-1]).max()
+    assert way > 1e-3 and np.abs(run.x - beside.x)[:-1].max() < 1e-3 * way  # each is off by (1e-6)^(2/3) for 1e-4
+
+
 # Books
 
 GRAVITY = (0.5, 0.0, -9.81)
