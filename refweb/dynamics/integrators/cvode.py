@@ -14,11 +14,11 @@ A run of 464 steps of BDF on the square web of 3120 lines, 0.7 s, takes 0.20 s f
 factorizations, 0.07 s for forces, 0.17 s within SUNDIALS, and 0.19 s for what is observed in the middle and at the end
 of each step. The last factors are kept where CVODE asks for them anew and nothing has changed, a third of all times.
 
-May change: `SHORT`, `STILL` and `RENEWED`, which change cost and digits within the tolerance. Must stay: arguments of
-`set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which sksundae calls them; `precondition`
-uses the factors of the last `set_up` with another γ or tangent; the Jacobian is the derivative of `right_side`. Keys of
-``[solve]`` are those of `registry.INTEGRATORS`. Must stay as well: public names of `Cvode`, which other files use.
-Tests: ``tests/dynamics/integrators/test_cvode.py``.
+May change: `SHORT`, `STILL`, `SUDDEN`, `ATTEMPTS` and `RENEWED`, which change cost and digits within the tolerance.
+Must stay: arguments of `set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which sksundae calls
+them; `precondition` uses the factors of the last `set_up` with another γ or tangent; the Jacobian is the derivative of
+`right_side`. Keys of ``[solve]`` are those of `registry.INTEGRATORS`. Must stay as well: public names of `Cvode`, which
+other files use. Tests: ``tests/dynamics/integrators/test_cvode.py``.
 """
 
 from __future__ import annotations

@@ -325,7 +325,7 @@ def note_momentum(
 
 @kernel(apart=("angular",))
 def note_turning(x: Matrix, p: Matrix, outside: Outside, ledger: MomentumBalance, size: float) -> None:
-    """Hold the angular momentum of momenta ``p`` against the book; a drift of ``size`` is not counted [N s]."""
+    """Hold the angular momentum of momenta ``p`` against the book, and a drift against that of ``size`` at least."""
     now, left = np.zeros(3), 0.0
     total, far = turning(x, p, outside, now)
     for n in range(outside.axes.shape[0]):

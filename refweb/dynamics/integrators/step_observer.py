@@ -251,6 +251,8 @@ class StepObserver(Integrator):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Displacement [m] and velocity [m/s] of all rows, shape (rows, 3), for those of the unknowns."""
         system = self.system
+        if not len(x) == len(v) == self.unknowns:
+            raise ValueError(f"{len(x)} displacements and {len(v)} velocities for {self.unknowns} unknowns")
         all_x, all_v = self._reference.copy(), np.zeros((system.rows, 3))
         fill_free(x, v, system.free, all_x.ravel(), all_v.ravel())
         system.drive(t, all_x, all_v)

@@ -105,6 +105,17 @@ def test_limits_of_steps():
         assert StepLimits(system).stop(0.25, x, v, 1.0, 1e-5) == pytest.approx(near, rel=1e-12)
 
 
+def test_a_state_has_all_unknowns():
+    """Vectors of another length, as an integrator of one's own may give them, are refused."""
+    solver = Cvode(built([]))
+    unknown = np.ones(solver.unknowns)
+    solver.start()
+    assert all(rows.sum() == solver.unknowns for rows in solver.state(0.0, unknown, unknown))
+    for x, v in ((unknown[:-1], unknown), (unknown, np.ones(1))):
+        with pytest.raises(ValueError, match=f"for {solver.unknowns} unknowns"):
+            solver.state(0.0, x, v)
+
+
 @pytest.mark.parametrize("method, keys", [(Cvode, {"family": "adams", "max_order": 5}), (Ida, {"max_order": 3})])
 def test_a_finer_run_is_of_the_same(method, keys):
     """All that was asked for but the tolerances, which are a tenth, or what is said, of those that were given."""
