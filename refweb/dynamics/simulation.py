@@ -457,6 +457,8 @@ class Simulation:
         if self._half_turns:
             yield Finding("half-turn", self._half_turns, "thread")
         yield from self.system.remarks()
+        if self.system.net.flows:
+            yield from self.system.material_flow.remarks()
         if self.overlaps is not None:
             yield from self.overlaps.remarks()
         if self._through is not None:

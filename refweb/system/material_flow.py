@@ -13,6 +13,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
+from ..findings import Finding
+
+HEAVY = 1e3
+"""Mass of a drum over that of the lines of its reel from which on it moves as if nothing were reeled."""
 
 
 class MaterialFlow:
@@ -61,6 +65,23 @@ class MaterialFlow:
         self._free = ~system.supported[self._rows]
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)])
         self._driven = np.isin(self._rows, driven)
+
+    def remarks(self):
+        """Findings on drums and rings that are free to move, see `refweb.effects.mass_flow`."""
+        system, heavy = self._system, self._net.mass.copy()
+        for body in self._net.bodies:
+            heavy[list(body.carried)] = np.inf if body.fixed else self._net.mass[body.row]
+        heavy[system.supported.all(axis=1) & ~system.carried] = np.inf
+        flowing = np.inf if self._wound else sum(flow.mass.sum() for flow in self.flows)
+        free = [int(row) for row in np.unique(self._drums) if heavy[row] < np.inf and HEAVY * flowing > heavy[row]]
+        if free:
+            name = system.row_name(free[0])
+            text = (
+                f'mass = "follows": the drum or ring at {name} is free to move. Where lines turn, angular momentum is '
+                "off by up to the share of the mass that comes or goes, which ± does not contain: hold the drum, make "
+                'it far heavier than the lines, or give mass = "stays"'
+            )
+            yield Finding("drum-moves", text, "winch" if self._wound else "reel")
 
     def shares(self, t):
         """Mass of each row of each flow of a reel at time t [kg], shape (cells,)."""

@@ -411,6 +411,25 @@ def test_lines_that_may_break_are_refused(rupture):
         paid_out(solve={"kind": "dynamic", "duration": 1.0}, rupture=rupture).build()
 
 
+@pytest.mark.parametrize("held, mass", [(True, 5.0), (False, 5.0), (False, 1e12)])
+def test_a_drum_that_is_free_to_move_is_told(held, mass):
+    """A tether that turns keeps its angular momentum but for what leaves at its drum: masses at nodes miss that."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[-5, 0, 0], [5, 0, 0]], lines=[[0, 1]], supports=[0] if held else []),
+        cable=refweb.Cable(law="tension-only", modulus=1e8, area=1e-4, density=1e4),
+        effects=[
+            refweb.PointMass(node=0, mass=mass),
+            refweb.PointMass(node=1, mass=5.0),
+            refweb.Velocity(node="all" if not held else 1, spin=(0.0, 0.0, 1.0)),
+            refweb.Reel(lines="all", factor=[(0.0, 1.0), (20.0, 0.5)], mass="follows", drum=0),
+        ],
+        observe=[refweb.Observe(name="span", quantity="distance", node=(0, 1))],
+        solve=refweb.Dynamic(duration=0.5),
+    )
+    told = [finding.text for finding in refweb.run(scene).findings if finding.code == "drum-moves"]
+    assert not told if held or mass > 1e4 else "node 0 is free to move" in told[0]
+
+
 def test_shipped_tether():
     """Angular momentum about the drum by the places and masses of the end; damping along the line has no moment."""
     solution = refweb.run(refweb.Scene.load("reeled-tether").replace(accuracy=refweb.Accuracy(error="none")))
