@@ -136,7 +136,7 @@ class DissipatedEnergy(Booked):
 
 
 class TotalEnergy(Booked):
-    """Sum of stored energies, in dynamics with the kinetic energy."""
+    """Sum of stored energies and of what winches and lines that yield or break have taken, with the kinetic energy."""
 
     def on(self, system: System) -> None:
         """Refuse energies by place in it with masses that follow."""
