@@ -208,7 +208,7 @@ class Runs:
             job_of(base, case._replace(values=settings), local, task=task)
             for case, base, (task, settings) in missing.values()
         ]
-        single, unfinished = local and len(jobs) == 1, len(jobs)
+        single, left = local and len(jobs) == 1, self.problem.sizing.runs - len(self.asked) + len(jobs)
         for outcome in map(solve, jobs) if single else through(jobs, self.crew, last=False) if jobs else ():
             row = {"case": outcome.key, **missing[outcome.key][0].values, **outcome.cells}
             self.rows[outcome.key] = row
@@ -216,10 +216,8 @@ class Runs:
             if self._table is not None:
                 self._table.add(row)
             before = f", {self.recorded} recorded before" if self.recorded else ""
-            unfinished -= 1
-            limit = self.problem.sizing.runs
-            left = limit - len(self.asked) + unfinished
-            self.tell(f"{self.fresh} runs{before}, at most {left} left", 1.0 - left / limit)
+            left -= 1
+            self.tell(f"{self.fresh} runs{before}, at most {left} left", 1.0 - left / self.problem.sizing.runs)
 
     def _judge(self, design, cases):
         """The `Judged` of a design."""

@@ -7,8 +7,7 @@ their number; that of one does not depend on the machine.
 
 May change: `ONE_THREAD`, where a library brings another variable. Must stay: nothing is imported that loads such a
 library, which reads its variable only once; both names, which `refweb.__main__`, `workers`, tests and validation
-import. Tests:
-``tests/commands/test_cli.py``, ``tests/sweeps/test_workers.py``.
+import. Tests: ``tests/commands/test_cli.py``, ``tests/sweeps/test_workers.py``.
 """
 
 from __future__ import annotations

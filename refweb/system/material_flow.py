@@ -68,14 +68,14 @@ class MaterialFlow:
 
     def remarks(self):
         """Findings on drums and rings that are free to move, see `refweb.effects.mass_flow`."""
-        system, heavy = self._system, self._net.mass.copy()
+        mass, flowing = self._net.mass.copy(), sum(flow.mass.sum() for flow in self.flows)
+        mass[self._system.fixed.all(axis=1)] = np.inf
         for body in self._net.bodies:
-            heavy[list(body.carried)] = np.inf if body.fixed else self._net.mass[body.row]
-        heavy[system.supported.all(axis=1) & ~system.carried] = np.inf
-        flowing = np.inf if self._wound else sum(flow.mass.sum() for flow in self.flows)
-        free = [int(row) for row in np.unique(self._drums) if heavy[row] < np.inf and HEAVY * flowing > heavy[row]]
-        if free:
-            name = system.row_name(free[0])
+            mass[list(body.carried)] = np.inf if body.prescribed else max(self._net.mass[body.row], body.mass)
+        drums = np.unique(self._drums)
+        free = drums[mass[drums] < (np.inf if self._wound else HEAVY * flowing)]
+        if len(free):
+            name = self._system.row_name(free[0])
             text = (
                 f'mass = "follows": the drum or ring at {name} is free to move. Where lines turn, angular momentum is '
                 "off by up to the share of the mass that comes or goes, which ± does not contain: hold the drum, make "

@@ -430,6 +430,27 @@ def test_a_drum_that_is_free_to_move_is_told(held, mass):
     assert not told if held or mass > 1e4 else "node 0 is free to move" in told[0]
 
 
+@pytest.mark.parametrize(
+    "body, moved, told",
+    [({"mass": 5.0}, False, True), ({"mass": 1e7}, False, False), ({"fixed": True}, False, False), ({}, True, False)],
+)
+def test_a_drum_on_a_body_that_is_free_to_move_is_told(body, moved, told):
+    """A body that is fixed, moved or heavy takes no notice of what the drum pulls."""
+    motion = [refweb.Motion(body="ship", displacement=[(0, 0, 0, 0), (1, 0.1, 0, 0)])] if moved else []
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[-5, 0, 0], [5, 0, 0]], lines=[[0, 1]], supports=[]),
+        cable=refweb.Cable(law="tension-only", modulus=1e8, area=1e-4, density=1e4),
+        effects=[
+            refweb.Body(name="ship", radius=0.1, position=(-5.1, 0, 0), **body),
+            refweb.Attach(body="ship", node=0),
+            refweb.Reel(lines="all", factor=[(0.0, 1.0), (20.0, 0.5)], mass="follows", drum=0),
+            *motion,
+        ],
+        solve=refweb.Dynamic(duration=0.05),
+    )
+    assert told == any(finding.code == "drum-moves" for finding in refweb.run(scene).findings)
+
+
 def test_shipped_tether():
     """Angular momentum about the drum by the places and masses of the end; damping along the line has no moment."""
     solution = refweb.run(refweb.Scene.load("reeled-tether").replace(accuracy=refweb.Accuracy(error="none")))

@@ -144,7 +144,7 @@ class Cvode(Sundials):
         jnew[0] = 0
         if self._still:
             self._rest, self._tried = largest, 0
-        elif known and may and not self._plain and largest > SUDDEN * self._rest and self._tried < ATTEMPTS:
+        elif may and not self._plain and largest > SUDDEN * self._rest and self._tried < ATTEMPTS:
             self._tried += 1
             self._gamma, self._set_up_at, self._plain, jnew[0] = gamma, t, True, 1  # the step is shortened at once
             return

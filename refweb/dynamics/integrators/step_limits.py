@@ -62,10 +62,11 @@ class StepLimits:
         ahead = np.searchsorted(self._corners, t * (1.0 + SAME), side="right")
         stop = self._corners[ahead] if ahead < len(self._corners) else np.inf
         if np.isfinite(self._thickness):
-            moving, path = v[: self._moving], TRAVEL * self._thickness
-            speed = 2.0 * math.sqrt(np.einsum("ij,ij->i", moving, moving).max())
+            moving = v[: self._moving]
+            speed = math.sqrt(np.einsum("ij,ij->i", moving, moving).max())
             if self._rotations:
-                speed = max(speed, 2.0 * self._rotations.speed(x, v))
+                speed = max(speed, self._rotations.speed(x, v))
+            speed, path = 2.0 * speed, TRAVEL * self._thickness
             if path < GROWTH * step * speed or not step > 0.0:
                 path = max(path, 0.5 * self._gap(x))
             stop = min(stop, t + path / speed) if speed > 0.0 else stop
