@@ -14,7 +14,7 @@ A run of 464 steps of BDF on the square web of 3120 lines, 0.7 s, takes 0.20 s f
 factorizations, 0.07 s for forces, 0.17 s within SUNDIALS, and 0.19 s for what is observed in the middle and at the end
 of each step. The last factors are kept where CVODE asks for them anew and nothing has changed, a third of all times.
 
-May change: `SHORT`, `STILL`, `SUDDEN`, `ATTEMPTS` and `RENEWED`, which change cost and digits within the tolerance.
+May change: `SHORT`, `STILL`, `SUDDEN`, `FAR`, `ATTEMPTS` and `RENEWED`, which change cost and digits within the tolerance.
 Must stay: arguments of `set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which sksundae calls
 them; `precondition` uses the factors of the last `set_up` with another γ or tangent; the Jacobian is the derivative of
 `right_side`. Keys of ``[solve]`` are those of `registry.INTEGRATORS`. Must stay as well: public names of `Cvode`, which
@@ -33,10 +33,12 @@ SHORT = 1.0
 """γω of a step up to which corrector iterations are cheaper without any factorization."""
 STILL = 1e-3
 """Displacement by accelerations within a step, over the tolerance, below which nothing moves: no system is solved."""
-SUDDEN, ATTEMPTS = 1e3, 6
-"""Growth of the largest acceleration from one set-up to the next that shows a first contact, and how often a long step
-into it is tried without a matrix: iterations do not converge, and the step becomes a quarter as long at once. A step
-with the matrix of its length converges, has too large an error, and is shortened as well."""
+SUDDEN, FAR, ATTEMPTS = 1e3, 1e4, 6
+"""Growth of the largest acceleration from rest to the next set-up that shows a first contact, displacement by it within
+the step over the tolerance, and how often a long step into it is tried without a matrix: iterations do not converge,
+and the step becomes a quarter as long at once. A step with the matrix of its length converges, has too large an error,
+and is shortened as well. That displacement is 7e3 to 1e11 tolerances in first contacts of balls with nets, and up to
+540 where a flat net begins to move by itself, whose steps must stay long."""
 RENEWED = 50
 """Evaluations of forces after which ω is estimated again."""
 
@@ -139,12 +141,13 @@ class Cvode(Sundials):
         """Factorize M + γC + γ²K; K and C are kept where CVODE allows."""
         may = self._sparing and not (self._plain and t == self._set_up_at)  # else iterations have not converged
         largest = np.abs(yp[self.unknowns :]).max(initial=0.0) if may else np.inf
-        known, self._still = self._gamma is not None, gamma * gamma * largest <= STILL * self.atol_position
+        known, way, tolerance = self._gamma is not None, gamma * gamma * largest, self.atol_position
+        self._still = way <= STILL * tolerance
         self._plain = known and may and self._short(gamma)
         jnew[0] = 0
         if self._still:
             self._rest, self._tried = largest, 0
-        elif may and not self._plain and largest > SUDDEN * self._rest and self._tried < ATTEMPTS:
+        elif self._tried < ATTEMPTS and may and not self._plain and way > FAR * tolerance and largest > SUDDEN * self._rest:
             self._tried += 1
             self._gamma, self._set_up_at, self._plain, jnew[0] = gamma, t, True, 1  # the step is shortened at once
             return

@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 
 import refweb
 from refweb.__main__ import main
-from refweb.dynamics.integrators import simpson_balance, sundials
+from refweb.dynamics.integrators import cvode, simpson_balance, sundials
 from refweb.dynamics.integrators.central_difference import CentralDifference, EnergyDriftError
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
@@ -324,6 +324,18 @@ def test_a_first_contact_asks_for_no_matrix():
     assert solver.stats["nfev"] < 1.2 * other.stats["nfev"]
     way = np.abs(beside.x[:-1]).max()
     assert way > 1e-3 and np.abs(run.x - beside.x)[:-1].max() < 1e-3 * way  # each is off by (1e-6)^(2/3) for 1e-4
+
+
+def test_a_web_that_begins_to_move_by_itself_keeps_its_long_steps(monkeypatch):
+    """A flat web without tension, whose forces grow from zero with the depth of a heavy node, is no first contact."""
+    node, counts = refweb.PointMass(node="centre", mass=1.0), []
+    system = small([node], size=20, prestrain=0.0)
+    v = np.zeros((system.rows, 3))
+    v[system.net.mass > 0.5] = [0.0, 0.0, 1.0]
+    for attempts in (cvode.ATTEMPTS, 0):
+        monkeypatch.setattr(cvode, "ATTEMPTS", attempts)
+        counts.append(ran(system, [0.02], v, rtol=3e-4)[0].stats)
+    assert counts[0] == counts[1] and counts[0]["nlu"] > 0
 
 
 # Books
