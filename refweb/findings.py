@@ -22,7 +22,7 @@ CODES = {
     "collapse": "Lines that do not push have let the web collapse.",
     "deep-contact": "A contact is deeper than is allowed of a body.",
     "digits-not-reached": "The digits asked for are not reached.",
-    "drum-moves": "A drum that is free to move, of lines whose mass follows: angular momentum is not kept.",
+    "drum-moves": "A drum or ring that is free to move, of a winch whose mass follows: angular momentum is not kept.",
     "event-not-seen": "A threshold is passed and passed back within a step.",
     "flies-past": "A body whose straight path does not meet the web.",
     "half-turn": "An end of a thread about half a turn round a cylinder from where it was, where turns are lost.",

@@ -1,18 +1,19 @@
 """Mass that follows natural length: what is reeled in leaves through a drum, what is paid out comes from there.
 
-An element of the natural length L has the mass ρA L, a share of which is at each of its nodes. Material passes the drum
-alone, with the velocity v_d of its node, so that each node of mass m has
+An element of the natural length L has the mass ρA L, a share of which is at each of its nodes.
+
+Of a reel, material passes from node to node, and leaves each with the velocity v of that node: the momentum m' v and
+the energy ½ m' v² are gone with it. `refweb.effects.sliding_material` has the force of what slides along the line. An
+explicit step changes the mass in the middle of its drift, and stays its own adjoint.
+
+Of a winch, material passes each ring or drum alone, with the velocity v_d of its node, so that each node of mass m has
 
     m v' = F + m' (v_d − v),    the momentum m' v_d and the energy m' (v_d·v − ½ v²) that come in.
 
 In axes that rotate with Ω, velocities are relative, and v_d becomes v_d − Ω × (r − r_d), with the places r of node and
-drum: material that rests on the drum moves against the axes elsewhere.
-
-The velocity at which material slides along the line is left out: its momentum flux is of the size ρA L'². The
-momentum of all, and the angular momentum about a drum at rest, are kept. A drum that is free to move lacks a reaction
-of the size ρA L' L ω where lines turn, and angular momentum misses the sum of m' (r − r_d) × v_d: a tether as heavy as
-both of its ends, reeled to half of its length, turns at 4.3 rad/s in place of 3.0. A run says so, see `MaterialFlow` of
-`system.material_flow`.
+ring: material that rests on the ring moves against the axes elsewhere. The velocity at which it slides is left out. A
+ring or a drum that is free to move lacks a reaction of the size ρA L' L ω where lines turn, and angular momentum misses
+the sum of m' (r − r_d) × v_d. A run says so, see `MaterialFlow` of `system.material_flow`.
 
 An explicit step brings Δm in the middle of its drift, where v − v_d goes with 1/m: that is the exact solution for F =
 0, and the step stays its own adjoint.
@@ -43,6 +44,7 @@ from ..kernels import (
     VectorTable,
     kernel,
 )
+from .base import column
 from .time_tables import flattened, interpolate
 
 if TYPE_CHECKING:
@@ -129,8 +131,10 @@ class FollowedMass(Record):
     built : ndarray, shape (changing,)
         Their masses at a factor of 1 [kg].
     cells, shares, tables : table
-        Rows of each flow with the places of these in ``rows`` and the rows of their drums, the mass of each that a
-        factor of 1 is worth [kg], and the table over time.
+        Rows of each flow, of shape (rows, 1), the mass of each that a factor of 1 is worth [kg], and the table over
+        time.
+    sliding : ndarray of int
+        Numbers of the terms of material that slides.
     mass, inverse : ndarray, shape (rows,) and (rows, 3)
         Mass of all rows [kg], and its inverse, 0 where a support holds: those of the loop.
     speed : ndarray, shape (3,)
@@ -151,6 +155,7 @@ class FollowedMass(Record):
     cells: IndexTable
     shares: VectorTable
     tables: VectorTable
+    sliding: Integers
     mass: Vector
     inverse: Matrix
     speed: Vector
@@ -162,10 +167,11 @@ class FollowedMass(Record):
     @classmethod
     def none(cls) -> FollowedMass:
         """Make the record of masses that stay."""
-        no_tables = Arrays(INDICES, []), Arrays(VECTOR, []), Arrays(VECTOR, [])
+        none = np.zeros(0, dtype=np.int64)
+        no_tables = Arrays(INDICES, []), Arrays(VECTOR, []), Arrays(VECTOR, []), none
         nothing = np.zeros(0), np.zeros((0, 3)), np.zeros(3), np.zeros((0, 3))
         no_passages = np.zeros((0, 4), dtype=np.int64), np.zeros((0, 2)), np.zeros(0)
-        return cls(np.zeros(0, dtype=np.int64), np.zeros(0), *no_tables, *nothing, *no_passages)
+        return cls(none, np.zeros(0), *no_tables, *nothing, *no_passages)
 
     @classmethod
     def of(cls, system: System, mass: NDArray[np.float64], inverse: NDArray[np.float64]) -> FollowedMass:
@@ -174,13 +180,14 @@ class FollowedMass(Record):
         by_slip = passages.shares
         rows = [*(flow.rows for flow in flows), passages.rows[by_slip != 0.0]]
         rows = np.unique(np.concatenate(rows)).astype(np.int64)
-        cells = [np.column_stack([f.rows, np.searchsorted(rows, f.rows), f.drums]).astype(np.int32) for f in flows]
+        sliding = [n for n, term in enumerate(system.terms) if term in system.material_flow.sliding]
         return cls(
             rows=rows,
             built=system.net.mass[rows],
-            cells=Arrays(INDICES, cells),
+            cells=Arrays(INDICES, [column(flow.rows) for flow in flows]),
             shares=Arrays(VECTOR, [flow.mass for flow in flows]),
             tables=Arrays(VECTOR, [np.array(flattened(flow.table)) for flow in flows]),
+            sliding=np.array(sliding, dtype=np.int64),
             mass=mass,
             inverse=inverse,
             speed=system.material_flow.speed,
@@ -236,42 +243,30 @@ def incoming(back, x, v, r, d, followed, velocity):
 
 
 @kernel(apart=("follows",))
-def exchange_masses(
-    t: float, h: float, x: Matrix, v: Matrix, followed: FollowedMass, work: Vector, pushed: Vector
-) -> None:
-    """Bring the material of a step of size h that ends at t, in the middle of its drift.
+def exchange_masses(t: float, v: Matrix, followed: FollowedMass, work: Vector, pushed: Vector) -> None:
+    """Change masses by tables in a step that ends at t, in the middle of its drift.
 
-    Its work, and its impulse on what is free, are added to the last place of ``work`` and to ``pushed``.
+    Energy and momentum of what is free, which material brings, are added to the last place of ``work`` and to
+    ``pushed``.
     """
-    rows, mass, inverse = followed.rows, followed.mass, followed.inverse
-    brought, before, velocity = np.zeros((rows.size, 3)), np.empty(rows.size), np.empty(3)
+    rows, mass, inverse, before = followed.rows, followed.mass, followed.inverse, np.empty(followed.rows.size)
     for n in range(rows.size):
         before[n] = mass[rows[n]]
-    for i in range(len(followed.tables)):
-        table, cells, shares = followed.tables[i], followed.cells[i], followed.shares[i]
-        change = interpolate(t, table, 0, 2, 1)[0] - interpolate(t - h, table, 0, 2, 1)[0]
-        for c in range(cells.shape[0]):
-            incoming(0.5 * h, x, v, cells[c, 0], cells[c, 2], followed, velocity)
-            for k in range(3):
-                brought[cells[c, 1], k] += shares[c] * change * velocity[k]
     set_masses(t, followed)
     for n in range(rows.size):
         r = rows[n]
         for k in range(3):
             if inverse[r, k] > 0.0:
-                old = v[r, k]
-                speed = inverse[r, k] * (before[n] * old + brought[n, k])
-                work[work.size - 1] += 0.5 * (mass[r] * speed * speed - before[n] * old * old)
-                pushed[k] += brought[n, k]
-                v[r, k] = speed
-                x[r, k] += 0.5 * h * (speed - old)
+                brought = (mass[r] - before[n]) * v[r, k]
+                work[work.size - 1] += 0.5 * brought * v[r, k]
+                pushed[k] += brought
 
 
 @kernel(apart=("follows",))
 def exchange_by_slips(
     t: float, h: float, x: Matrix, v: Matrix, followed: FollowedMass, work: Vector, pushed: Vector
 ) -> None:
-    """Bring the material that has gone over rings and drums in a step, as `exchange_masses` does by tables.
+    """Bring the material that has gone over rings and drums in a step, in the middle of its drift.
 
     One half goes over one after the other, and one half in the inverse order: the step stays of order 2.
     """

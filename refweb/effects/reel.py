@@ -38,9 +38,10 @@ class Reel(Table):
         "stays": nodes keep their mass. "follows": a line has the mass of its natural length. Material leaves and comes
         through the drum, at the velocity of the drum's node, with its momentum and its energy, which counts as
         ``work``. So does its weight: energies by place are those of the masses at t = 0. Point masses and bodies keep
-        theirs, a body with the share of a line's end on it. Forces of the size ρA (dL/dt)², of material that slides
-        along the line, are left out; where lines turn about a drum that is free to move, angular momentum is not kept,
-        and a run says so. The lines may not break.
+        theirs, a body with the share of a line's end on it. Material that slides along the lines has its inertia, see
+        `refweb.effects.sliding_material`: nodes, which it passes, jump by it where the rate of the factor does, also
+        at t = 0. Momentum and angular momentum are kept, also where the drum is free to move. Kinetic energy is that
+        of nodes. The lines may not break.
     drum : int, str or list, optional
         Node at the drum, with ``mass = "follows"``: one of each connected part of the lines. By default the one that is
         supported, moved or on a body.

@@ -91,9 +91,8 @@ class Winch(Table):
         leaves and comes through the drum, at the velocity of the drum's node, with its momentum and its energy, which
         counts as ``work``; over each ring of a thread it goes at the velocity of the ring. The weight of what comes is
         ``work`` as well: energies by place are those of the masses at t = 0. Point masses and bodies keep theirs, a
-        body with the share of nodes on it. Forces of the size ρA (dL/dt)², of material that slides along the thread,
-        are left out; where lines turn about a drum or ring that is free to move, angular momentum is not kept, and a
-        run says so.
+        body with the share of nodes on it. The inertia of material that slides along the thread is left out; where
+        lines turn about a drum or ring that is free to move, angular momentum is not kept, and a run says so.
     drum : int, str or list, optional
         Nodes at the drums of ``lines``, with ``mass = "follows"``: one end of each. By default the one that is
         supported, moved or on a body.

@@ -146,6 +146,10 @@ class System:
         self.carried: NDArray[np.bool_] = np.zeros(self.rows, dtype=bool)
         self.carried[net.carried] = True
         self.supported[self.carried] = True
+        if net.flows:
+            from ..effects.sliding_material import force_terms
+
+            self.terms += force_terms(self)
         self._factorization = factorization
         if factorization == "rslab":
             _ = self.library  # which refuses it where it is not installed
@@ -241,10 +245,7 @@ class System:
 
     @cached_property
     def carriers(self) -> Any:
-        """The `refweb.system.attached_nodes.Carried` of bodies that carry nodes; None if none does.
-
-        In statics the `refweb.system.resting_bodies.RestingBodies` of bodies that turn.
-        """
+        """The `Carried` of bodies that carry nodes, in statics the `RestingBodies` of those that turn; None without."""
         if self.angles:
             from .resting_bodies import RestingBodies
 
@@ -651,10 +652,7 @@ class System:
     def damping(
         self, t: float, x: NDArray[np.float64], v: NDArray[np.float64], blocks: list[NDArray[np.float64]] | None = None
     ) -> NDArray[np.float64] | None:
-        """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None if no force depends on velocity.
-
-        ``blocks`` are `blocks` to write to, which a loop keeps.
-        """
+        """Values of C = −∂f/∂v [N s/m] in the fixed pattern, by way of ``blocks``; None if no force depends on v."""
         if not any(f.velocity.damping is not None for f in self.terms):
             return None
         blocks = self.blocks() if blocks is None else blocks

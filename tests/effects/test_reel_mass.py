@@ -3,7 +3,7 @@
 import nets
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import simpson, solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -48,7 +48,8 @@ def by_scipy(factor, drive, weight, end=1.0):
     """Place, velocity, and work that the motion of the drum and the reel have done, in closed equations.
 
     The reel gives the force −(EA/2)(l² − L²)/L² = −∂E/∂L of the line times −L', and material of the drum's velocity u
-    the power ρA L'/2 (u·v − ½ v²); the moved drum has half of the line's mass, and pulls with the line's tension.
+    the power ρA L'/2 (u·v − ½ v²); the moved drum has half of the line's mass, and pulls with the line's tension. Where
+    L' jumps, what slides between drum and mass gives either −½ ΔL' ½ρA times the way from one to the other.
     """
     times, factors = np.transpose(factor)
     u = np.array(drive)
@@ -67,10 +68,21 @@ def by_scipy(factor, drive, weight, end=1.0):
         return np.concatenate([v, push / mass, [work]])
 
     y = np.array([1.0, 0.0, 0.0, *np.add(drive, (0.0, FAST, 0.0)), 0.0])
-    for a, b, f, g in zip(times, times[1:], factors, factors[1:], strict=False):
-        given = dict(args=((g - f) / (b - a), a, f), method="DOP853", rtol=1e-12, atol=1e-13)
+    slopes = [*np.diff(factors) / np.diff(times), 0.0]
+    y[3:6] += jumped(y[:3], slopes[0], 1.0)
+    for n, (a, b, f, g) in enumerate(zip(times, times[1:], factors, factors[1:], strict=False)):
+        given = dict(args=(slopes[n], a, f), method="DOP853", rtol=1e-12, atol=1e-13)
         y = solve_ivp(rate, (a, min(b, end)), y, **given).y[:, -1]
+        if b <= end:
+            jump, before = jumped(y[:3] - u * b, slopes[n + 1] - slopes[n], g), y[3:6].copy()
+            y[3:6] += jump
+            y[6] += (MASS + 0.5 * DENSE * g) * jump @ (before + 0.5 * jump)
     return y[:3], y[3:6], y[6]
+
+
+def jumped(away, jump, natural):
+    """Jump of the velocity of a mass at the end of a line, away from the drum, for one of L'."""
+    return -0.25 * DENSE * jump * away / (MASS + 0.5 * DENSE * natural)
 
 
 def far(run, system, truth):
@@ -82,7 +94,7 @@ def far(run, system, truth):
 @pytest.mark.parametrize("factor", [IN, OUT_AND_IN], ids=["in", "out and in"])
 @pytest.mark.parametrize("drum", DRIVES)
 def test_a_mass_that_is_whirled_by_central_differences(factor, drum):
-    """Order 2 in place, velocity and work; momentum to rounding, and angular momentum about a drum at rest as well."""
+    """Order 2 in place, velocity, work and angular momentum about a drum at rest; momentum to rounding."""
     drive, errors = DRIVES[drum], []
     system = whirled(factor, WEIGHT, drive=drive)
     truth = by_scipy(factor, drive, np.array(WEIGHT.acceleration))
@@ -92,10 +104,9 @@ def test_a_mass_that_is_whirled_by_central_differences(factor, drum):
         solver.advance(run, np.linspace(0.1, 1.0, 10))
         errors.append([run.nsteps, *far(run, system, truth)])
         assert run.ledger.drifts[0] < 1e-13
-        if not any(drive):
+        if not any(drive):  # gravity has no moment about z through the drum, which the line is bound to
             turning = (MASS + 0.5 * DENSE * factor[-1][1]) * np.cross(system.net.points[1] + run.x[1], run.v[1])
-            # Gravity has no moment about z through the drum, which the line is bound to; 1e3 roundings.
-            np.testing.assert_allclose(turning[2], (MASS + 0.5 * DENSE) * FAST, rtol=1e-13)
+            errors[-1].append(abs(turning[2] - (MASS + 0.5 * DENSE) * FAST))
     nsteps, *errors = np.array(errors).T
     for error in errors:
         slope = np.polyfit(np.log(1.0 / nsteps), np.log(error), 1)[0]
@@ -107,7 +118,10 @@ def test_a_mass_that_is_whirled_by_central_differences(factor, drum):
 @pytest.mark.parametrize("solver", [Cvode, Ida])
 @pytest.mark.parametrize("drum", DRIVES)
 def test_a_mass_that_is_whirled_by_sundials(solver, drum):
-    """Errors go with rtol to the power 2/3, by 21 over two decades, of which a third is asked for; balances close."""
+    """Errors go with rtol to the power 2/3, by 21 over two decades, of which a quarter is asked for; balances close.
+
+    Each corner of the table begins the method anew, at order 1.
+    """
     drive, errors = DRIVES[drum], []
     system = whirled(OUT_AND_IN, WEIGHT, drive=drive)
     truth = by_scipy(OUT_AND_IN, drive, np.array(WEIGHT.acceleration))
@@ -117,7 +131,7 @@ def test_a_mass_that_is_whirled_by_sundials(solver, drum):
         one.advance(run, np.linspace(0.1, 1.0, 10))
         errors.append([*far(run, system, truth), run.drift, run.ledger.drifts[0]])
     coarse, fine = np.array(errors)
-    assert (coarse > 7.0 * fine).all()
+    assert (coarse > 5.0 * fine).all()
     assert fine[0] < 5e-4 and fine[1] < 1e-2 and fine[2] < 5e-3 and fine[3] < 5e-4 and fine[4] < 5e-5
 
 
@@ -151,8 +165,9 @@ def hoisted(yields, end):
         force = mass * GRAVITY - pull - brought * v
         return [v, force / mass, max(growth, 0.0) if e >= largest else 0.0, creep, dissipated]
 
+    begun = jumped(1.0, speed, 1.0)
     length, v, _, _, lost = solve_ivp(
-        rate, (0.0, end), [1.0, 0.0, 0.0, 0.0, 0.0], "DOP853", rtol=1e-9, atol=1e-12, max_step=1e-3
+        rate, (0.0, end), [1.0, begun, 0.0, 0.0, 0.0], "DOP853", rtol=1e-9, atol=1e-12, max_step=1e-3
     ).y[:, -1]
     return length, v, lost
 
@@ -187,20 +202,111 @@ def test_a_line_that_yields_or_relaxes_while_it_is_reeled_in(kind, solver):
     assert run.drift < 2e-4
 
 
+def momenta(system, time, x, v, slope):
+    """Momentum and angular momentum about the origin of nodes and bodies, and of what slides at a rate φ' of the reel.
+
+    An edge has the momentum −φ' Q (r_b − r_a) and the angular momentum −φ' Q r_a × r_b.
+    """
+    mass, places = system.material_flow.masses(time), system.net.points + x
+    linear = system.rows - system.net.spins
+    push, turn = mass[:linear] @ v[:linear], mass[:linear] @ np.cross(places[:linear], v[:linear])
+    for body in system.net.bodies:
+        turn += mass[body.spin] * v[body.spin]  # v of the row of rotation is the angular momentum over its mass
+    for term in system.material_flow.sliding:
+        (a, b), beyond = term.cells.T, -slope * term.data[:, 0]
+        push, turn = push + beyond @ (places[b] - places[a]), turn + beyond @ np.cross(places[a], places[b])
+    return np.array([push, turn])
+
+
 def test_a_tether_keeps_its_angular_momentum():
-    """Four elements about a pin: Σ m r × v about it stays to rounding, with the mass of each at its time."""
-    system, rows = whirled(IN, pieces=4), []
-    solver = CentralDifference(system)
-    run = solver.start()
-    for time in (0.0, 0.3, 1.0):
-        if time:
-            solver.advance(run, [time])
-        mass = system.material_flow.masses(time)
-        rows.append((mass[:, None] * np.cross(system.net.points + run.x, run.v)).sum(axis=0)[2])
+    """Four elements about a pin: Σ m r × v and what slides, with the mass of each at its time, to order 2."""
+    system, errors = whirled(IN, pieces=4), []
     lumped = DENSE * 0.25 * np.array([1.0, 1.0, 1.0, 0.5])
     lumped[-1] += MASS
-    np.testing.assert_allclose(rows, lumped @ np.linspace(0.25, 1.0, 4) ** 2 * FAST, rtol=1e-13)
-    np.testing.assert_allclose(mass.sum(), MASS + 0.6 * DENSE, rtol=1e-14)
+    for safety in (0.4, 0.2, 0.1):
+        solver = CentralDifference(system, safety=safety)
+        run = solver.start()
+        errors.append([])
+        for time, slope in ((0.0, -0.4), (0.3, -0.4), (1.0, 0.0)):
+            if time:
+                solver.advance(run, [time])
+            found = momenta(system, time, run.x, run.v, slope)[1][2]
+            errors[-1].append(abs(found - lumped @ np.linspace(0.25, 1.0, 4) ** 2 * FAST))
+    assert max(errors[0][0], errors[1][0], errors[2][0]) < 1e-14
+    for error in np.transpose(errors)[1:]:
+        assert error[2] < 1e-4 and error[1] / error[2] == pytest.approx(4.0, rel=0.2)
+    np.testing.assert_allclose(system.material_flow.masses(1.0).sum(), MASS + 0.6 * DENSE, rtol=1e-14)
+
+
+def test_a_free_tether_that_is_reeled_in_turns_as_one_without_elements():
+    """Two masses on a straight line that does not stretch: its transverse motion, and no moment about the drum.
+
+    With a the acceleration of the drum across the line, of the masses beyond it m, of their first and second moments
+    m₁ and m₂ about it, (M + m) a + m₁ ω' = −2 l' ω m and m₁ a + m₂ ω' = −2 l' ω m₁.
+    """
+    drum, far, dense, span, end = 5.0, 5.0, 1.0, 10.0, 0.5
+
+    def rate(t, y):
+        length, speed = span * (1.0 - end * t), -span * end
+        m, m1, m2 = (length**k * (far + dense * length / (k + 1.0)) for k in range(3))
+        sides = -2.0 * speed * y[0] * np.array([m, m1])
+        return np.linalg.solve([[drum + m, m1], [m1, m2]], sides)[1:]
+
+    truth = solve_ivp(rate, (0.0, 1.0), [20.0], "DOP853", rtol=1e-10, atol=1e-12).y[0, -1]
+    errors = []
+    for pieces in (4, 8, 16):
+        effects = [
+            refweb.PointMass(node=0, mass=drum),
+            refweb.PointMass(node=pieces, mass=far),
+            refweb.Velocity(node="all", spin=(0.0, 0.0, 20.0)),
+            refweb.Reel(lines="all", factor=[(0.0, 1.0), (1.0, end)], mass="follows", drum=0),
+        ]
+        cable = refweb.Cable(law="linear", modulus=1e13, area=1e-4, density=dense / 1e-4)
+        system = nets.system(straight(pieces, (), span).web(), cable, effects, quasi_static=False)
+        solver = CentralDifference(system, safety=0.5)
+        run = solver.start()
+        solver.advance(run, [1.0])
+        away, apart = run.x[-1] - run.x[0] + [span, 0.0, 0.0], run.v[-1] - run.v[0]
+        errors.append(abs(np.cross(away, apart)[2] / (away @ away) - truth))
+        assert run.drift < 1e-3 and run.ledger.drifts[0] < 1e-12
+    # Coriolis forces bend the line, by (l'/(ω l))² of its length and more; without what slides it is 92 rad/s.
+    assert errors[2] < errors[1] < 0.3 * errors[0] and errors[2] < 5e-3 * truth
+
+
+@pytest.mark.ordinary("CentralDifference")
+@pytest.mark.parametrize("solver", [CentralDifference, Cvode, Ida])
+def test_a_net_that_is_reeled_by_a_free_body_keeps_its_momenta(solver):
+    """A ring, a chain and a bridge with a drum on a body that turns: what is lost has left with the drum's velocity."""
+    points = [[0, 0, 0], [1, 0.2, 0], [1.5, 1.0, 0.3], [0.4, 1.2, -0.2], [-0.3, 0.6, 0.1], [2.3, 1.4, 0.8]]
+    lines = [[0, 1], [1, 2], [2, 3], [3, 4], [4, 0], [2, 5]]
+    factor = [(0.0, 1.0), (0.1, 0.8), (0.2, 1.05)]
+    rng = np.random.default_rng(5)
+    effects = [
+        refweb.Body(name="ship", radius=0.2, mass=2.0, position=(0.0, -0.3, 0.0), angular_velocity=(0.5, -0.3, 0.8)),
+        refweb.Attach(body="ship", node=0),
+        *(refweb.Velocity(node=n, value=tuple(rng.normal(size=3))) for n in range(1, 6)),
+        refweb.Reel(lines="all", factor=factor, mass="follows", drum=0),
+    ]
+    web = refweb.Inline(points=points, lines=lines, supports=[]).web()
+    cable = refweb.Cable(law="linear", modulus=1e4 * AXIAL, area=1e-4, density=DENSE / 1e-4)
+    system = nets.system(web, cable, effects, quasi_static=False)
+    method = solver(system, **({"safety": 0.1} if solver is CentralDifference else {"rtol": 1e-7}))
+    run = method.start()
+    worth = system.material_flow.shares(0.0).sum()  # the mass of a factor of 1
+    before, found, lost = momenta(system, 0.0, run.x, run.v, -2.0), [], []
+    for slope, times in ((-2.0, np.linspace(0.0, 0.1 - 1e-9, 101)), (2.5, np.linspace(0.1, 0.2 - 1e-9, 101))):
+        leaving = []
+        for time in times:
+            if time:
+                method.advance(run, [time])
+            leaving.append([run.v[0].copy(), np.cross(system.net.points[0] + run.x[0], run.v[0])])
+        lost.append(slope * worth * simpson(leaving, x=times, axis=0))
+        found.append(momenta(system, times[-1], run.x, run.v, slope) - before)
+        before = before + found[-1]
+    method.advance(run, [0.2])
+    at_rest = momenta(system, 0.2, run.x, run.v, 0.0) - before
+    np.testing.assert_allclose(found, lost, rtol=0.0, atol=1e-4)  # of up to 2.7: what steps of order 2 leave
+    np.testing.assert_allclose(at_rest, 0.0, atol=1e-6)  # what leaves in 1 ns
 
 
 @pytest.mark.slow
@@ -235,7 +341,7 @@ def test_what_a_reel_adds_in_turning_axes():
     """At a factor of 1.2, between corners: force by the energy, tangents by the force, whose velocity does no work."""
     axes = [[1.0, 2.0, 0.0], [-2.0, 1.0, 0.5]]
     system = whirled(OUT_AND_IN, refweb.Orbit(mean_motion=0.7, axes=axes), pieces=2)
-    of_place, of_velocity = (term for term in system.terms if term.balance.column == "work")
+    of_place, of_velocity = (term for term in system.terms if term.name == "orbit" and term.balance.column == "work")
     rng, t, h = np.random.default_rng(3), 0.4 * 2.0 / 3.0, 1e-6
     x, v, step = (rng.normal(size=(system.rows, 3)) for _ in range(3))
     blocks = np.empty((len(of_place.cells), 3, 3))
@@ -411,46 +517,6 @@ def test_lines_that_may_break_are_refused(rupture):
         paid_out(solve={"kind": "dynamic", "duration": 1.0}, rupture=rupture).build()
 
 
-@pytest.mark.parametrize("held, mass", [(True, 5.0), (False, 5.0), (False, 1e12)])
-def test_a_drum_that_is_free_to_move_is_told(held, mass):
-    """A tether that turns keeps its angular momentum but for what leaves at its drum: masses at nodes miss that."""
-    scene = refweb.Scene(
-        web=refweb.Inline(points=[[-5, 0, 0], [5, 0, 0]], lines=[[0, 1]], supports=[0] if held else []),
-        cable=refweb.Cable(law="tension-only", modulus=1e8, area=1e-4, density=1e4),
-        effects=[
-            refweb.PointMass(node=0, mass=mass),
-            refweb.PointMass(node=1, mass=5.0),
-            refweb.Velocity(node="all" if not held else 1, spin=(0.0, 0.0, 1.0)),
-            refweb.Reel(lines="all", factor=[(0.0, 1.0), (20.0, 0.5)], mass="follows", drum=0),
-        ],
-        observe=[refweb.Observe(name="span", quantity="distance", node=(0, 1))],
-        solve=refweb.Dynamic(duration=0.5),
-    )
-    told = [finding.text for finding in refweb.run(scene).findings if finding.code == "drum-moves"]
-    assert not told if held or mass > 1e4 else "node 0 is free to move" in told[0]
-
-
-@pytest.mark.parametrize(
-    "body, moved, told",
-    [({"mass": 5.0}, False, True), ({"mass": 1e7}, False, False), ({"fixed": True}, False, False), ({}, True, False)],
-)
-def test_a_drum_on_a_body_that_is_free_to_move_is_told(body, moved, told):
-    """A body that is fixed, moved or heavy takes no notice of what the drum pulls."""
-    motion = [refweb.Motion(body="ship", displacement=[(0, 0, 0, 0), (1, 0.1, 0, 0)])] if moved else []
-    scene = refweb.Scene(
-        web=refweb.Inline(points=[[-5, 0, 0], [5, 0, 0]], lines=[[0, 1]], supports=[]),
-        cable=refweb.Cable(law="tension-only", modulus=1e8, area=1e-4, density=1e4),
-        effects=[
-            refweb.Body(name="ship", radius=0.1, position=(-5.1, 0, 0), **body),
-            refweb.Attach(body="ship", node=0),
-            refweb.Reel(lines="all", factor=[(0.0, 1.0), (20.0, 0.5)], mass="follows", drum=0),
-            *motion,
-        ],
-        solve=refweb.Dynamic(duration=0.05),
-    )
-    assert told == any(finding.code == "drum-moves" for finding in refweb.run(scene).findings)
-
-
 def test_shipped_tether():
     """Angular momentum about the drum by the places and masses of the end; damping along the line has no moment."""
     solution = refweb.run(refweb.Scene.load("reeled-tether").replace(accuracy=refweb.Accuracy(error="none")))
@@ -458,7 +524,7 @@ def test_shipped_tether():
     for t, x, v in ((0.0, 0.0, system.initial_velocity()), (60.0, solution.state.x, solution.state.v)):
         places = system.net.points + x
         turning.append((system.material_flow.masses(t)[:, None] * np.cross(places, v)).sum(axis=0)[2])
-    assert turning[1] == pytest.approx(turning[0], rel=1e-11)  # the rounding of 5000 steps
+    assert turning[1] == pytest.approx(turning[0], rel=1e-8)  # of order 2 in steps
     lumped = 0.03 * np.array([0.2, 0.4, 0.6, 0.8, 1.0]) ** 2 @ [1.0, 1.0, 1.0, 1.0, 0.5]
     moments = [length**2 * (2.0 + length / 100.0 * lumped) for length in (100.0, 80.0)]
     speed = 0.05 * moments[0] / moments[1] * 80.0

@@ -188,6 +188,8 @@ class CentralDifference(Integrator):
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
         x = system.taken_on(0.0, x)
+        if system.net.flows:
+            v = system.material_flow.velocity_behind(0.0, x, v)
         extremes = Extremes.at_start(np.zeros(len(self._observed.signs)))
         work, total = np.zeros(len(system.terms) + 1), np.zeros(len(system.terms) + 3)
         where = np.zeros(2, dtype=np.int64)

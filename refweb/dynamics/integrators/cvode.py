@@ -14,11 +14,11 @@ A run of 464 steps of BDF on the square web of 3120 lines, 0.7 s, takes 0.20 s f
 factorizations, 0.07 s for forces, 0.17 s within SUNDIALS, and 0.19 s for what is observed in the middle and at the end
 of each step. The last factors are kept where CVODE asks for them anew and nothing has changed, a third of all times.
 
-May change: `SHORT`, `STILL`, `SUDDEN`, `FAR`, `ATTEMPTS` and `RENEWED`, which change cost and digits within the tolerance.
-Must stay: arguments of `set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which sksundae calls
-them; `precondition` uses the factors of the last `set_up` with another γ or tangent; the Jacobian is the derivative of
-`right_side`. Keys of ``[solve]`` are those of `registry.INTEGRATORS`. Must stay as well: public names of `Cvode`, which
-other files use. Tests: ``tests/dynamics/integrators/test_cvode.py``.
+May change: `SHORT`, `STILL`, `SUDDEN`, `FAR`, `ATTEMPTS` and `RENEWED`, which change cost and digits within the
+tolerance. Must stay: arguments of `set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which
+sksundae calls them; `precondition` uses the factors of the last `set_up` with another γ or tangent; the Jacobian is the
+derivative of `right_side`. Keys of ``[solve]`` are those of `registry.INTEGRATORS`. Must stay as well: public names of
+`Cvode`, which other files use. Tests: ``tests/dynamics/integrators/test_cvode.py``.
 """
 
 from __future__ import annotations
@@ -141,13 +141,19 @@ class Cvode(Sundials):
         """Factorize M + γC + γ²K; K and C are kept where CVODE allows."""
         may = self._sparing and not (self._plain and t == self._set_up_at)  # else iterations have not converged
         largest = np.abs(yp[self.unknowns :]).max(initial=0.0) if may else np.inf
-        known, way, tolerance = self._gamma is not None, gamma * gamma * largest, self.atol_position
-        self._still = way <= STILL * tolerance
+        known, moved, tolerance = self._gamma is not None, gamma * gamma * largest, self.atol_position
+        self._still = moved <= STILL * tolerance
         self._plain = known and may and self._short(gamma)
         jnew[0] = 0
         if self._still:
             self._rest, self._tried = largest, 0
-        elif self._tried < ATTEMPTS and may and not self._plain and way > FAR * tolerance and largest > SUDDEN * self._rest:
+        elif (
+            self._tried < ATTEMPTS
+            and may
+            and not self._plain
+            and moved > FAR * tolerance
+            and largest > SUDDEN * self._rest
+        ):
             self._tried += 1
             self._gamma, self._set_up_at, self._plain, jnew[0] = gamma, t, True, 1  # the step is shortened at once
             return

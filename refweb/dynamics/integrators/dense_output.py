@@ -367,9 +367,9 @@ def look_inside(
     show_again(now, inside, model, observed, running)
 
 
-@kernel(apart=("driven",))
+@kernel(apart=("jumping",))
 def look_behind(model: Model, observed: Observed, running: Running, workspace: Workspace) -> None:
-    """Look for extremes behind a corner of motion, where velocities have jumped."""
+    """Look for extremes behind a corner of motion or of a reel, where velocities have jumped."""
     now, lines, where, total = running.clock[0].time, model.terms.outs[0], workspace.where, workspace.total
     x, v, f, extremes = running.x, running.v, running.f, running.extremes
     begin_anew(extremes)

@@ -89,6 +89,17 @@ def refuse_open(course, limit, remedy):
         raise EnergyDriftError(f"{drift}, limit {limit:g}: {remedy}", course.drift)
 
 
+@kernel()
+def kinetic_of(x, v, mass, turns):
+    """Kinetic energy of all rows [J]."""
+    total = 0.0
+    for r in range(x.shape[0]):
+        total += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+    if turns.moment.size:
+        total += more_kinetic(x, v, turns)
+    return total
+
+
 @kernel(leaf=True, apart=())
 def book_energies(
     t: float,
@@ -110,7 +121,7 @@ def book_energies(
     work, −1 if its power is energy lost, else 0.
     """
     count = len(energies)
-    total[count], total[count + 1] = 0.0, book[count]
+    total[count + 1] = book[count]
     for i in range(count):
         energies[i](t, x, cells[i], data[i], energy_outs[i])
         total[i] = sum_of(energy_outs[i])
@@ -118,10 +129,7 @@ def book_energies(
             total[count + 1] += book[i]
         elif working[i] < 0:
             total[i] = -book[i]
-    for r in range(x.shape[0]):
-        total[count] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
-    if turns.moment.size:
-        total[count] += more_kinetic(x, v, turns)
+    total[count] = kinetic_of(x, v, mass, turns)
 
 
 @kernel(ENERGY)
@@ -270,7 +278,7 @@ def change_lengths(t: float, h: float, model: Model, was: Vector, running: Runni
     lengths, cells, lines = model.lengths, model.terms.cells[0], model.terms.data[0]
     x, length_force, work = running.x, running.length_force, running.work
     if lengths.masses.rows.size:
-        exchange_masses(t, h, x, running.v, lengths.masses, work, running.ledger.pushed)
+        exchange_masses(t, running.v, lengths.masses, work, running.ledger.pushed)
     for c in range(was.size):
         was[c] = record_at(LINE, lines, lengths.elements[c], 0).natural_length
     set_lengths(t, lengths, lines)

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...effects.sliding_material import BEHIND
 from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import add_forces_to_bodies
 from ...net.rotation_bounds import fastest_point, hardest_push
@@ -50,6 +51,7 @@ from .neighbour_list import reach_all, show_near, update_neighbours
 from .rows import energies_now, write_row
 from .step import (
     add_forces,
+    change_sliding,
     contact_kick,
     give_impulse,
     give_reaction,
@@ -127,6 +129,7 @@ def begin_more(t: float, changing: bool, extra: Matrix, push: Vector, model: Mod
     """Write powers, forces of natural lengths and push from outside."""
     x, v, terms, outside = running.x, running.v, model.terms, model.outside
     if running.clock[0].begun == 0:
+        t *= BEHIND if model.lengths.masses.sliding.size else 1.0
         lossy, again = model.implicit_contacts.terms, running.clock[0].nsteps > 0
         begin_powers(t, x, v, extra, terms, lossy, again, running.power)
     if changing:
@@ -347,6 +350,8 @@ def advance_rows(
             if halved > 0.0:
                 add_half_steps(halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             if (model.inertia.driven.size or lengths.growth >= 0) and turn_supports(clock.time, model, running):
+                look_behind(model, observed, running, space)
+            if lengths.masses.sliding.size and change_sliding(clock.time, model, running):
                 look_behind(model, observed, running, space)
             if clock.time == corner < times[n]:  # what is stored at a corner may be gone again at the row
                 largest = energies_now(model, running, total)[1]

@@ -21,8 +21,9 @@ def features(scheme, model, observed, events):
     -------
     set of str
         ``stages`` or ``kicks`` (steps of one drift); ``watched`` (extremes), ``books`` (of energies), ``averages``,
-        ``looks`` (any of these), ``events``; ``turning`` bodies and ``carried`` nodes; ``driven`` rows, ``lengths``
-        that change, masses that ``follows`` them, their ``growth``, ``relaxing`` internal variables;
+        ``looks`` (any of these), ``events``; ``turning`` bodies and ``carried`` nodes; ``driven`` rows, ``sliding``
+        material, ``jumping`` velocities of either; ``lengths`` that change, masses that ``follows`` them, their
+        ``growth``, ``relaxing`` internal variables;
         ``powers``, ``snaps`` of forces that jump, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped``
         (integrated impulses),
         ``booked`` (powers, lengths or pushing), ``angular`` momentum that is kept; ``near`` cells, ``pairs`` that are
@@ -30,6 +31,7 @@ def features(scheme, model, observed, events):
         (``body_ccd``); ``contacts`` of bodies.
     """
     inertia, terms, outside, windows = model.inertia, model.terms, model.outside, observed.windows
+    driven = len(inertia.driven) + len(model.motions.kernels) + (model.lengths.growth >= 0)
     has = {
         "stages": len(scheme.drifts) > 1,
         "kicks": len(scheme.drifts) == 1,
@@ -39,7 +41,9 @@ def features(scheme, model, observed, events):
         "looks": len(observed.followed) + len(observed.sums) + len(windows.slots),
         "events": len(events),
         "carried": len(inertia.turns.carried),
-        "driven": len(inertia.driven) + len(model.motions.kernels) + (model.lengths.growth >= 0),
+        "driven": driven,
+        "sliding": len(model.lengths.masses.sliding),
+        "jumping": driven + len(model.lengths.masses.sliding),
         "lengths": len(model.lengths.elements),
         "follows": len(model.lengths.masses.rows),
         "growth": model.lengths.growth >= 0,

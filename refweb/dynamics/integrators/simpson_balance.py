@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...compiled.kernel import prepare
+from ...effects.sliding_material import BEHIND
 from ...errors import EnergyDriftError, IntegrationError
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, Arrays, Functions
 from ...net.rotation import RigidRotations, more_kinetic
@@ -64,6 +65,13 @@ class Sample:
         self.rates: Rates | None = None
         self.force, self.per_cell = system.balance(time, x, v)
         refuse_endless(system, time, self.force)
+
+    @classmethod
+    def behind(cls, system, time, x, v):
+        """The sample behind a corner of tables of reels; that at the time where there is none."""
+        sample = cls(system, time * BEHIND if system.net.flows else time, x, v)
+        sample.time = time
+        return sample
 
     @cached_property
     def felt(self):
@@ -208,10 +216,11 @@ class SimpsonBalance:
     def piece(self, course, end, at):
         """The `Piece` from where a course is to a time, by the dense output ``at`` of the step.
 
-        At the corner of a motion velocities jump: until then the given ones are those in the middle.
+        At the corner of a motion velocities jump: until then the given ones are those in the middle. At the corner of a
+        reel whose mass follows, those of nodes that material slides past jump.
         """
         middle, end = at(0.5 * (course.time + end)), at(end)
-        driven, last, jump = self._driven, end, None
+        driven, last, jump, before, after = self._driven, end, None, end.v, end.v
         if len(driven) and (end.v[driven] != middle.v[driven]).any():
             before, step = end.v.copy(), np.zeros_like(end.v)
             before[driven] = middle.v[driven]
@@ -223,10 +232,18 @@ class SimpsonBalance:
             if self.system.carriers:
                 self.system.carriers.update_attached_nodes(end.x, after)
             self._hold(end.x, after)
-            last, end = (Sample(self.system, end.time, end.x, v) for v in (before, after))
-            jump = np.zeros(len(course.work) + 6)
-            jump[-7] = self.kinetic(end.time, end.x, after) - self.kinetic(end.time, end.x, before)
-            jump[-6:-3] = self.momentum(end.time, end.x, after) - self.momentum(end.time, end.x, before)
+            last = Sample(self.system, end.time, end.x, before)
+        moved = after
+        if self.system.net.flows:
+            after = self.system.material_flow.velocity_behind(end.time, end.x, after)
+        if after is not before:
+            t, x, jump = end.time, end.x, np.zeros(len(course.work) + 6)
+            if after is not moved:
+                self._hold(x, after)
+            end = Sample.behind(self.system, t, x, after)
+            jump[-7] = self.kinetic(t, x, after) - self.kinetic(t, x, before)
+            jump[-6:-3] = self.momentum(t, x, moved) - self.momentum(t, x, before)
+            jump[-3:] = self.momentum(t, x, after) - self.momentum(t, x, moved)
         start, rates = course.sample, (self.rates(middle), self.rates(last))
         rates = start.rates or self.rates(start), *rates
         end.rates = rates[-1] if last is end else None

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...effects.contact_solver import commit, forget, gauss_seidel, warm_start
 from ...effects.natural_lengths import set_growth
+from ...effects.sliding_material import BEHIND, add_impulses
 from ...kernels import (
     ContactTable,
     Cube,
@@ -31,7 +32,7 @@ from ...kernels import (
 from ...net.rotation import RigidRotations, add_forces_to_bodies, advance_rotation, note_turns, update_attached_nodes
 from .ccd import largest_of
 from .contacts import feel
-from .energy_balance import act
+from .energy_balance import act, kinetic_of
 from .implicit_contacts import detect_all
 
 if TYPE_CHECKING:
@@ -256,6 +257,42 @@ def move_supports(
         kernels[i](t - 0.5 * h, aside, v, f, cells[i], data[i], outs[i])
 
 
+@kernel()
+def renew_forces(t, model, running):
+    """Write the forces of all terms at time t, and what bodies feel."""
+    terms = model.terms
+    running.f[:] = 0.0
+    for i in range(len(terms.forces)):
+        act(i, t, running.x, running.v, running.f, terms)
+    add_forces_to_bodies(running.x, running.f, model.inertia.turns)
+    feel(model.contacts, terms)
+
+
+@kernel(apart=("sliding",))
+def change_sliding(t: float, model: Model, running: Running) -> bool:
+    """Give nodes the impulses of material whose sliding changes at a corner; whether any does.
+
+    The gain of kinetic energy is work of the reel, and the impulse on what is free is one from outside.
+    """
+    terms, turns, mass, inverse = model.terms, model.inertia.turns, model.inertia.mass, model.inertia.inverse
+    x, v, impulse, changed, before = running.x, running.v, np.zeros(running.x.shape), False, 0.0
+    for i in model.lengths.masses.sliding:
+        changed = add_impulses(t, x, terms.cells[i], terms.data[i], impulse) or changed
+    if not changed:
+        return False
+    add_forces_to_bodies(x, impulse, turns)
+    before = kinetic_of(x, v, mass, turns)
+    for r in range(x.shape[0]):
+        for k in range(3):
+            if r < model.inertia.linear and inverse[r, k] > 0.0:
+                running.ledger.pushed[k] += impulse[r, k]
+            v[r, k] += inverse[r, k] * impulse[r, k]
+    update_attached_nodes(x, v, turns)
+    running.work[running.work.size - 1] += kinetic_of(x, v, mass, turns) - before
+    renew_forces(BEHIND * t, model, running)
+    return True
+
+
 @kernel(apart=("driven",))
 def turn_supports(t: float, model: Model, running: Running) -> bool:
     """Write prescribed velocities behind a corner at time t, and forces that follow from velocity; whether any jumps.
@@ -263,7 +300,7 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
     The gain of kinetic energy of the supports is work of their motion; history rows show the state after the corner.
     """
     driven, mass, terms, motions = model.inertia.driven, model.inertia.mass, model.terms, model.motions
-    x, v, f, forces, cells, data = running.x, running.v, running.f, terms.forces, terms.cells, terms.data
+    x, v, f = running.x, running.v, running.f
     was, turned = np.empty((driven.size, 3)), False
     for d in range(driven.size):
         for k in range(3):
@@ -280,11 +317,7 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
         turned = True
     update_attached_nodes(x, v, model.inertia.turns)
     if turned and terms.viscous.size + model.implicit_contacts.terms.size:
-        f[:] = 0.0
-        for i in range(len(forces)):
-            forces[i](t, x, v, f, cells[i], data[i], terms.outs[i])
-        add_forces_to_bodies(x, f, model.inertia.turns)
-        feel(model.contacts, terms)
+        renew_forces(t, model, running)
         for i in model.implicit_contacts.terms:
             running.power[i] = sum_of(terms.outs[i][:, 0])
         for n in range(terms.powers.shape[0] if model.lengths.growth >= 0 else 0):

@@ -309,6 +309,9 @@ class StepObserver(Integrator):
         v = system.initial_velocity() if v is None else v.copy()
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
+        if system.net.flows:
+            v = system.material_flow.velocity_behind(0.0, x, v)
+            self.hold(x, v)
         sample, work = Sample(system, 0.0, x, v), np.zeros(len(system.terms) + 1)
         energies = self._book.energies(sample, work, 0.0)
         monitors = self._measurements.start(sample, energies, self._events)
@@ -380,7 +383,7 @@ class StepObserver(Integrator):
         """Begin at the state of a course."""
         system, x, v = self.system, course.x, course.v
         self._refer(course)
-        course.sample, course.least_energy = Sample(system, course.time, x, v), self._book.least_energy
+        course.sample, course.least_energy = Sample.behind(system, course.time, x, v), self._book.least_energy
         with self._report(course):
             self.begin(course.time, x.ravel()[system.free], v.ravel()[system.free])
 
@@ -446,7 +449,8 @@ class StepObserver(Integrator):
             course.sample.rates = None  # of other plastic strains
         if self._limits.at_corner(course.time):  # what is stored there may be gone again at the row
             self._book.note_largest(course, self._book.energies(end, course.work, course.step))
-        if piece.jump is not None and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
+        net = self.system.net
+        if piece.jump is not None and (net.flows or net.consistent_minus_lumped is not None):  # what is free jumps too
             self._enter(course)
 
     def _fill(self, row, course, before):
