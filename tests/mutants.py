@@ -103,7 +103,8 @@ MIRRORS = {
     "effects/winch_power": "effects/test_winch.py test_contract.py",
     "effects/wound_lines": "effects/test_wound_lines.py test_contract.py",
     "effects/wound_mass": "effects/test_winch_mass.py",
-    "effects/thread_friction": "effects/test_thread_friction.py effects/test_winch.py test_contract.py",
+    "effects/thread_friction": "effects/test_thread_friction.py effects/test_winch.py test_contract.py "
+    "effects/test_winch_mass.py",
     "results/observables/thread": "effects/test_thread.py effects/test_thread_friction.py",
     "system/broken_lines": "effects/test_rupture.py",
     "effects/base": "test_contract.py dynamics/integrators/test_ida.py",
@@ -741,6 +742,7 @@ MUTANTS = [
     Mutant("effects/mass_flow", "- (w[i] * along_j - w[j] * along_i)", "+ (w[i] * along_j - w[j] * along_i)"),
     Mutant("system/material_flow", "np.intersect1d(net.line[at_risk], flow.lines)[:1]", "[]"),
     Mutant("effects/thread_friction", "<= STILL * abs(now - before)", "< 0.0"),
+    Mutant("effects/thread_friction", "abs(first) > most + STILL * abs(now - before)", "abs(first) > math.inf"),
     Mutant("studies/modes", "rest.at(equilibrium.step, equilibrium.x)", "rest"),
     Mutant("statics/gradients", "if system.net.flows:", "if net.flows:"),
     Mutant("system/material_flow", "incoming * speed - 0.5 * speed**2", "incoming * speed - 0.4 * speed**2"),

@@ -163,7 +163,7 @@ def kernels(law, record, width):
         """Energy that a winch takes beside the trapezoidal rule, with Y ``now`` and ``before`` at the present lengths.
 
         The strain energy loses what the winch takes and what rings lose, which is by the trapezoidal rule. 0 for small
-        changes of Y.
+        changes of Y, and where Y differs at a ring before by more than its friction.
         """
         line, energy, pulls = record_at(record, data, c, 0), -0.5 * (now + before) * paid_out, np.empty(w.shape[1])
         if abs(now - before) <= EVEN * (abs(now) + abs(before)):
@@ -172,9 +172,11 @@ def kernels(law, record, width):
             pulls[s], stored = pull_before(data, c, w, s)
             energy += stored - natural(w, s) * energy_density(strain_of(w, s), line)
         for r in range(rings - 1):
-            last = gap(data, c, w, rings, r)
-            first = pulls[(r + 1) % w.shape[1]] - pulls[r]
-            energy -= 0.5 * (last + (first if first * last > 0.0 else last)) * (w[SLIP, r] - w[BEFORE, r])
+            last, first = gap(data, c, w, rings, r), pulls[(r + 1) % w.shape[1]] - pulls[r]
+            most = abs(last) * (max(1.0, before / now) if now > 0.0 else 1.0)
+            if abs(first) > most + STILL * abs(now - before):  # movements have shared out what rings then even
+                return 0.0
+            energy -= 0.5 * (last + math.copysign(min(abs(first), most), last)) * (w[SLIP, r] - w[BEFORE, r])
         return energy if math.isfinite(energy) else 0.0
 
     @kernel()

@@ -372,6 +372,48 @@ def test_what_a_reel_adds_in_turning_axes():
     np.testing.assert_allclose(force, expected, rtol=0, atol=1e-13 * np.abs(force).max())
 
 
+def test_what_slides_in_turning_axes():
+    """At a factor of 1.2: force by the velocities of the axes, tangents by the force; the jump by the masses there are."""
+    omega = np.array([0.3, -0.4, 1.2])
+    system = whirled(OUT_AND_IN, refweb.Frame(angular_velocity=omega), pieces=3)
+    (term,) = system.material_flow.sliding
+    rng, t = np.random.default_rng(4), 0.4 * 2.0 / 3.0
+    x, v, step = (rng.normal(size=(system.rows, 3)) for _ in range(3))
+    (a, b), places = term.cells.T, system.net.points + x
+    beyond = DENSE * np.array([2.5, 1.5, 0.5]) / 3.0  # of the nodes behind each edge
+    push = -(0.3 / 0.4) * beyond[:, None] * (v[b] - v[a] + np.cross(omega, places[b] - places[a]))
+    expected = np.zeros_like(x)
+    np.add.at(expected, term.cells, push[:, None, :])
+    force = system.force_of(term, t, x, v)
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-13)
+    for kernel, state in ((term.tangent.stiffness, (x + step, v)), (term.velocity.damping, (x, v + step))):
+        blocks, change = np.empty((3, 6, 6)), system.force_of(term, t, *state) - force  # the force is linear
+        kernel(t, x, v, blocks, term.cells, term.data, False)
+        total = np.zeros_like(x)
+        np.add.at(total, term.cells, (blocks @ step[term.cells].reshape(3, 6, 1)).reshape(3, 2, 3))
+        np.testing.assert_allclose(total, -change, rtol=0, atol=1e-13)
+    flow, jump = system.material_flow, (1.1 - 1.3) / 0.6 - 0.3 / 0.4
+    gained = flow.masses(0.4)[1:, None] * (flow.velocity_behind(0.4, x, v) - v)[1:]
+    expected = 0.5 * jump * beyond[:, None] * (places[a] - places[b])
+    np.testing.assert_allclose(gained.sum(axis=0), (2.0 * expected.sum(axis=0) - expected[0]), rtol=0, atol=1e-13)
+    assert flow.velocity_behind(0.2, x, v) is v
+
+
+def test_material_goes_both_ways_around_a_ring():
+    """What leaves each node is its mass, and around the ring ∑ q L is 0: ∑ q² L is least."""
+    corners = [[0, 0, 0], [1, 0, 0], [2, 2, 0], [0, 1, 0]]
+    web = refweb.Inline(points=corners, lines=[[0, 1], [1, 2], [2, 3], [3, 0]], supports=[0]).web()
+    system = nets.system(web, CABLE, [refweb.Reel(lines="all", factor=IN, mass="follows")], quasi_static=False)
+    (term,), (flow,) = system.material_flow.sliding, system.material_flow.flows
+    out = np.zeros(4)
+    for (a, b), passed in zip(term.cells, term.data[:, 0], strict=True):
+        out[a] += passed
+        out[b] -= passed
+    np.testing.assert_allclose(out[1:], flow.mass[1:], rtol=1e-13)
+    assert abs(term.data[:, 0] @ system.net.natural_length) < 1e-13
+    assert np.ptp(system.net.natural_length) > 1.0
+
+
 @pytest.mark.parametrize("method", ["newton", "relaxation"])
 def test_a_line_that_is_paid_out_hangs_by_the_weight_it_has(method):
     """At each load step the tension in an element is the weight of the nodes below it, ρA L(t) g in all."""

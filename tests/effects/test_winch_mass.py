@@ -100,7 +100,7 @@ TENSION, POWER = {"tension": EA * STRAIN}, {"power": 20.0, "speed_limit": 50.0}
 LOWERED = {"points": HUNG, "velocities": [None, [0.1, 0.2, -0.4]], "strain": (MASS + 0.5 * DENSE) * G / EA}
 
 
-@pytest.mark.ordinary("central-difference-winch0-more0")
+@pytest.mark.ordinary("central-difference-winch0-more0", "bdf-winch7-more7")
 @pytest.mark.parametrize(
     "method, winch, more",
     [
