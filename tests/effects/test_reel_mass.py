@@ -373,7 +373,7 @@ def test_what_a_reel_adds_in_turning_axes():
 
 
 def test_what_slides_in_turning_axes():
-    """At a factor of 1.2: force by the velocities of the axes, tangents by the force; the jump by the masses there are."""
+    """At a factor of 1.2: force by velocities of the axes, tangents by the force; the jump by the masses there are."""
     omega = np.array([0.3, -0.4, 1.2])
     system = whirled(OUT_AND_IN, refweb.Frame(angular_velocity=omega), pieces=3)
     (term,) = system.material_flow.sliding
