@@ -401,7 +401,7 @@ def test_what_slides_in_turning_axes():
 
 def test_material_goes_both_ways_around_a_ring():
     """What leaves each node is its mass, and around the ring ∑ q L is 0: ∑ q² L is least."""
-    corners = [[0, 0, 0], [1, 0, 0], [2, 2, 0], [0, 1, 0]]
+    corners = [[0, 0, 0], [1, 0, 0], [3, 2, 0], [0, 1, 0]]
     web = refweb.Inline(points=corners, lines=[[0, 1], [1, 2], [2, 3], [3, 0]], supports=[0]).web()
     system = nets.system(web, CABLE, [refweb.Reel(lines="all", factor=IN, mass="follows")], quasi_static=False)
     (term,), (flow,) = system.material_flow.sliding, system.material_flow.flows
