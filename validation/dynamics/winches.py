@@ -108,7 +108,7 @@ def path(times):
 
 
 def turned():
-    """Angular velocity of two masses of 5 kg on a line of 10 kg and 10 m that turned by 1 rad/s before it was reeled."""
+    """Angular velocity of two masses of 5 kg on a line of 10 kg and 10 m that turned by 1 rad/s before."""
     points = [[10.0 * n / 16.0, 0, 0] for n in range(17)]
     solution = refweb.run(
         refweb.Scene(
