@@ -334,7 +334,7 @@ def test_bad_input(options, message):
         refweb.cost(scene(), **options)
 
 
-def test_command_line(tmp_path, monkeypatch, capsys):
+def test_command_line(tmp_path, coarse, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     import tomli_w
 
