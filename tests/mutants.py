@@ -742,7 +742,7 @@ MUTANTS = [
     Mutant("effects/mass_flow", "- (w[i] * along_j - w[j] * along_i)", "+ (w[i] * along_j - w[j] * along_i)"),
     Mutant("system/material_flow", "np.intersect1d(net.line[at_risk], flow.lines)[:1]", "[]"),
     Mutant("effects/thread_friction", "<= STILL * abs(now - before)", "< 0.0"),
-    Mutant("effects/thread_friction", "abs(first) > most + STILL * abs(now - before)", "abs(first) > math.inf"),
+    Mutant("effects/thread_friction", "abs(first) > friction + STILL * abs(now - before)", "abs(first) > math.inf"),
     Mutant("studies/modes", "rest.at(equilibrium.step, equilibrium.x)", "rest"),
     Mutant("statics/gradients", "if system.net.flows:", "if net.flows:"),
     Mutant("system/material_flow", "incoming * speed - 0.5 * speed**2", "incoming * speed - 0.4 * speed**2"),

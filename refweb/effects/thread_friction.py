@@ -173,10 +173,10 @@ def kernels(law, record, width):
             energy += stored - natural(w, s) * energy_density(strain_of(w, s), line)
         for r in range(rings - 1):
             last, first = gap(data, c, w, rings, r), pulls[(r + 1) % w.shape[1]] - pulls[r]
-            most = abs(last) * (max(1.0, before / now) if now > 0.0 else 1.0)
-            if abs(first) > most + STILL * abs(now - before):  # movements have shared out what rings then even
+            friction = abs(last) * (max(1.0, before / now) if now > 0.0 else 1.0)
+            if abs(first) > friction + STILL * abs(now - before):  # movements have shared out what rings then even
                 return 0.0
-            energy -= 0.5 * (last + math.copysign(min(abs(first), most), last)) * (w[SLIP, r] - w[BEFORE, r])
+            energy -= 0.5 * (last + math.copysign(min(abs(first), friction), last)) * (w[SLIP, r] - w[BEFORE, r])
         return energy if math.isfinite(energy) else 0.0
 
     @kernel()
