@@ -10,7 +10,7 @@ velocities give each other:
 In axes that rotate with Ω, velocities are those plus Ω × r. With m v' = f beside other forces, and material that leaves
 each node with the node's velocity, momentum and angular momentum are those of the net but for the material that leaves
 through the drum, with the velocity of the drum: for any places, velocities and number of elements. q' is an impulse
-where the rate of a reel jumps, see `impulse_of`. The push of material that comes to rest at the drum, of the size
+where the rate of a reel jumps, see `impulse`. The push of material that comes to rest at the drum, of the size
 ρA (φ' L)², is in the sum of these forces, and acts along the line. A chain of 200 beads that a drum takes one after the
 other, as heavy as the masses at both ends, comes to the same places as 64 elements, to 2e-4 of its length where it does
 not turn and to 0.012 of it after five turns.
@@ -21,16 +21,16 @@ Where q jumps at a corner of the table, the force at the corner is that ahead of
 the other, and at 0 as well.
 
 May change: how fluxes are found. Must stay: the fields of `EDGE`, behind which, at `TABLE`, the table of the factor
-stands; `BEHIND` is more than the width that `rate_of` looks back by; `add_impulses` and `impulse_of` are the same
-equation, which steps and `MaterialFlow` call; `force`, by which `MaterialFlow` knows the terms. Must follow: masses
-that change, in `mass_flow` and `system.material_flow`. Tests: ``tests/effects/test_reel_mass.py``.
+stands; `BEHIND` is more than the width that `rate_of` looks back by; `impulse`, which steps and `MaterialFlow` call;
+`force`, by which `MaterialFlow` knows the terms. Must follow: masses that change, in `mass_flow` and
+`system.material_flow`. Tests: ``tests/effects/test_reel_mass.py``.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..compiled.rows import matrix_of, record_at, records_of, width_of
+from ..compiled.rows import matrix_of, record_at, width_of
 from ..errors import InputError, refused_at
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from .base import Balance, ForceTerm, Tangent, Timing, VelocityForce
@@ -40,8 +40,9 @@ from .vectors import cross
 EDGE = np.dtype([("mass", float), ("largest", float), ("apart", float, (3,)), ("speed", float, (3,))])
 """Q [kg], the largest |Q φ'| [kg/s], a − b in the web as built [m], and Ω [rad/s]; then the table of φ."""
 TABLE = width_of(EDGE)
-SAME, BEHIND = 1e-12, 1.0 + 4e-12
-"""Share of a time within which it is that of a corner, and that time over it which is behind the corner."""
+SAME, BEHIND, LEAST = 1e-12, 1.0 + 4e-12, 1e-300
+"""Share of a time within which it is that of a corner, that time over it which is behind the corner, and a time from 0
+within which it is 0 [s]."""
 
 
 @kernel()
@@ -191,45 +192,18 @@ def _edges(net, flow, drums):
 
 @kernel()
 def jump_of(t, data, c):
-    """Jump of q of an edge [kg/s] at time t: 0 between corners."""
-    near = abs(t) * SAME
+    """Jump of q of an edge [kg/s] at time t, where 0 is a corner of a table that begins there; 0 between corners."""
+    near = max(abs(t) * SAME, LEAST)
     ahead, later = interpolate(t - near, data[c], TABLE, 2, 1)[1], interpolate(t + near, data[c], TABLE, 2, 1)[1]
     return record_at(EDGE, data, c, 0).mass * (ahead - later)
 
 
-@kernel()
-def add_impulses(t, x, cells, data, impulse):
-    """Add −½ Δq (r_b − r_a) to both nodes of each edge at time t; True where any rate jumps."""
-    jumps = False
+@kernel(FORCE)
+def impulse(t, x, v, f, cells, data, out):
+    """Add −½ Δq (r_b − r_a) at time t to both nodes of each edge [N s]."""
     for c in range(cells.shape[0]):
-        jump = jump_of(t, data, c)
-        if jump != 0.0:
-            jumps, apart = True, record_at(EDGE, data, c, 0).apart
-            for i in range(3):
-                half = 0.5 * jump * (apart[i] + x[cells[c, 0], i] - x[cells[c, 1], i])
-                for end in range(2):
-                    impulse[cells[c, end], i] += half
-    return jumps
-
-
-def impulse_of(t, x, terms):
-    """Impulse on each row [N s], shape (rows, 3), where rates of reels jump at time t; None where none does.
-
-    Parameters
-    ----------
-    t : float
-        Time [s]; at 0 all that is there begins.
-    x : ndarray, shape (rows, 3)
-        Displacement [m].
-    terms : sequence of ForceTerm
-        Those of `force_terms`.
-    """
-    impulse, jumps = np.zeros_like(x), False
-    for term in terms:
-        edges, table = records_of(EDGE, term.data), term.data[0, TABLE + 1 :].reshape(-1, 2)
-        slopes = np.concatenate([[0.0], np.diff(table[:, 1]) / np.diff(table[:, 0]), [0.0]])
-        jump = np.diff(slopes)[np.abs(table[:, 0] - t) <= SAME * abs(t)].sum()
-        half = -0.5 * (jump * edges["mass"])[:, None] * (edges["apart"] + x[term.cells[:, 0]] - x[term.cells[:, 1]])
-        np.add.at(impulse, term.cells, half[:, None, :])
-        jumps = jumps or jump != 0.0
-    return impulse if jumps else None
+        jump, apart = jump_of(t, data, c), record_at(EDGE, data, c, 0).apart
+        for i in range(3):
+            half = 0.5 * jump * (apart[i] + x[cells[c, 0], i] - x[cells[c, 1], i])
+            for end in range(2):
+                f[cells[c, end], i] += half

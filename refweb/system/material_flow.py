@@ -126,14 +126,16 @@ class MaterialFlow:
 
     def velocity_behind(self, t, x, v):
         """Velocity of all rows [m/s] behind time t, shape (rows, 3); v itself where no rate of a reel jumps there."""
-        from ..effects.sliding_material import impulse_of
+        from ..effects.sliding_material import impulse
 
-        system, impulse = self._system, impulse_of(t, x, self.sliding)
-        if impulse is None:
+        system, push = self._system, np.zeros_like(x)
+        for term in self.sliding:
+            impulse(t, x, v, push, term.cells, term.data, push)
+        if not push.any():
             return v
         if system.carriers:
-            system.carriers.add_forces_to_bodies(x, impulse)
-        v = v + system.at(t, x).mass.moved_by(impulse)
+            system.carriers.add_forces_to_bodies(x, push)
+        v = v + system.at(t, x).mass.moved_by(push)
         if system.carriers:
             system.carriers.update_attached_nodes(x, v)
         return v

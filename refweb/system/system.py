@@ -652,7 +652,7 @@ class System:
     def damping(
         self, t: float, x: NDArray[np.float64], v: NDArray[np.float64], blocks: list[NDArray[np.float64]] | None = None
     ) -> NDArray[np.float64] | None:
-        """Values of C = −∂f/∂v [N s/m] in the fixed pattern, by way of ``blocks``; None if no force depends on v."""
+        """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None if no force depends on v. ``blocks``: `stiffness`."""
         if not any(f.velocity.damping is not None for f in self.terms):
             return None
         blocks = self.blocks() if blocks is None else blocks

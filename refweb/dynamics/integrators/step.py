@@ -16,7 +16,7 @@ import numpy as np
 
 from ...effects.contact_solver import commit, forget, gauss_seidel, warm_start
 from ...effects.natural_lengths import set_growth
-from ...effects.sliding_material import BEHIND, add_impulses
+from ...effects.sliding_material import BEHIND, impulse
 from ...kernels import (
     ContactTable,
     Cube,
@@ -275,18 +275,18 @@ def change_sliding(t: float, model: Model, running: Running) -> bool:
     The gain of kinetic energy is work of the reel, and the impulse on what is free is one from outside.
     """
     terms, turns, mass, inverse = model.terms, model.inertia.turns, model.inertia.mass, model.inertia.inverse
-    x, v, impulse, changed, before = running.x, running.v, np.zeros(running.x.shape), False, 0.0
+    x, v, push = running.x, running.v, np.zeros(running.x.shape)
     for i in model.lengths.masses.sliding:
-        changed = add_impulses(t, x, terms.cells[i], terms.data[i], impulse) or changed
-    if not changed:
+        impulse(t, x, v, push, terms.cells[i], terms.data[i], terms.outs[i])
+    if not push.any():
         return False
-    add_forces_to_bodies(x, impulse, turns)
+    add_forces_to_bodies(x, push, turns)
     before = kinetic_of(x, v, mass, turns)
     for r in range(x.shape[0]):
         for k in range(3):
             if r < model.inertia.linear and inverse[r, k] > 0.0:
-                running.ledger.pushed[k] += impulse[r, k]
-            v[r, k] += inverse[r, k] * impulse[r, k]
+                running.ledger.pushed[k] += push[r, k]
+            v[r, k] += inverse[r, k] * push[r, k]
     update_attached_nodes(x, v, turns)
     running.work[running.work.size - 1] += kinetic_of(x, v, mass, turns) - before
     renew_forces(BEHIND * t, model, running)
