@@ -535,7 +535,7 @@ def test_a_stack_rests():
     boxes = [
         dict(name=f"b{i}", shape="box", size=[0.4] * 3, mass=1.0, position=[0, 0, 0.2 + 0.4 * i]) for i in range(3)
     ]
-    s = run([FLOOR, *boxes], 2.7, dict(stiffness=k, damping=30.0, friction=0.3), gravity=True)
+    s = run([FLOOR, *boxes], 6.2, dict(stiffness=k, damping=30.0, friction=0.3), gravity=True)
     assert s.solver["nsteps"] >= 100_000
     at = [rows(s, f"b{i}") for i in range(3)]
     assert max(np.abs(s.state.v[list(r)]).max() for r in at) <= 1e-12
