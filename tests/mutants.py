@@ -737,7 +737,7 @@ MUTANTS = [
     Mutant("effects/sliding_material", "half = 0.5 * jump", "half = jump"),
     Mutant("effects/sliding_material", "apart = jump_of(t, data, c), ", "apart = 0.0 * jump_of(t, data, c), "),
     Mutant("effects/sliding_material", "share = 1.0 / np.repeat", "share = np.repeat"),
-    Mutant("system/material_flow", "system.at(t, x).mass.moved_by(push)", "system.mass.moved_by(push)"),
+    Mutant("system/material_flow", "np.inf, self.masses(t, x)", "np.inf, self._net.mass"),
     Mutant("effects/mass_flow", "- (w[i] * along_j - w[j] * along_i)", "+ (w[i] * along_j - w[j] * along_i)"),
     Mutant("system/material_flow", "np.intersect1d(net.line[at_risk], flow.lines)[:1]", "[]"),
     Mutant("effects/thread_friction", "<= STILL * abs(now - before)", "< 0.0"),

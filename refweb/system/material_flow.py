@@ -135,7 +135,8 @@ class MaterialFlow:
             return v
         if system.carriers:
             system.carriers.add_forces_to_bodies(x, push)
-        v = v + system.at(t, x).mass.moved_by(push)
+        mass = np.where(system.supported, np.inf, self.masses(t, x)[:, None])  # lumped, which follows alone
+        v = v + np.divide(push, mass, out=np.zeros_like(push), where=mass > 0.0)
         if system.carriers:
             system.carriers.update_attached_nodes(x, v)
         return v
