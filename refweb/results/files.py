@@ -4,7 +4,8 @@ May change: private functions; names of files while they are written, which begi
 (`results.folder.RESULT_FILES`). Must stay: that a file is whole or not there; `number`, which reads back to the same
 float; the order of tables in `as_toml`, by which forces are added up: another order changes the last digits of a run
 from that file; `write_atomically`, which `commands.gradient`, `commands.new` and other files import; `write_text`,
-which `commands.new`, `pages.page` and other files import. Tests: ``tests/test_scene.py``, ``tests/test_faults.py``.
+which `commands.new`, `pages.page` and other files import; `finite`, which `results.solution`, `sweeps.study_result` and
+`sizing.size` import. Tests: ``tests/test_scene.py``, ``tests/test_faults.py``.
 """
 
 from __future__ import annotations
@@ -34,6 +35,15 @@ def write_atomically(path, write):
 def write_text(path, text):
     """Write a text file atomically, as UTF-8."""
     write_atomically(path, lambda name: pathlib.Path(name).write_text(text, encoding="utf-8"))
+
+
+def finite(given):
+    """Plain values with None for infinite numbers, which JSON does not have."""
+    if isinstance(given, dict):
+        return {key: finite(value) for key, value in given.items()}
+    if isinstance(given, list | tuple):
+        return [finite(value) for value in given]
+    return None if isinstance(given, float) and given - given != 0.0 else given
 
 
 def write_json(path, content):

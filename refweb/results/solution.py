@@ -253,12 +253,13 @@ class SolutionData:
         return as_history(self.columns, rows)
 
     def summary(self) -> dict[str, Any]:
-        """The content of ``run.json``, a dict of plain values."""
+        """The content of ``run.json``, a dict of plain values; None for numbers of a failed run that are not finite."""
+        from .files import finite
 
         def plain(results):
             return {name: result.plain() for name, result in results.items()}
 
-        return {
+        content = {
             "status": self.status,
             "message": self.message,
             "scene": self.scene.title,
@@ -278,6 +279,7 @@ class SolutionData:
             **{key: value for key in OPTIONAL if (value := getattr(self, key))},
             **({"further_runs": self.further} if self.further else {}),
         }
+        return finite(content)
 
 
 def as_history(columns: Sequence[str], rows: Any) -> Names:

@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING, Any
 from ..errors import SolverError
 from ..messages import quote
 from ..results.case_rows import results_among, written
-from ..results.files import as_toml, write_text
+from ..results.files import as_toml, finite, write_text
 from ..results.progress import followed
 from ..results.provenance import versions
 from ..results.run_status import Clock, recorded
-from ..sweeps.study_result import finite
 from ..sweeps.workers import crew_of
 from .formulas import MOST_SIDES
 from .problem import Problem

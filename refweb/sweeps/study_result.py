@@ -1,8 +1,8 @@
 """Results of a study in memory: its rows, their statistics, and the content of its ``run.json``.
 
 May change: the text that a `Sweep` shows. Must stay: attributes of `Sweep`, which `refweb` exports; keys of `summary`,
-which are those of ``run.json`` and which `results.study_text`, pages and pictures read; `finite`, which `sizing.size`
-imports; `columns_of` and `row_of`, which `sweep` imports. Tests: ``tests/sweeps/test_sweep.py``.
+which are those of ``run.json`` and which `results.study_text`, pages and pictures read; `columns_of` and `row_of`,
+which `sweep` imports. Tests: ``tests/sweeps/test_sweep.py``.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..results.case_rows import ordered, results_among
+from ..results.files import finite
 from ..results.observables.observe import bounds_by_name
 from ..results.provenance import versions
 from .chances import chances
@@ -153,12 +154,3 @@ def row_of(study: Study, case: Any, known: dict[str, dict[str, Any]]) -> dict[st
 def columns_of(study: Study, rows: Sequence[dict[str, Any]]) -> list[str]:
     """All columns in their order."""
     return ordered(dict.fromkeys([*study.parameters, *(name for row in rows for name in row)]))
-
-
-def finite(given: Any) -> Any:
-    """Plain values with None for infinite numbers, which JSON does not have."""
-    if isinstance(given, dict):
-        return {key: finite(value) for key, value in given.items()}
-    if isinstance(given, list | tuple):
-        return [finite(value) for value in given]
-    return None if isinstance(given, float) and given - given != 0.0 else given

@@ -197,6 +197,38 @@ def test_failed_run_keeps_its_folder(here, capsys):
     assert "failed" in out and "carried off" in out
 
 
+def test_a_run_whose_energy_is_not_finite_is_written(here, capsys):
+    """A pressure of 1e12 Pa tears a net apart: numbers that are not finite are null in ``run.json``."""
+    tables = """
+        [web]
+        kind = "window"
+        mesh = "square"
+        rows = 3
+        columns = 3
+        side = 0.1
+        [cable]
+        law = "smooth"
+        modulus = 7e7
+        area = 1e-4
+        density = 200.0
+        [[pressure]]
+        lines = "all"
+        normal = [0.0, -1.0, 0.0]
+        value = -1e12
+        [solve]
+        kind = "dynamic"
+        duration = 2.66e-5
+        method = "central-difference"
+        [output]
+        interval = 8.87e-6
+    """
+    pathlib.Path("torn.toml").write_text(tables)
+    assert main(["run", "torn.toml", "--out", "out"]) == 1
+    assert "refweb: energy not finite at t = " in capsys.readouterr().err
+    kept = json.loads(pathlib.Path("out/run.json").read_text())
+    assert kept["status"] == "failed" and kept["solver"]["energy_drift"] is None
+
+
 @pytest.mark.parametrize("old, new", [("0.0, 1.0]", "0.0, 1e308]"), ("[1, 2, 3]", "[1e308]")])
 def test_numbers_that_overflow(here, capsys, old, new):
     (here.parent / "scenes" / "big.toml").write_text(SCENE.replace(old, new), encoding="utf-8")
