@@ -20,7 +20,8 @@ from refweb.__main__ import main
 from refweb.commands import __doc__ as verbs
 from refweb.dynamics.integrators import __doc__ as integrators
 from refweb.effects import __doc__ as effects
-from refweb.kernels import FORCE, kernel
+from refweb.effects.base import Balance, ForceTerm, Tangent
+from refweb.kernels import BOUND, FORCE, STIFFNESS, kernel
 from refweb.net.laws import __doc__ as laws
 from refweb.net.rigid_body import __doc__ as shapes
 from refweb.results.observables import __doc__ as observables
@@ -207,7 +208,7 @@ class Uplift(Table):
 @pytest.fixture
 def clean(monkeypatch):
     """What is registered is gone behind the test."""
-    for name in ("uplift", "misplaced"):
+    for name in ("uplift", "misplaced", "counted"):
         monkeypatch.setitem(registry.EFFECTS, name, None)
         monkeypatch.delitem(registry.EFFECTS, name)
 
@@ -228,6 +229,43 @@ def test_a_script_registers_its_own(clean):
     again = refweb.run(built.replace(effects=(refweb.Load(node="all", force=(0, 0, 0.2)),)))
     np.testing.assert_allclose(solution.positions, again.positions, atol=1e-12)
     assert solution.positions[:, 2].max() > 0.0
+
+
+@kernel(FORCE)
+def counting_force(t, x, v, f, cells, data, out):
+    data[0, 0] += 1.0
+    out[0, 0] = 0.0
+
+
+@kernel(STIFFNESS)
+def no_stiffness(t, x, v, blocks, cells, data, definite):
+    blocks[:] = 0.0
+
+
+@kernel(BOUND)
+def no_rates(reach, speed, x, mass, rates, cells, data):
+    pass
+
+
+@table
+class Counted(Table):
+    """No force; it counts how often it is asked for."""
+
+    def on(self, net):
+        tangent, cells = Tangent(no_stiffness, no_rates), np.zeros((1, 1), dtype=np.int32)
+        return ForceTerm("counted", cells, np.zeros((1, 1)), counting_force, Balance("work", power=0), tangent=tangent)
+
+
+def test_a_step_asks_an_effect_for_its_force_twice(clean):
+    """Once for the motion, and once with the velocity at the end of the step, for both balances; not for stiffness."""
+    refweb.register("effect", "counted", Counted)
+    solve = {"kind": "dynamic", "duration": 2e-3, "step_size": 1e-6}
+    given = {key: SCENE[key] for key in ("web", "cable", "accuracy", "output")} | {"solve": solve, "counted": {}}
+    solution = refweb.run(refweb.Scene.from_dict(given))
+    (term,) = (term for term in solution.state.system.terms if term.name == "counted")
+    nsteps = solution.solver["nsteps"]
+    assert nsteps >= 2000 and 2 * nsteps <= term.data[0, 0] < 2.1 * nsteps  # rows ask, too
+    assert not no_stiffness.loaded
 
 
 def test_a_fault_of_a_plug_in_is_named_as_its_own(clean, tmp_path, capsys):

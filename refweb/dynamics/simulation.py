@@ -404,7 +404,6 @@ class Simulation:
             spent["integrated_impulses"] = integrated
         choice = {} if self._ways is None else self._ways.record()
         solution.solver = {**SOLVER, "method": self.scene.solve.method, **choice, **spent}
-        solution.solver["slack_nodes"] = len(solution.state.slack_nodes) if solution.state else None
 
     def _state(self, course):
         """The state of a course, as a copy."""

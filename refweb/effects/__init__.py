@@ -23,11 +23,12 @@ cell. A whole file, ``my_webs/current.py``::
             i, j, line, field = cells[c, 0], cells[c, 1], data[c, :3], data[c, 3:]
             chord = (line[0] + x[j, 0] - x[i, 0], line[1] + x[j, 1] - x[i, 1], line[2] + x[j, 2] - x[i, 2])
             push = cross(chord, (0.5 * field[0], 0.5 * field[1], 0.5 * field[2]))
-            out[c, 0] = 0.0
+            power = 0.0
             for k in range(3):
                 f[i, k] += push[k]
                 f[j, k] += push[k]
-                out[c, 0] += push[k] * (v[i, k] + v[j, k])
+                power += push[k] * (v[i, k] + v[j, k])
+            out[c, 0] = power
 
 
     @kernel(STIFFNESS)

@@ -161,11 +161,14 @@ def act(i, t, x, v, f, terms):
 def book_powers(
     t: float, h: float, x: Matrix, v: Matrix, extra: Matrix, power: Vector, work: Vector, terms: ForceTerms
 ) -> None:
-    """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` is space for forces."""
+    """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` is space for forces.
+
+    Terms that depend on velocity, and those of `push_on`, have written their power already.
+    """
     powers = terms.powers
     for n in range(powers.shape[0]):
         i, column = powers[n, 0], powers[n, 1]
-        if powers[n, 2] == 0:  # the power at the full step: the forces above see the velocity at its middle
+        if powers[n, 2] == 0:  # the power at the full step: the force of the step saw the velocity at its middle
             act(i, t, x, v, extra, terms)
         gained = sum_of(terms.outs[i][:, column])
         work[i] += 0.5 * h * (power[i] + gained)

@@ -193,12 +193,12 @@ def run_steps(
         else:
             plain_kick(last, flat_inverse, flat_v, flat_f, x, v, turns)
         feel(model.contacts, terms)
+        if pushing:
+            push_on(now, kick, last, x, v, model.outside, terms, extra, push, running.ledger.pushed)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, terms)
         book_motion(kick, last, driven, mass, v, f, before, work)
         give_reaction(kick, last, fixed, flat_f, reaction, impulse)
-        if pushing:
-            push_on(now, kick, last, x, v, model.outside, terms, extra, push, running.ledger.pushed)
         if looks:
             look_inside(now, h, step == fresh, stages == 0, space.inside, where, total, model, observed, running)
         turned, ending, known[1] = False, begun + step == planned or math.isnan(looked[0]), -1.0

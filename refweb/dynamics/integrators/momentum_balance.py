@@ -151,19 +151,23 @@ class Outside(Record):
         outer = [(i, term) for i, term in enumerate(system.terms) if not term.balance.internal]
         known = [term for _, term in outer if term.balance.impulse is not None]
         damped = [i for i, term in enumerate(known) if term.velocity.damping is not None]
-        pushing = [i for i, term in outer if term.balance.impulse is None]
         return cls(
             impulses=Functions(IMPULSE, [term.balance.impulse for term in known]),
             cells=Arrays(INDICES, [term.cells for term in known]),
             data=Arrays(MATRIX, [term.data for term in known]),
             damped=np.array(damped, dtype=np.int64),
-            pushing=np.array(pushing, dtype=np.int64),
+            pushing=np.array(pushing_terms(system.terms), dtype=np.int64),
             places=net.points[:linear] - net.points[:linear].mean(axis=0),
             mass=net.mass[:linear],
             inverse_reach=_inverse_reach(net),
             axes=kept_axes(system),
             rounding=float(ROUNDINGS * net.line_data.ea.sum()),
         )
+
+
+def pushing_terms(terms):
+    """Numbers of the terms whose force is integrated along the steps."""
+    return [i for i, term in enumerate(terms) if not term.balance.internal and term.balance.impulse is None]
 
 
 def _inverse_reach(net):

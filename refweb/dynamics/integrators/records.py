@@ -55,7 +55,7 @@ from .energy_balance import no_energy
 from .events import EventArray
 from .extremes import Extremes
 from .implicit_contacts import ImplicitContacts
-from .momentum_balance import MomentumBalance, Outside
+from .momentum_balance import MomentumBalance, Outside, pushing_terms
 from .neighbour_list import NeighbourList, near_of
 from .step_bound import no_bound
 
@@ -197,8 +197,8 @@ class ForceTerms(Record):
     working : ndarray of int, shape (terms,)
         1 if the power of a term counts as work, −1 if it is energy lost, else 0.
     powers : ndarray of int, shape (powered, 3)
-        Terms booked by their power, the column of ``outs`` that has it, and whether they depend on velocity: 2 where
-        their force jumps as lines snap taut.
+        Terms booked by their power, the column of ``outs`` that has it, and 0 where it must be found again for the
+        velocity at the end of a step, else 1, or 2 where the force jumps as lines snap taut.
     bounds, dampings : table
         Kernel that bounds the stiffness of each term, and the damping of each viscous one.
     """
@@ -229,7 +229,8 @@ class ForceTerms(Record):
         viscous = [i for i in fast if terms[i].velocity.implicit is None]
         still = [i for i in range(1, len(terms)) if i not in fast and terms[i].internal is None]
         booked = [(i, f.balance.power) for i, f in enumerate(terms) if f.balance.power is not None]
-        powers = [(i, k, (i in fast) + terms[i].velocity.jumps) for i, k in booked if terms[i].internal is None]
+        ready = {*fast, *pushing_terms(terms)}
+        powers = [(i, k, (i in ready) + terms[i].velocity.jumps) for i, k in booked if terms[i].internal is None]
         near, stored = near_of(system), [np.zeros(len(term.cells)) for term in terms]
         cells = [*(terms[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
         by_blocks = None if net.factors else terms[0].by_blocks
