@@ -282,7 +282,7 @@ def check_term(net, system, term, seed):
 
     if term.balance.power is not None:
         (out,) = system.forces(t, x, v)[1]
-        if term.internal is None:  # else by what internal variables do
+        if term.elements.internal is None:  # else by what internal variables do
             np.testing.assert_allclose(out[:, term.balance.power].sum(), np.sum(force * v), rtol=1e-12)
         assert term.balance.column == "work" or out[:, term.balance.power].max() <= 0.0
 

@@ -263,21 +263,6 @@ class Timing(NamedTuple):
     at_rest: bool = True
 
 
-class CellElements(NamedTuple):
-    """Elements of the net through which cells act; a cell ends when its element breaks.
-
-    Attributes
-    ----------
-    numbers : ndarray of int, shape (cells,) or (cells, 2), optional
-        Elements of each cell; None for forces on nodes.
-    disable : callable, optional
-        Changes rows of ``data`` in place so that their cells have no force, for cells with a broken element.
-    """
-
-    numbers: NDArray[np.int64] | None = None
-    disable: Callable[..., Any] | None = None
-
-
 class InternalVariables(NamedTuple):
     """Internal variables of elements, unknowns z that are no places, with c z' = f.
 
@@ -352,6 +337,34 @@ def with_numbers(net: Net, x: NDArray[np.float64] | None, numbers: NDArray[np.fl
     return x
 
 
+class CellElements(NamedTuple):
+    """Elements of the net through which cells act, or that they are; a cell ends when its element breaks.
+
+    Attributes
+    ----------
+    numbers : ndarray of int, shape (cells,) or (cells, 2), optional
+        Elements of each cell; None for forces on nodes, and for cells that are the elements of the net or a thread.
+    disable : callable, optional
+        Changes rows of ``data`` in place so that their cells have no force, for cells with a broken element.
+    adds_tension : bool
+        True for a force over the lines beside their law, which writes the whole tension to ``out``.
+    observed : int
+        Number of values per cell in ``out`` that observables read, of a thread.
+    by_blocks : kernel, optional
+        The force of lines for steps of an explicit method, from numbers as `refweb.effects.line_kernels.blocks_of`
+        arranges them.
+    internal : InternalVariables, optional
+        Internal variables that the cells have.
+    """
+
+    numbers: NDArray[np.int64] | None = None
+    disable: Callable[..., Any] | None = None
+    adds_tension: bool = False
+    observed: int = 0
+    by_blocks: Callable[..., Any] | None = None
+    internal: InternalVariables | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class ForceTerm:
     """Force of cells of one kind with its kernels, whose signatures are in `refweb.kernels`.
@@ -368,18 +381,12 @@ class ForceTerm:
         on.
     force : kernel
         Adds to the forces.
-    by_blocks : kernel, optional
-        The same for steps of an explicit method, from numbers as `refweb.effects.line_kernels.blocks_of` arranges them.
     balance : Balance
         Part in the balances of energy and momentum.
     energy : kernel, optional
         Potential of the force, if there is one; for a force with a power it is linear in time between its times.
-    tangent, velocity, contact, frame, timing, elements, internal
-        Parts that are left out where a force has none, see the classes; none of the first six may be None.
-    adds_tension : bool
-        True for a force over the lines beside their law, which writes the whole tension to ``out``.
-    observed : int
-        Number of values per cell in ``out`` that observables read, of a thread.
+    tangent, velocity, contact, frame, timing, elements
+        Parts that are left out where a force has none, see the classes; none may be None.
     """
 
     name: str
@@ -394,10 +401,6 @@ class ForceTerm:
     frame: MovingFrame = MovingFrame()
     timing: Timing = Timing()
     elements: CellElements = CellElements()
-    internal: InternalVariables | None = None
-    adds_tension: bool = False
-    observed: int = 0
-    by_blocks: Callable[..., Any] | None = None
 
     @property
     def over_lines(self) -> bool:
@@ -411,10 +414,10 @@ class ForceTerm:
             return CONTACT_COLUMNS + self.contact.places
         if self.velocity.jumps:
             return SNAPPED + 1
-        if self.adds_tension and self.balance.power is None:
+        if self.elements.adds_tension and self.balance.power is None:
             return DAMPED_TENSION + 1
-        if self.observed:
-            return self.observed
+        if self.elements.observed:
+            return self.elements.observed
         return int(self.contact.crossing is not None) if self.balance.power is None else self.balance.power + 1
 
     @property

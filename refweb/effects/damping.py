@@ -37,6 +37,7 @@ from .base import (
     LINE_OUT,
     POWER,
     Balance,
+    CellElements,
     ForceTerm,
     Tangent,
     Timing,
@@ -274,7 +275,7 @@ class Damping(Table):
                     velocity=VelocityForce(damping, bound, jumps=True),
                     balance=Balance("dissipated_energy", POWER, internal=True),
                     timing=Timing(at_rest=False),
-                    adds_tension=True,
+                    elements=CellElements(adds_tension=True),
                 )
             )
             if changing:

@@ -26,7 +26,7 @@ import numpy as np
 from ..compiled.rows import numbers_aside, numbers_at, record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..tables import Table, table
-from .base import LINE_OUT, Balance, ForceTerm, Tangent
+from .base import LINE_OUT, Balance, CellElements, ForceTerm, Tangent
 from .line_kernels import BLOCK, add_row_sums, add_stiffness, line_at, pull_together, strain, strain_of
 
 
@@ -204,13 +204,14 @@ class Elasticity(Table):
     def on(self, net):
         """The term of all lines; ``out`` is tension [N] and strain."""
         force, energy, stiffness, bound, *_ = of(net)
+        by_blocks = force_by_blocks(net.law) if net.order == 1 and not net.law.columns else None
         return ForceTerm(
             name="elasticity",
             cells=net.cells,
             data=None,
             force=force,
-            by_blocks=force_by_blocks(net.law) if net.order == 1 and not net.law.columns else None,
             energy=energy,
             tangent=Tangent(stiffness, bound),
             balance=Balance("strain_energy", internal=True),
+            elements=CellElements(by_blocks=by_blocks),
         )

@@ -40,7 +40,17 @@ from ..compiled.rows import record_at
 from ..kernels import ENERGY, FORCE, RELAX, STIFFNESS, kernel
 from ..net.plastic_keys import yield_curves
 from . import elasticity
-from .base import LINE_OUT, Balance, ForceTerm, InternalVariables, Tangent, no_force, with_internal, with_numbers
+from .base import (
+    LINE_OUT,
+    Balance,
+    CellElements,
+    ForceTerm,
+    InternalVariables,
+    Tangent,
+    no_force,
+    with_internal,
+    with_numbers,
+)
 from .line_kernels import add_stiffness, internal_number, line_at, pull_together, strain
 
 if TYPE_CHECKING:
@@ -276,7 +286,7 @@ class PlasticLines:
             energy=kept,
             tangent=Tangent(stiffness),
             balance=Balance("strain_energy", internal=True),
-            adds_tension=True,
+            elements=CellElements(adds_tension=True),
         )
         none = np.zeros(0, dtype=np.int64)
         lost = ForceTerm(
@@ -286,7 +296,9 @@ class PlasticLines:
             force=no_force,
             energy=gone,
             balance=Balance("plastic_energy", internal=True),
-            internal=InternalVariables(none, none, np.zeros(0), relax, 0, 'law = "elastic-plastic"', self),
+            elements=CellElements(
+                internal=InternalVariables(none, none, np.zeros(0), relax, 0, 'law = "elastic-plastic"', self)
+            ),
         )
         return [tension, lost]
 

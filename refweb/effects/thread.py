@@ -40,7 +40,7 @@ from ..net.materials import MATERIALS
 from ..net.threads import COLUMNS, TAUT, ThreadLine
 from ..registry import LAWS
 from ..tables import Several, Table, boolean, checked, choice, field, nodes, numbers_by_name, real, table, text
-from .base import Balance, ForceTerm, Tangent
+from .base import Balance, CellElements, ForceTerm, Tangent
 from .line_kernels import line_at
 from .thread_segments import add_across, energy_kernel, segment_kernel
 
@@ -390,5 +390,5 @@ def _term(thread: ThreadLine):
         energy=energy,
         tangent=Tangent(stiffness, bound, across=thread.across),
         balance=Balance("strain_energy", internal=True),
-        observed=COLUMNS,
+        elements=CellElements(observed=COLUMNS),
     )

@@ -46,30 +46,20 @@ import numpy as np
 from ..compiled.rows import record_at
 from ..kernels import BOUND, ENERGY, FORCE, RELAX, STIFFNESS, kernel
 from ..net.threads import COLUMNS, TAUT
-from .base import Balance, ForceTerm, InternalVariables, Tangent, Timing, no_force, with_rows
+from .base import Balance, CellElements, ForceTerm, InternalVariables, Tangent, Timing, no_force, with_rows
 from .line_kernels import internal_number, line_at
 from .thread_segments import add_across, segment_kernel
 from .thread_slips import (
-    BEFORE,
-    HEAD,
-    KAPPA,
-    LENGTH,
-    LONGER,
-    MODE,
-    RATE,
-    ROWS,
-    SLIP,
-    SLOPE,
-    TAIL,
-    TENSION,
+    SEGMENT,
     choose,
     eliminate,
-    gained,
     layout_kernels,
     matrix,
     natural,
     return_mapping,
+    rings_beside,
     sides,
+    slipped,
     strain_of,
 )
 
@@ -121,13 +111,13 @@ def kernels(law, record, width):
     @kernel()
     def gap(data, c, w, rings, r):
         """Y behind ring r less Y before it, for the direction in which it has slipped; 0 where it has not."""
-        moved = w[SLIP, r] - w[BEFORE, r]
+        moved = slipped(w, r)
         if moved == 0.0:
             return 0.0
         line, total = record_at(record, data, c, 0), 0.0
-        for s, sign in (((r + 1) % w.shape[1], 1.0), (r, -1.0)):
+        for s, sign in (((r + 1) % len(w), 1.0), (r, -1.0)):
             strain = strain_of(w, s)
-            total += sign * (w[TENSION, s] * (1.0 + strain) - energy_density(strain, line))
+            total += sign * (w[s].tension * (1.0 + strain) - energy_density(strain, line))
         return max(total, 0.0) if moved > 0.0 else min(total, 0.0)
 
     @kernel()
@@ -138,23 +128,24 @@ def kernels(law, record, width):
     @kernel()
     def at_winch(w):
         """Number of the segment at a winch."""
-        return 0 if w[HEAD, 0] > 0.0 else w.shape[1] - 1
+        return 0 if w[0].head > 0.0 else len(w) - 1
 
     @kernel()
     def pulled_over(data, c, w):
         """Configurational force Y at a winch."""
         s, line = at_winch(w), record_at(record, data, c, 0)
         strain = strain_of(w, s)
-        return w[TENSION, s] * (1.0 + strain) - energy_density(strain, line)
+        return w[s].tension * (1.0 + strain) - energy_density(strain, line)
 
     @kernel()
     def pull_before(data, c, w, s):
         """(Y, strain energy) of segment s at the slips before and its length now; NaN for energy without a length."""
-        line, gain = record_at(record, data, c, 0), gained(w, s, BEFORE)
-        long = w[LENGTH, s] - w[LONGER, s] + gain
+        line, (i, j, first, second) = record_at(record, data, c, 0), rings_beside(w, s)
+        gain = first * w[i].slip_before - second * w[j].slip_before
+        long = w[s].length - w[s].elongation + gain
         if not long > 0.0:
             return 0.0, math.nan
-        strain = (w[LONGER, s] - gain) / long
+        strain = (w[s].elongation - gain) / long
         density = energy_density(strain, line)
         return stress(strain, line) * (1.0 + strain) - density, long * density
 
@@ -165,18 +156,18 @@ def kernels(law, record, width):
         The strain energy loses what the winch takes and what rings lose, which is by the trapezoidal rule. 0 for small
         changes of Y, and where Y differs at a ring before by more than its friction.
         """
-        line, energy, pulls = record_at(record, data, c, 0), -0.5 * (now + before) * paid_out, np.empty(w.shape[1])
+        line, energy, pulls = record_at(record, data, c, 0), -0.5 * (now + before) * paid_out, np.empty(len(w))
         if abs(now - before) <= EVEN * (abs(now) + abs(before)):
             return 0.0
-        for s in range(w.shape[1]):
+        for s in range(len(w)):
             pulls[s], stored = pull_before(data, c, w, s)
             energy += stored - natural(w, s) * energy_density(strain_of(w, s), line)
         for r in range(rings - 1):
-            last, first = gap(data, c, w, rings, r), pulls[(r + 1) % w.shape[1]] - pulls[r]
+            last, first = gap(data, c, w, rings, r), pulls[(r + 1) % len(w)] - pulls[r]
             friction = abs(last) * (max(1.0, before / now) if now > 0.0 else 1.0)
             if abs(first) > friction + STILL * abs(now - before):  # movements have shared out what rings then even
                 return 0.0
-            energy -= 0.5 * (last + math.copysign(min(abs(first), friction), last)) * (w[SLIP, r] - w[BEFORE, r])
+            energy -= 0.5 * (last + math.copysign(min(abs(first), friction), last)) * slipped(w, r)
         return energy if math.isfinite(energy) else 0.0
 
     @kernel()
@@ -187,8 +178,8 @@ def kernels(law, record, width):
         tension is set, else by the trapezoidal rule.
         """
         row, last, ea = int(data[c, first_of(cells)]), rings - 1, line_at(data, c).ea
-        w[BEFORE, last] = internal_number(x, row, last)
-        paid_out = (w[SLIP, last] - w[BEFORE, last]) * (w[HEAD, 0] - w[TAIL, 0])
+        w[last].slip_before = internal_number(x, row, last)
+        paid_out = slipped(w, last) * (w[0].head - w[0].tail)
         if paid_out == 0.0:
             return internal_number(x, row, 2 * rings + 2)
         now, before = pulled_over(data, c, w), ea * internal_number(x, row, 2 * rings - 1)
@@ -210,17 +201,17 @@ def kernels(law, record, width):
             now, before = gap(data, c, w, rings, r) / ea, internal_number(x, row, rings + r)
             if now * before <= 0.0:
                 before = now
-            total += 0.5 * (before + now) * (w[SLIP, r] - w[BEFORE, r])
+            total += 0.5 * (before + now) * slipped(w, r)
         return total
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        w = np.empty((ROWS, cells.shape[1] - 1))
+        w = np.empty(cells.shape[1] - 1, SEGMENT)
         for c in range(cells.shape[0]):
-            rings, count, largest, total = find_slips(t, x, cells, data, c, w), w.shape[1], 0, 0.0
+            rings, count, largest, total = find_slips(t, x, cells, data, c, w), len(w), 0, 0.0
             for s in range(count):
                 p0, p1, p2, inverse, length, _ = segment(x, cells, data, c, s)
-                i, j, scale = cells[c, s], cells[c, s + 1], w[TENSION, s] * inverse
+                i, j, scale = cells[c, s], cells[c, s + 1], w[s].tension * inverse
                 f[i, 0] += scale * p0
                 f[i, 1] += scale * p1
                 f[i, 2] += scale * p2
@@ -228,26 +219,26 @@ def kernels(law, record, width):
                 f[j, 1] -= scale * p1
                 f[j, 2] -= scale * p2
                 total += length
-                largest = s if w[TENSION, s] > w[TENSION, largest] else largest
-                out[c, COLUMNS + s] = w[TENSION, s]
+                largest = s if w[s].tension > w[largest].tension else largest
+                out[c, COLUMNS + s] = w[s].tension
             for r in range(rings):
-                out[c, COLUMNS + count + r] = w[SLIP, r]
-            out[c, 0], out[c, 1] = w[TENSION, largest], w[TENSION, largest] * data[c, width]
+                out[c, COLUMNS + count + r] = w[r].slip
+            out[c, 0], out[c, 1] = w[largest].tension, w[largest].tension * data[c, width]
             out[c, 2], out[c, 3] = strain_of(w, largest), total
 
     @kernel(ENERGY)
     def kept(t, x, cells, data, out):
-        w = np.empty((ROWS, cells.shape[1] - 1))
+        w = np.empty(cells.shape[1] - 1, SEGMENT)
         for c in range(cells.shape[0]):
             find_slips(t, x, cells, data, c, w)
             line, out[c] = record_at(record, data, c, 0), 0.0
-            for s in range(w.shape[1]):
+            for s in range(len(w)):
                 out[c] += natural(w, s) * energy_density(strain_of(w, s), line)
 
     def energy_of(now):
         @kernel(ENERGY)
         def energy(t, x, cells, data, out):
-            w = np.empty((ROWS, cells.shape[1] - 1))
+            w = np.empty(cells.shape[1] - 1, SEGMENT)
             for c in range(cells.shape[0]):
                 rings = find_slips(t, x, cells, data, c, w)
                 out[c] = now(x, cells, data, c, w, rings) * line_at(data, c).ea
@@ -258,7 +249,7 @@ def kernels(law, record, width):
 
     @kernel(RELAX)
     def relax(h, x, cells, data, before, lost):
-        w = np.empty((ROWS, cells.shape[1] - 1))
+        w = np.empty(cells.shape[1] - 1, SEGMENT)
         for c in range(cells.shape[0]):
             lost[c], row, winch = 0.0, int(data[c, first_of(cells)]), data[c, first_of(cells) + 1] > 1.0
             if h > 0.0:
@@ -275,7 +266,7 @@ def kernels(law, record, width):
                     n = rings + r
                     if r < ordinary_of(cells, data, c, rings):
                         x[row + n // 3, n % 3] = gap(data, c, w, rings, r) / ea
-                    x[row + r // 3, r % 3] = w[SLIP, r]
+                    x[row + r // 3, r % 3] = w[r].slip
                 x[row + 2 * rings // 3, 2 * rings % 3] = total
 
     @kernel()
@@ -305,25 +296,25 @@ def kernels(law, record, width):
         for r in range(rings):
             for m in range(b.shape[1]):
                 b[r, m] = 0.0
-            if r == rings - 1 and abs(w[MODE, r]) != 1.0:
+            if r == rings - 1 and abs(w[r].direction) != 1.0:
                 b[r, b.shape[1] - 1] = 1.0
-            if abs(w[MODE, r]) != 1.0:
+            if abs(w[r].direction) != 1.0:
                 continue
             low, high = sides(w, r)
-            if w[MODE, r] < 0.0:
+            if w[r].direction < 0.0:
                 low, high = high, low
-            for s, part in ((high, w[KAPPA, r] * w[SLOPE, high]), (low, -w[SLOPE, low])):
+            for s, part in ((high, w[r].kappa * w[high].slope), (low, -w[low].slope)):
                 if s < 0:
                     continue
                 p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 for k in range(3):
-                    b[r, 3 * s + k] -= w[MODE, r] * part * p[k]
-                    b[r, 3 * s + 3 + k] += w[MODE, r] * part * p[k]
+                    b[r, 3 * s + k] -= w[r].direction * part * p[k]
+                    b[r, 3 * s + 3 + k] += w[r].direction * part * p[k]
             if min(low, high) < 0:
                 continue
             friction = data[c, first_of(cells) + 2 + r]
-            turn_slopes(x, cells, data, c, r, w, -w[MODE, r] * friction * w[KAPPA, r] * w[TENSION, high], b)
+            turn_slopes(x, cells, data, c, r, w, -w[r].direction * friction * w[r].kappa * w[high].tension, b)
         eliminate(a, b)
 
     @kernel()
@@ -337,16 +328,16 @@ def kernels(law, record, width):
             p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
             p = (p0 * inverse, p1 * inverse, p2 * inverse)
             for m in range(size + 1):
-                before = b[s - 1, m] if s > 0 else b[count - 1, m] * w[HEAD, 0]
-                behind = b[s, m] if s < count - 1 else b[count - 1, m] * w[TAIL, 0]
-                slopes[s, m] = -w[RATE, s] * (before - behind)
+                before = b[s - 1, m] if s > 0 else b[count - 1, m] * w[0].head
+                behind = b[s, m] if s < count - 1 else b[count - 1, m] * w[0].tail
+                slopes[s, m] = -w[s].rate * (before - behind)
                 if 3 * s <= m < 3 * s + 6:
-                    slopes[s, m] += w[SLOPE, s] * p[m % 3] * (-1.0 if m < 3 * s + 3 else 1.0)
+                    slopes[s, m] += w[s].slope * p[m % 3] * (-1.0 if m < 3 * s + 3 else 1.0)
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         count, size = cells.shape[1] - 1, 3 * cells.shape[1]
-        w, slopes = np.empty((ROWS, count)), np.empty((count, size + 1))
+        w, slopes = np.empty(count, SEGMENT), np.empty((count, size + 1))
         for c in range(cells.shape[0]):
             rings = find_slips(t, x, cells, data, c, w)
             tension_slopes(x, cells, data, c, w, rings, definite, slopes)
@@ -360,11 +351,11 @@ def kernels(law, record, width):
                     for k in range(3):
                         blocks[c, 3 * s + k, m] -= p[k] * slopes[s, m]
                         blocks[c, 3 * s + 3 + k, m] += p[k] * slopes[s, m]
-                add_across(blocks, c, s, p, w[TENSION, s] * inverse)
+                add_across(blocks, c, s, p, w[s].tension * inverse)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
-        w = np.empty((ROWS, cells.shape[1] - 1))
+        w = np.empty(cells.shape[1] - 1, SEGMENT)
         for c in range(cells.shape[0]):
             rings, ea, first, turned = (
                 find_slips(0.0, x, cells, data, c, w),
@@ -373,14 +364,14 @@ def kernels(law, record, width):
                 1.0,
             )
             shortest = natural(w, 0)
-            for s in range(1, w.shape[1]):
+            for s in range(1, len(w)):
                 shortest = min(shortest, natural(w, s))
             for r in range(ordinary_of(cells, data, c, rings)):
                 turned += data[c, first + 2 + r]
-            for s in range(w.shape[1]):
+            for s in range(len(w)):
                 inverse, distance = segment(x, cells, data, c, s)[3], data[c, width + 4 + 4 * s]
                 soon = TAUT * ea / max(distance, TAUT * line_at(data, c).natural_length)
-                total = 2.0 * (ea / shortest + turned * max(w[TENSION, s] * inverse, soon))
+                total = 2.0 * (ea / shortest + turned * max(w[s].tension * inverse, soon))
                 rates[cells[c, s]] += total
                 rates[cells[c, s + 1]] += total
 
@@ -412,7 +403,7 @@ def terms(thread: ThreadLine) -> list[ForceTerm]:
         tangent=Tangent(acting.stiffness, acting.bound, symmetric=False, across=thread.across),
         balance=Balance("strain_energy", internal=True),
         timing=Timing(thread.corners),
-        observed=COLUMNS + len(thread.distances) + thread.rings,
+        elements=CellElements(observed=COLUMNS + len(thread.distances) + thread.rings),
     )
     stored = ForceTerm(**of_thread, force=no_force, energy=acting.kept, balance=Balance("strain_energy", internal=True))
     none = np.zeros(0, dtype=np.int64)
@@ -422,7 +413,9 @@ def terms(thread: ThreadLine) -> list[ForceTerm]:
         force=no_force,
         energy=acting.gone,
         balance=Balance("dissipated_energy", internal=True),
-        internal=InternalVariables(none, none, np.zeros(0), acting.relax, 0, "[[thread]] friction", slips),
+        elements=CellElements(
+            internal=InternalVariables(none, none, np.zeros(0), acting.relax, 0, "[[thread]] friction", slips)
+        ),
     )
     if not thread.winch:
         return [tension, stored, lost]
@@ -463,6 +456,6 @@ def settled(thread: ThreadLine, net: Net, x: NDArray[np.float64]) -> NDArray[np.
     x = x.copy()
     numbers = x[thread.first : thread.first + thread.rows_of_slips].reshape(-1)[thread.rings :]
     numbers[:] = 0.0
-    x = next(term.internal for term in terms(thread) if term.internal).follower.taken_on(net, x, 0.0)
+    x = next(filter(None, (term.elements.internal for term in terms(thread)))).follower.taken_on(net, x, 0.0)
     x[thread.first : thread.first + thread.rows_of_slips].reshape(-1)[thread.rings :] = 0.0
     return x

@@ -1,13 +1,13 @@
 """Slips of the rings of a thread with friction: the return mapping of a step, see `refweb.effects.thread_friction`.
 
-Numbers of a thread stand in a matrix w, a row for each kind and a column for each segment or ring. Ring r is between
-segment r and the next; there is one ring less than segments, in a closed thread as many.
+The segments of a thread are records w, see `SEGMENT`. Ring r is between segment r and the next; there is one ring less
+than segments, in a closed thread as many.
 
 May change: limits of the iterations (`STEPS`, `ROUGH`, `BISECTIONS`, `DOUBLINGS`, `FARTHER`, `POLISH`) upwards: slips
-are to be found to rounding, of which the other constants say what it is. Must stay: the rows of w by their names,
-`LONGER` to `REACH`, and `ROWS`, which `thread_friction`, `winch_power`, `wound_lines` and `wound_mass` read; the layout
-that `layout_kernels` reads: first row, ends, friction of each ring, numbers of the winch, as
-`thread_friction.numbers_of` writes them; all names that `thread_friction`, `wound_mass` and `winch_power` import.
+are to be found to rounding, of which the other constants say what it is. Must stay: the fields of `SEGMENT`, which
+`thread_friction`, `winch_power`, `wound_lines` and `wound_mass` read; the layout that `layout_kernels` reads: first
+row, ends, friction of each ring, numbers of the winch, as `thread_friction.numbers_of` writes them; all names that
+`thread_friction`, `wound_mass` and `winch_power` import.
 Tests: ``tests/effects/test_thread_friction.py``, ``tests/effects/test_winch.py``.
 """
 
@@ -15,22 +15,35 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import Annotated
 
 import numpy as np
+from numba import from_dtype, types
 
 from ..compiled.rows import record_at
 from ..kernels import Indices, Matrix, kernel
 from .line_kernels import internal_number, line_at
 from .thread_segments import segment_kernel
 
-ROWS = 20
-LONGER, LENGTH, TENSION, PULL, SLOPE, RATE, PULL_RATE, SLIP, BEFORE, KAPPA, MODE, CHANGE, OLD, LOW, HIGH = range(15)
-HEAD, TAIL, HOLDS_IN, HOLDS_OUT, REACH = range(15, ROWS)
-"""Rows of the numbers of a thread, by segment or ring: elongation with the natural length as built, length, tension;
-tension that goes on below 0; slopes ∂T/∂l, −∂T/∂L and that of the pull; slip, slip before; κ; the direction in which a
-ring slips, 0 where it sticks; what Newton's method changes; what segments have gained before; what goes over the rings
-of a chain at two pulls. In the first column alone: 1 where the last ring has a segment behind it, and one before it;
-the tensions up to which a winch hauls in and from which it pays out, and its largest slip in the step."""
+_NUMBERS = """
+    elongation length tension pull slope rate pull_rate gained_before
+    slip slip_before kappa direction change left left_low
+    head tail holds_in holds_out reach
+"""
+SEGMENT = np.dtype([(name, float) for name in _NUMBERS.split()])
+"""Numbers of a segment, and of the ring behind it.
+
+Of the segment: elongation with the natural length as built, length, tension, and the tension that goes on below 0
+(pull); slopes ∂T/∂l, −∂T/∂L and that of the pull; what it had gained before. Of the ring: slip, slip before, κ, the
+direction in which it slips (0 where it sticks, ±2 where a winch is at its largest speed), what Newton's method changes,
+and the material that is left behind it where a chain begins with a pull, and with a lower one.
+
+Of the whole thread, in its first segment alone: 1 where the last ring has a segment behind it (head), and one before it
+(tail); the tensions up to which a winch hauls in and from which it pays out; its largest slip in the step.
+"""
+NOTHING = np.zeros(1, SEGMENT)
+SegmentArray = Annotated[np.ndarray, types.Array(from_dtype(SEGMENT), 1, "C")]
+"""Annotation of the segments of a thread."""
 ROUNDING = 1e-15
 """Share of elongations and slips of a segment up to which its tension is rounding."""
 STEPS = 12
@@ -60,38 +73,51 @@ SHRINK = 0.5
 
 
 @kernel()
-def gained(w, s, row):
-    """Sum of a row of rings over what segment s gains: that of the ring before it, less that of its own."""
-    last = w.shape[1] - 1
-    before = w[row, s - 1] if s > 0 else w[row, last] * w[HEAD, 0]
-    return before - (w[row, s] if s < last else w[row, last] * w[TAIL, 0])
+def rings_beside(w, s):
+    """Ring before segment s, ring behind it, and 1 for each of them that there is, else 0."""
+    last = len(w) - 1
+    before, first = (s - 1, 1.0) if s > 0 else (last, w[0].head)
+    return before, s, first, 1.0 if s < last else w[0].tail
+
+
+@kernel()
+def gained(w, s):
+    """Material that segment s has gained by slips: that of the ring before it, less that of its own."""
+    a, b, first, second = rings_beside(w, s)
+    return first * w[a].slip - second * w[b].slip
+
+
+@kernel()
+def slipped(w, r):
+    """Slip of ring r in the step."""
+    return w[r].slip - w[r].slip_before
 
 
 @kernel()
 def natural(w, s):
     """Natural length of segment s."""
-    return w[LENGTH, s] - w[LONGER, s] + gained(w, s, SLIP)
+    return w[s].length - w[s].elongation + gained(w, s)
 
 
 @kernel()
 def strain_of(w, s):
     """Strain of segment s."""
-    return (w[LONGER, s] - gained(w, s, SLIP)) / natural(w, s)
+    return (w[s].elongation - gained(w, s)) / natural(w, s)
 
 
 @kernel()
 def rounding(w, s):
     """Tension of segment s by rounding."""
-    size = abs(w[LONGER, s]) + abs(gained(w, s, SLIP)) + abs(w[SLIP, s - 1]) + abs(w[SLIP, s])
-    return ROUNDING * (size * max(w[SLOPE, s], w[PULL_RATE, s]) + abs(w[TENSION, s]))
+    size = abs(w[s].elongation) + abs(gained(w, s)) + abs(w[s - 1].slip) + abs(w[s].slip)
+    return ROUNDING * (size * max(w[s].slope, w[s].pull_rate) + abs(w[s].tension))
 
 
 @kernel()
 def sides(w, r):
     """Segments before and behind ring r; −1 for the drum of a winch."""
-    last = w.shape[1] - 1
-    before = -1 if r == last and w[TAIL, 0] == 0.0 else r
-    behind = r + 1 if r < last else 0 if w[HEAD, 0] > 0.0 else -1
+    last = len(w) - 1
+    before = -1 if r == last and w[0].tail == 0.0 else r
+    behind = r + 1 if r < last else 0 if w[0].head > 0.0 else -1
     return before, behind
 
 
@@ -105,15 +131,15 @@ def little(w, r):
 @kernel()
 def side_in(w, r, s):
     """(κ times the pull, its slope) on the side of ring r that material goes to."""
-    return (w[KAPPA, r] * w[PULL, s], w[KAPPA, r] * w[PULL_RATE, s]) if s >= 0 else (w[HOLDS_IN, 0], 0.0)
+    return (w[r].kappa * w[s].pull, w[r].kappa * w[s].pull_rate) if s >= 0 else (w[0].holds_in, 0.0)
 
 
 @kernel()
 def side_out(w, s, target):
     """(Tension, its slope) on the side that material comes from; it goes on below 0 where a drum is the other."""
     if s < 0:
-        return w[HOLDS_OUT, 0], 0.0
-    return (w[TENSION, s], w[RATE, s]) if target >= 0 else (w[PULL, s], w[PULL_RATE, s])
+        return w[0].holds_out, 0.0
+    return (w[s].tension, w[s].rate) if target >= 0 else (w[s].pull, w[s].pull_rate)
 
 
 @kernel()
@@ -128,7 +154,7 @@ def beyond(w, r, forward):
 @kernel()
 def reach_of(w, r):
     """Largest slip of ring r in a step: that of a winch at its speed limit."""
-    return w[REACH, 0] if min(sides(w, r)[0], sides(w, r)[1]) < 0 else math.inf
+    return w[0].reach if min(sides(w, r)[0], sides(w, r)[1]) < 0 else math.inf
 
 
 @kernel()
@@ -136,14 +162,15 @@ def miss(w, rings):
     """Largest distance of a ring from where its slip asks it to be, over what rounding allows."""
     worst = 0.0
     for r in range(rings):
-        moved, ahead, back, reach = w[SLIP, r] - w[BEFORE, r], beyond(w, r, True), beyond(w, r, False), reach_of(w, r)
+        moved, reach = slipped(w, r), reach_of(w, r)
+        ahead, back = beyond(w, r, True), beyond(w, r, False)
         if abs(moved) >= reach * (1.0 - NEAR):
             error = 0.0 if reach == 0.0 else max(-ahead, 0.0) if moved > 0.0 else max(-back, 0.0)
         else:
             error = abs(ahead) if moved > 0.0 else abs(back) if moved < 0.0 else max(ahead, back, 0.0)
         if not math.isfinite(moved + error):
             return math.inf
-        if w[KAPPA, r] > 0.0 and error > worst * little(w, r):
+        if w[r].kappa > 0.0 and error > worst * little(w, r):
             worst = error / little(w, r)
     return worst
 
@@ -157,22 +184,22 @@ def choose(w, rings, at_limit):
     """
     pinned = 0
     for r in range(rings):
-        (a, b), moved, edge, reach = sides(w, r), w[SLIP, r] - w[BEFORE, r], 0.0, reach_of(w, r)
+        (a, b), moved, edge, reach = sides(w, r), slipped(w, r), 0.0, reach_of(w, r)
         ahead, back = beyond(w, r, True), beyond(w, r, False)
         if moved == 0.0:
             edge = -little(w, r) if at_limit else little(w, r)
-        w[MODE, r] = 0.0
-        if w[KAPPA, r] > 0.0 and reach > 0.0:
+        w[r].direction = 0.0
+        if w[r].kappa > 0.0 and reach > 0.0:
             if ahead + (side_in(w, r, b)[1] + side_out(w, a, b)[1]) * moved > edge:
-                w[MODE, r] = 1.0
+                w[r].direction = 1.0
             elif back - (side_in(w, r, a)[1] + side_out(w, b, a)[1]) * moved > edge:
-                w[MODE, r] = -1.0
-            if abs(moved) >= reach * (1.0 - NEAR) and w[MODE, r] * (ahead if moved > 0.0 else -back) >= 0.0:
-                w[MODE, r] *= 2.0
-        if w[MODE, r] == 0.0 or w[MODE, pinned] != 0.0 and abs(moved) < abs(w[SLIP, pinned] - w[BEFORE, pinned]):
+                w[r].direction = -1.0
+            if abs(moved) >= reach * (1.0 - NEAR) and w[r].direction * (ahead if moved > 0.0 else -back) >= 0.0:
+                w[r].direction *= 2.0
+        if w[r].direction == 0.0 or w[pinned].direction != 0.0 and abs(moved) < abs(slipped(w, pinned)):
             pinned = r
-    if w[HEAD, 0] * w[TAIL, 0] > 0.0:
-        w[MODE, pinned] = 0.0
+    if w[0].head * w[0].tail > 0.0:
+        w[pinned].direction = 0.0
 
 
 @kernel()
@@ -181,19 +208,19 @@ def matrix(w, rings, a):
     for r in range(rings):
         for q in range(rings):
             a[r, q] = 0.0
-        if abs(w[MODE, r]) != 1.0:
+        if abs(w[r].direction) != 1.0:
             a[r, r] = 1.0
             continue
         before, behind = sides(w, r)
         low, high = side_in(w, r, before)[1], side_in(w, r, behind)[1]
-        if w[MODE, r] > 0.0:
+        if w[r].direction > 0.0:
             low = max(side_out(w, before, behind)[1], SINGULAR * high)
         else:
             high = max(side_out(w, behind, before)[1], SINGULAR * low)
         a[r, r] = low + high
-        if before >= 0 and (before > 0 or w[HEAD, 0] > 0.0):
+        if before >= 0 and (before > 0 or w[0].head > 0.0):
             a[r, before - 1] -= low
-        if behind >= 0 and (behind < w.shape[1] - 1 or w[TAIL, 0] > 0.0):
+        if behind >= 0 and (behind < len(w) - 1 or w[0].tail > 0.0):
             a[r, behind] -= high
 
 
@@ -288,38 +315,39 @@ def return_mapping(law, record, width):
     def pull_all(w, data, c):
         """Write the tensions at the slips, and their slopes."""
         line = record_at(record, data, c, 0)
-        for s in range(w.shape[1]):
+        for s in range(len(w)):
             length, strain = natural(w, s), strain_of(w, s)
             tension, slope = stress(strain, line), tangent(strain, line)
-            w[TENSION, s], w[SLOPE, s] = tension, slope / length
-            w[RATE, s] = w[SLOPE, s] * (1.0 + strain)
-            w[PULL, s], w[PULL_RATE, s] = pull_of(strain, length, data, c)
+            w[s].tension, w[s].slope = tension, slope / length
+            w[s].rate = w[s].slope * (1.0 + strain)
+            w[s].pull, w[s].pull_rate = pull_of(strain, length, data, c)
 
     @kernel()
     def newton(w, rings, data, c, a, b):
         """Change the slips by a Newton step, as far as segments keep their share of material; the largest miss."""
         for r in range(rings):
-            b[r, 0] = w[BEFORE, r] - w[SLIP, r]
-            if abs(w[MODE, r]) == 1.0:
-                b[r, 0] = w[MODE, r] * beyond(w, r, w[MODE, r] > 0.0)
-            elif w[MODE, r] != 0.0:
-                b[r, 0] += 0.5 * w[MODE, r] * reach_of(w, r)
+            b[r, 0] = w[r].slip_before - w[r].slip
+            if abs(w[r].direction) == 1.0:
+                b[r, 0] = w[r].direction * beyond(w, r, w[r].direction > 0.0)
+            elif w[r].direction != 0.0:
+                b[r, 0] += 0.5 * w[r].direction * reach_of(w, r)
         matrix(w, rings, a)
         eliminate(a, b)
         share = 1.0
         for r in range(rings):
-            w[CHANGE, r] = b[r, 0]
-        for s in range(w.shape[1]):
-            loss = -gained(w, s, CHANGE)
+            w[r].change = b[r, 0]
+        for s in range(len(w)):
+            i, j, first, second = rings_beside(w, s)
+            loss = second * w[j].change - first * w[i].change
             if loss * share > SHRINK * natural(w, s):
                 share = SHRINK * natural(w, s) / loss
         for r in range(rings):
-            w[SLIP, r] += share * w[CHANGE, r]
-            moved, reach = w[SLIP, r] - w[BEFORE, r], reach_of(w, r)
-            if w[MODE, r] == 0.0 and share == 1.0:
-                w[SLIP, r] = w[BEFORE, r]
+            w[r].slip += share * w[r].change
+            moved, reach = slipped(w, r), reach_of(w, r)
+            if w[r].direction == 0.0 and share == 1.0:
+                w[r].slip = w[r].slip_before
             elif abs(moved) > reach:
-                w[SLIP, r] = w[BEFORE, r] + math.copysign(reach, moved)
+                w[r].slip = w[r].slip_before + math.copysign(reach, moved)
         pull_all(w, data, c)
         return miss(w, rings)
 
@@ -340,28 +368,28 @@ def return_mapping(law, record, width):
                     low = middle
                 else:
                     high = middle
-        return w[LENGTH, s] / (1.0 + low)
+        return w[s].length / (1.0 + low)
 
     @kernel()
-    def shoot(pull, incoming, w, data, c, start, first, row):
+    def shoot(pull, incoming, w, data, c, start, first):
         """Material that is left at the end of the chain, where segment ``first`` of it has a pull; −∞ if it is too low.
 
-        The chain begins at segment ``start``. Slips of rings are written to a row, and −∞ behind a slack segment that
-        would take more.
+        The chain begins at segment ``start``. Material left behind each of its segments is written, −∞ behind a slack
+        one that would take more.
         """
-        count, moved = w.shape[1], incoming
+        count, moved = len(w), incoming
         for i in range(first, count):
             s = (start + i) % count
             if moved > -math.inf:
-                moved += w[LENGTH, s] - w[LONGER, s] + w[OLD, s] - length_at(pull, w, data, c, s)
-            w[row, i] = moved
+                moved += w[s].length - w[s].elongation + w[s].gained_before - length_at(pull, w, data, c, s)
+            w[i].left = moved
             if moved > 0.0:
-                pull = max(pull, 0.0) / w[KAPPA, s] if w[KAPPA, s] > 0.0 else math.inf
+                pull = max(pull, 0.0) / w[s].kappa if w[s].kappa > 0.0 else math.inf
             elif pull > 0.0:
-                pull *= w[KAPPA, s]
+                pull *= w[s].kappa
             else:
                 moved = -math.inf
-        return w[row, count - 1]
+        return w[count - 1].left
 
     @kernel()
     def chain(w, data, c, start, rounds):
@@ -370,14 +398,13 @@ def return_mapping(law, record, width):
         Material that is left at the end grows with the pull on a segment. It jumps where a ring on the way turns from
         one direction to the other: there that ring sticks, and the chain begins anew behind it.
         """
-        count, first, incoming, ea = w.shape[1], 0, 0.0, line_at(data, c).ea
+        count, first, incoming, ea = len(w), 0, 0.0, line_at(data, c).ea
         low, high = -ea, ea
         for _ in range(DOUBLINGS):
-            if shoot(high, incoming, w, data, c, start, first, HIGH) >= 0.0:
+            if shoot(high, incoming, w, data, c, start, first) >= 0.0:
                 break
             high *= 2.0
         while first < count:
-            w[LOW, first] = -math.inf
             for _ in range(rounds):
                 pull = 0.5 * (low + high)
                 if low < 0.0 < high:
@@ -388,47 +415,49 @@ def return_mapping(law, record, width):
                     pull = math.sqrt(low * high)
                 if pull == low or pull == high:
                     break
-                if shoot(pull, incoming, w, data, c, start, first, HIGH) < 0.0:
+                if shoot(pull, incoming, w, data, c, start, first) < 0.0:
                     low = pull
                 else:
                     high = pull
-            shoot(low, incoming, w, data, c, start, first, LOW)
-            shoot(high, incoming, w, data, c, start, first, HIGH)
+            shoot(low, incoming, w, data, c, start, first)
+            for i in range(first, count):
+                w[i].left_low = w[i].left
+            shoot(high, incoming, w, data, c, start, first)
             pull_low, pull_high = low, high
             for i in range(first, count):
                 s = (start + i) % count
                 first = i + 1
                 if i == count - 1:
                     break
-                down, up = w[LOW, i], w[HIGH, i]
+                down, up = w[i].left_low, w[i].left
                 incoming = up
                 if down <= 0.0 < up:  # it sticks
                     incoming = 0.0
-                    low = w[KAPPA, s] * pull_low if w[KAPPA, s] * pull_low > 0.0 else -ea
-                    high = max(pull_high, 0.0) / w[KAPPA, s] if w[KAPPA, s] > 0.0 else LARGEST * ea
+                    low = w[s].kappa * pull_low if w[s].kappa * pull_low > 0.0 else -ea
+                    high = max(pull_high, 0.0) / w[s].kappa if w[s].kappa > 0.0 else LARGEST * ea
                 elif down <= 0.0 and pull_low <= 0.0:  # it goes to a segment that gets just taut, from a slack one
                     low, high = -ea, 0.0
-                w[SLIP, s] = w[BEFORE, s] + incoming
+                w[s].slip = w[s].slip_before + incoming
                 if down <= 0.0 and (up > 0.0 or pull_low <= 0.0):
                     break
                 if up > 0.0:
-                    pull_low, pull_high = max(pull_low, 0.0) / w[KAPPA, s], max(pull_high, 0.0) / w[KAPPA, s]
+                    pull_low, pull_high = max(pull_low, 0.0) / w[s].kappa, max(pull_high, 0.0) / w[s].kappa
                 else:
-                    pull_low, pull_high = pull_low * w[KAPPA, s], pull_high * w[KAPPA, s]
+                    pull_low, pull_high = pull_low * w[s].kappa, pull_high * w[s].kappa
 
     @kernel()
     def find_chain(w, data, c, start, moved, rounds):
         """Write the slips of a chain where a winch has slipped by ``moved``; its pull beyond its limit, with a sign."""
-        count = w.shape[1]
+        count = len(w)
         for r in range(count):
-            w[SLIP, r] = w[BEFORE, r]
-        if w[HEAD, 0] != w[TAIL, 0]:
-            w[SLIP, count - 1] += moved
+            w[r].slip = w[r].slip_before
+        if w[0].head != w[0].tail:
+            w[count - 1].slip += moved
         for s in range(count):
-            w[OLD, s] = gained(w, s, SLIP)
+            w[s].gained_before = gained(w, s)
         chain(w, data, c, start, rounds)
         pull_all(w, data, c)
-        if w[HEAD, 0] == w[TAIL, 0]:
+        if w[0].head == w[0].tail:
             return 0.0
         ahead, back = beyond(w, count - 1, True), beyond(w, count - 1, False)
         if moved != 0.0:
@@ -439,13 +468,13 @@ def return_mapping(law, record, width):
     def find_with_winch(w, data, c, rounds):
         """Write all slips by `chain`, with that of a winch by bisection."""
         first = find_chain(w, data, c, 0, 0.0, rounds)
-        if first == 0.0 or w[REACH, 0] == 0.0:
+        if first == 0.0 or w[0].reach == 0.0:
             return
-        sign, low, high = math.copysign(1.0, first), 0.0, min(w[REACH, 0], w[LENGTH, 0])
+        sign, low, high = math.copysign(1.0, first), 0.0, min(w[0].reach, w[0].length)
         for _ in range(FARTHER):
-            if find_chain(w, data, c, 0, sign * high, rounds) * sign <= 0.0 or high >= w[REACH, 0]:
+            if find_chain(w, data, c, 0, sign * high, rounds) * sign <= 0.0 or high >= w[0].reach:
                 break
-            high = min(2.0 * high, w[REACH, 0])
+            high = min(2.0 * high, w[0].reach)
         if find_chain(w, data, c, 0, sign * high, rounds) * sign >= 0.0:
             return
         for _ in range(rounds):
@@ -460,13 +489,13 @@ def return_mapping(law, record, width):
     @kernel()
     def find_all(w, rings, data, c, a, b):
         """Write all slips by `chain`; a closed thread has a ring that sticks, at which it begins."""
-        count, best, best_error = w.shape[1], 0, math.inf
-        starts = count if w[HEAD, 0] * w[TAIL, 0] > 0.0 else 1
+        count, best, best_error = len(w), 0, math.inf
+        starts = count if w[0].head * w[0].tail > 0.0 else 1
         for trial in range(2 * starts + (starts > 1)):
             start, rounds = trial % starts, ROUGH if trial < starts else BISECTIONS
             if trial == 2 * starts:
                 start = best
-            if w[HEAD, 0] != w[TAIL, 0]:
+            if w[0].head != w[0].tail:
                 find_with_winch(w, data, c, rounds)
             else:
                 find_chain(w, data, c, start, 0.0, rounds)
@@ -475,10 +504,10 @@ def return_mapping(law, record, width):
                 if error <= 1.0:
                     return
                 for r in range(rings):
-                    moved, nothing = w[SLIP, r] - w[BEFORE, r], 8.0 * ROUNDING * (abs(w[SLIP, r]) + w[LENGTH, r])
-                    w[MODE, r] = 1.0 if moved > nothing else -1.0 if moved < -nothing else 0.0
+                    moved, nothing = slipped(w, r), 8.0 * ROUNDING * (abs(w[r].slip) + w[r].length)
+                    w[r].direction = 1.0 if moved > nothing else -1.0 if moved < -nothing else 0.0
                     if abs(moved) >= reach_of(w, r) * (1.0 - NEAR):
-                        w[MODE, r] *= 2.0
+                        w[r].direction *= 2.0
                 error = newton(w, rings, data, c, a, b)
             if error < best_error and trial >= starts:
                 best, best_error = start, error
@@ -486,20 +515,20 @@ def return_mapping(law, record, width):
     @kernel()
     def wind(t, x, data, c, w, winch, row):
         """Write what a winch holds and asks for at time t, by its numbers from a column on."""
-        last, rings = w.shape[1] - 1, w.shape[1]
+        last, rings = len(w) - 1, len(w)
         begin = internal_number(x, row, 2 * rings + 1)
         span, fixed = t - begin, data[c, winch + 3] > 0.0
         if span < SAME * t:  # times of steps are sums
             span = 0.0
-        w[HOLDS_IN, 0], w[HOLDS_OUT, 0], w[KAPPA, last] = data[c, winch], data[c, winch + 1], 1.0
-        w[REACH, 0] = math.inf if fixed or math.isinf(data[c, winch + 2]) else span * data[c, winch + 2]
+        w[0].holds_in, w[0].holds_out, w[last].kappa = data[c, winch], data[c, winch + 1], 1.0
+        w[0].reach = math.inf if fixed or math.isinf(data[c, winch + 2]) else span * data[c, winch + 2]
         if not fixed:
             hauled = hauled_until(begin + span, data, c, winch + 4) - hauled_until(begin, data, c, winch + 4)
-            w[BEFORE, last] += hauled * (w[TAIL, 0] - w[HEAD, 0])
-            w[SLIP, last] = w[BEFORE, last]
+            w[last].slip_before += hauled * (w[0].tail - w[0].head)
+            w[last].slip = w[last].slip_before
 
     @kernel(apart=())
-    def find_slips(t: float, x: Matrix, cells: Indices, data: Matrix, c: int, w: Matrix) -> int:
+    def find_slips(t: float, x: Matrix, cells: Indices, data: Matrix, c: int, w: SegmentArray) -> int:
         """Write the numbers of cell c where its slips are those that positions ask for; the number of its rings.
 
         A winch has wound until the time t.
@@ -507,15 +536,15 @@ def return_mapping(law, record, width):
         line, first, rings = record_at(record, data, c, 0), first_of(cells), rings_of(cells, data, c)
         share, ends, count = 1.0 - line.natural_length / line.distance, data[c, first + 1], cells.shape[1] - 1
         ordinary = rings - (ends > 1.0)
-        w[:] = 0.0
-        w[HEAD, 0], w[TAIL, 0] = 1.0 if ends == 1.0 or ends == 2.0 else 0.0, 1.0 if ends == 1.0 or ends == 3.0 else 0.0
         for s in range(count):
+            w[s] = NOTHING[0]
             _, _, _, _, length, longer = segment(x, cells, data, c, s)
-            w[LENGTH, s], w[LONGER, s] = length, longer + share * data[c, width + 4 + 4 * s]
+            w[s].length, w[s].elongation = length, longer + share * data[c, width + 4 + 4 * s]
+        w[0].head, w[0].tail = 1.0 if ends == 1.0 or ends == 2.0 else 0.0, 1.0 if ends == 1.0 or ends == 3.0 else 0.0
         for r in range(rings):
-            w[BEFORE, r] = w[SLIP, r] = internal_number(x, int(data[c, first]), r)
+            w[r].slip_before = w[r].slip = internal_number(x, int(data[c, first]), r)
         for r in range(ordinary):
-            w[KAPPA, r] = math.exp(-data[c, first + 2 + r] * turn_of(x, cells, data, c, r))
+            w[r].kappa = math.exp(-data[c, first + 2 + r] * turn_of(x, cells, data, c, r))
         if ends > 1.0:
             wind(t, x, data, c, w, first + 2 + ordinary, int(data[c, first]))
         pull_all(w, data, c)

@@ -36,7 +36,18 @@ from ..compiled.rows import record_at
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, RELAX, STIFFNESS, kernel
 from . import elasticity
-from .base import LINE_OUT, POWER, Balance, ForceTerm, InternalVariables, Tangent, Timing, with_internal, with_numbers
+from .base import (
+    LINE_OUT,
+    POWER,
+    Balance,
+    CellElements,
+    ForceTerm,
+    InternalVariables,
+    Tangent,
+    Timing,
+    with_internal,
+    with_numbers,
+)
 from .line_kernels import add_row_sums, add_stiffness, internal_number, line_at, pull_together, strain
 
 if TYPE_CHECKING:
@@ -306,7 +317,7 @@ class ViscousArms:
             tangent=Tangent(stiffness, bound),
             balance=Balance("strain_energy", internal=True),
             timing=Timing(at_rest=self.viscous.statics == "short"),
-            adds_tension=True,
+            elements=CellElements(adds_tension=True),
         )
         dashpots = ForceTerm(
             name="viscous",
@@ -315,13 +326,15 @@ class ViscousArms:
             force=power,
             balance=Balance("dissipated_energy", POWER, internal=True),
             timing=Timing(at_rest=False),
-            internal=InternalVariables(
-                components=3 * rows[element, 0].astype(np.int64) + number,
-                elements=element,
-                resistance=by_component[element, number],
-                relax=relax,
-                space=len(net.cells) * len(net.weights),
-                title="[cable.viscous]",
+            elements=CellElements(
+                internal=InternalVariables(
+                    components=3 * rows[element, 0].astype(np.int64) + number,
+                    elements=element,
+                    resistance=by_component[element, number],
+                    relax=relax,
+                    space=len(net.cells) * len(net.weights),
+                    title="[cable.viscous]",
+                )
             ),
         )
         return [springs, dashpots]

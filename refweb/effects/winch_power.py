@@ -40,11 +40,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..kernels import BOUND, FORCE, RELAX, STIFFNESS, kernel
-from .base import Balance, ForceTerm, InternalVariables, Tangent, Timing, no_force
+from .base import Balance, CellElements, ForceTerm, InternalVariables, Tangent, Timing, no_force
 from .line_kernels import internal_number, line_at
 from .thread_friction import kernels
 from .thread_segments import segment_kernel
-from .thread_slips import HEAD, ROWS, TAIL, layout_kernels, return_mapping, strain_of
+from .thread_slips import SEGMENT, layout_kernels, return_mapping, strain_of
 
 if TYPE_CHECKING:
     from ..net.threads import ThreadLine
@@ -115,7 +115,7 @@ def power_kernels(law, record, width):
         find_slips(t, x, nodes, data, c, w)
         pull, (r, k, q, m) = pulled_over(data, c, w), unknowns_of(nodes, data, c)
         rate = rate_at(pull, nodes, data, c)[0]
-        f[r, k] += rate * (w[TAIL, 0] - w[HEAD, 0])
+        f[r, k] += rate * (w[0].tail - w[0].head)
         f[q, m] -= rate * pull / line_at(data, c).ea
 
     @kernel()
@@ -124,7 +124,7 @@ def power_kernels(law, record, width):
         count, rings = nodes.shape[1] - 1, find_slips(t, x, nodes, data, c, w)
         size = 3 * (count + 1)
         tension_slopes(x, nodes, data, c, w, rings, False, slopes)
-        pull, (_, k, _, m), sign = pulled_over(data, c, w), unknowns_of(nodes, data, c), w[TAIL, 0] - w[HEAD, 0]
+        pull, (_, k, _, m), sign = pulled_over(data, c, w), unknowns_of(nodes, data, c), w[0].tail - w[0].head
         (rate, slope), slip, energy = rate_at(pull, nodes, data, c), size + k, size + 3 + m
         for s in range(count):
             p0, p1, p2, inverse, _, _ = segment(x, nodes, data, c, s)
@@ -140,7 +140,7 @@ def power_kernels(law, record, width):
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        nodes, w = cells[:, : cells.shape[1] - 2].copy(), np.empty((ROWS, cells.shape[1] - 3))
+        nodes, w = cells[:, : cells.shape[1] - 2].copy(), np.empty(cells.shape[1] - 3, SEGMENT)
         force_of(t, x, v, f, nodes, data, out)
         for c in range(cells.shape[0]):
             add_rates(t, x, f, nodes, data, c, w)
@@ -148,7 +148,7 @@ def power_kernels(law, record, width):
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         nodes, count = cells[:, : cells.shape[1] - 2].copy(), cells.shape[1] - 3
-        w, slopes = np.empty((ROWS, count)), np.empty((count, 3 * (count + 1) + 1))
+        w, slopes = np.empty(count, SEGMENT), np.empty((count, 3 * (count + 1) + 1))
         blocks[:] = 0.0
         stiffness_of(t, x, v, blocks, nodes, data, definite)
         for c in range(0 if definite else cells.shape[0]):
@@ -160,7 +160,7 @@ def power_kernels(law, record, width):
 
     @kernel(RELAX)
     def relax(h, x, cells, data, before, lost):
-        w = np.empty((ROWS, cells.shape[1] - 1))
+        w = np.empty(cells.shape[1] - 1, SEGMENT)
         for c in range(cells.shape[0]):
             lost[c], row, rings = 0.0, int(data[c, first_of(cells)]), rings_of(cells, data, c)
             if h <= 0.0:
@@ -220,6 +220,8 @@ def with_power(thread: ThreadLine, terms: list[ForceTerm]) -> list[ForceTerm]:
         force=no_force,
         balance=Balance("winch_energy", internal=True),
         timing=Timing(at_rest=False),
-        internal=InternalVariables(unknowns, none, np.ones(2), powered.relax, 0, "[[winch]] power"),
+        elements=CellElements(
+            internal=InternalVariables(unknowns, none, np.ones(2), powered.relax, 0, "[[winch]] power")
+        ),
     )
     return [tension, stored, length, *others]

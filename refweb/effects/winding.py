@@ -36,7 +36,7 @@ from ..compiled.rows import record_at, width_of
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..net.threads import COLUMNS, TAUT
 from .around import CYLINDER, KINDS, SPHERE, STRAIGHT, refuse_free, steady
-from .base import CONTACT_COLUMNS, TOUCH, Balance, ForceTerm, Tangent
+from .base import CONTACT_COLUMNS, TOUCH, Balance, CellElements, ForceTerm, Tangent
 from .line_kernels import line_at
 from .thread_segments import energy_kernel
 from .vectors import cross, dot
@@ -455,5 +455,5 @@ def term(net: Net, thread: ThreadLine) -> ForceTerm:
         energy=energy,
         tangent=Tangent(stiffness, bound, across=thread.across),
         balance=Balance("strain_energy", internal=True, twists=bears),
-        observed=COLUMNS + CONTACT_COLUMNS * len(bases),
+        elements=CellElements(observed=COLUMNS + CONTACT_COLUMNS * len(bases)),
     )

@@ -34,9 +34,9 @@ from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, RELAX, STIFFNESS, kernel
 from ..net.threads import COLUMNS
 from . import elasticity, thread_friction
-from .base import LINE_OUT, Balance, ForceTerm, InternalVariables, Tangent, Timing, no_force, with_rows
+from .base import LINE_OUT, Balance, CellElements, ForceTerm, InternalVariables, Tangent, Timing, no_force, with_rows
 from .line_kernels import add_stiffness, pull_together, strain
-from .thread_slips import ROWS
+from .thread_slips import SEGMENT
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -168,7 +168,7 @@ def power_kernels(law, record, first, powered, gradients, weights):
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        nodes, w = cells[:, :2].copy(), np.empty((ROWS, 1))
+        nodes, w = cells[:, :2].copy(), np.empty(1, SEGMENT)
         force_of(t, x, v, f, nodes, data, out)
         for c in range(cells.shape[0]):
             if data[c, powered] > 0.0:
@@ -176,7 +176,7 @@ def power_kernels(law, record, first, powered, gradients, weights):
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
-        nodes, w, slopes = cells[:, :2].copy(), np.empty((ROWS, 1)), np.empty((1, 7))
+        nodes, w, slopes = cells[:, :2].copy(), np.empty(1, SEGMENT), np.empty((1, 7))
         of_nodes = np.empty((cells.shape[0], 6, 6))
         stiffness_of(t, x, v, of_nodes, nodes, data, definite)
         blocks[:] = 0.0
@@ -275,7 +275,7 @@ def terms(net: Net) -> list[ForceTerm]:
         tangent=Tangent(stiffness, bound, symmetric=False),
         balance=Balance("strain_energy", internal=True),
         timing=Timing(corners),
-        adds_tension=True,
+        elements=CellElements(adds_tension=True),
     )
     stored = ForceTerm(**common, force=no_force, energy=kept, balance=Balance("strain_energy", internal=True))
     none = np.zeros(0, dtype=np.int64)
@@ -284,7 +284,9 @@ def terms(net: Net) -> list[ForceTerm]:
         force=no_force,
         energy=taken,
         balance=Balance("winch_energy", internal=True),
-        internal=InternalVariables(none, none, np.zeros(0), relax, 0, "[[winch]]", WoundLines(relax, column)),
+        elements=CellElements(
+            internal=InternalVariables(none, none, np.zeros(0), relax, 0, "[[winch]]", WoundLines(relax, column))
+        ),
     )
     return [*_with_power(net, tension), stored, wound]
 
@@ -312,7 +314,7 @@ def _with_power(net, tension):
         force=no_force,
         balance=Balance("winch_energy", internal=True),
         timing=Timing(at_rest=False),
-        internal=InternalVariables(unknowns, none, ones, relax, 0, "[[winch]] power"),
+        elements=CellElements(internal=InternalVariables(unknowns, none, ones, relax, 0, "[[winch]] power")),
     )
     return [with_rates, length]
 

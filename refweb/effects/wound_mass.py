@@ -37,7 +37,7 @@ from .base import Balance, ForceTerm, Tangent, Timing, VelocityForce
 from .line_kernels import internal_number
 from .mass_flow import Passages
 from .thread_friction import LEAST, kernels
-from .thread_slips import HEAD, MODE, ROWS, SAME, SLIP, TAIL, layout_kernels, return_mapping
+from .thread_slips import SAME, SEGMENT, layout_kernels, return_mapping
 from .time_tables import interpolate
 from .vectors import cross
 
@@ -244,7 +244,7 @@ def passing_kernel(law, record, width, powered):
     @kernel(FORCE)
     def passing(t, x, v, f, cells, data, out):
         count, size = cells.shape[1] - 1, 3 * cells.shape[1]
-        w, a, b = np.empty((ROWS, count)), np.zeros((count, count)), np.zeros((count, size + 1))
+        w, a, b = np.empty(count, SEGMENT), np.zeros((count, count)), np.zeros((count, size + 1))
         for c in range(cells.shape[0]):
             later = t
             if 0.0 < data[c, first_of(cells) + 3 + rings_of(cells, data, c)] < math.inf:  # it needs time to wind
@@ -253,15 +253,15 @@ def passing_kernel(law, record, width, powered):
             last = find_slips(later, x, cells, data, c, w) - 1
             slip_slopes(x, cells, data, c, w, last + 1, a, b)
             speed, limit = given_rate(t, cells, data, c, w)
-            speed *= w[TAIL, 0] - w[HEAD, 0]
-            given = speed + (math.copysign(limit, w[MODE, last]) if abs(w[MODE, last]) == 2.0 else 0.0)
+            speed *= w[0].tail - w[0].head
+            given = speed + (math.copysign(limit, w[last].direction) if abs(w[last].direction) == 2.0 else 0.0)
             for r in range(count):
                 rate = b[r, size] * given
                 for m in range(size):
                     rate += b[r, m] * v[cells[c, m // 3], m % 3]
-                if r == last and abs(w[MODE, r]) == 1.0 and abs(rate - speed) > limit > 0.0:
+                if r == last and abs(w[r].direction) == 1.0 and abs(rate - speed) > limit > 0.0:
                     rate = speed + math.copysign(limit, rate - speed)
-                out[c, r], out[c, count + r] = w[SLIP, r], rate
+                out[c, r], out[c, count + r] = w[r].slip, rate
 
     return passing
 
@@ -285,10 +285,10 @@ def field_kernels(law, record, width):
     @kernel()
     def changes(w, r, n):
         """Change of the length at node n by the slip of ring r: of the segments at either side, as numbers of them."""
-        last = w.shape[1] - 1
+        last = len(w) - 1
         if r < last:
             return -1.0 if n == r else 1.0 if n == r + 2 else 0.0
-        if w[HEAD, 0] > 0.0:
+        if w[0].head > 0.0:
             return 1.0 if n <= 1 else 0.0
         return -1.0 if n >= last else 0.0
 
@@ -297,8 +297,8 @@ def field_kernels(law, record, width):
         """Write what each node has gained, of the length of its segments."""
         for n in range(lengths.size):
             lengths[n] = 0.0
-            for r in range(w.shape[1]):
-                lengths[n] += changes(w, r, n) * w[SLIP, r]
+            for r in range(len(w)):
+                lengths[n] += changes(w, r, n) * w[r].slip
 
     @kernel()
     def acceleration_at(x, cells, data, c, n):
@@ -315,7 +315,7 @@ def field_kernels(law, record, width):
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        w, lengths = np.empty((ROWS, cells.shape[1] - 1)), np.empty(cells.shape[1])
+        w, lengths = np.empty(cells.shape[1] - 1, SEGMENT), np.empty(cells.shape[1])
         for c in range(cells.shape[0]):
             find_slips(t, x, cells, data, c, w)
             add_lengths(w, lengths)
@@ -334,7 +334,7 @@ def field_kernels(law, record, width):
     def stiffness(t, x, v, blocks, cells, data, definite):
         count, size = cells.shape[1] - 1, 3 * cells.shape[1]
         w, a, b, lengths = (
-            np.empty((ROWS, count)),
+            np.empty(count, SEGMENT),
             np.zeros((count, count)),
             np.zeros((count, size + 1)),
             np.empty(count + 1),
@@ -366,7 +366,7 @@ def field_kernels(law, record, width):
 
     @kernel(FORCE)
     def coriolis(t, x, v, f, cells, data, out):
-        w, lengths = np.empty((ROWS, cells.shape[1] - 1)), np.empty(cells.shape[1])
+        w, lengths = np.empty(cells.shape[1] - 1, SEGMENT), np.empty(cells.shape[1])
         for c in range(cells.shape[0]):
             find_slips(t, x, cells, data, c, w)
             add_lengths(w, lengths)
@@ -379,7 +379,7 @@ def field_kernels(law, record, width):
 
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):
-        w, lengths = np.empty((ROWS, cells.shape[1] - 1)), np.empty(cells.shape[1])
+        w, lengths = np.empty(cells.shape[1] - 1, SEGMENT), np.empty(cells.shape[1])
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
             if definite:

@@ -164,7 +164,8 @@ class State:
         system = self.system
         sums = np.zeros((system.rows, 3, 3))
         for term in system.terms:
-            if term.over_lines or term.observed or term.contact != ContactForce() or not term.tangent.stiffness:
+            of_lines = term.over_lines or term.elements.observed
+            if of_lines or term.contact != ContactForce() or not term.tangent.stiffness:
                 continue
             count, arity = term.cells.shape
             blocks = np.zeros((count, 3 * arity, 3 * arity))

@@ -125,7 +125,7 @@ class System:
         powers = [term.balance.power for term in self.terms if term.over_lines and term.balance.power is not None]
         if len(set(powers)) < len(powers):
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
-        internal = [term.internal for term in self.terms if term.internal]
+        internal = [term.elements.internal for term in self.terms if term.elements.internal]
         unknown = [variables for variables in internal if not variables.follower]
         self.internal: Any = reduce(lambda first, more: first.joined(more), unknown) if unknown else None
         self.followers: list[Any] = [variables.follower for variables in internal if variables.follower]
@@ -188,8 +188,8 @@ class System:
     @property
     def internal_of_lines(self) -> str:
         """Table or key that gives lines internal variables; empty without any."""
-        cells = self.net.cells
-        titles = (term.internal.title for term in self.terms if term.internal and np.array_equal(term.cells, cells))
+        of_lines = (term.elements.internal for term in self.terms if np.array_equal(term.cells, self.net.cells))
+        titles = (internal.title for internal in of_lines if internal)
         return next(titles, "") if self.net.rows_of_elements else ""
 
     def resistance(self, t: float) -> NDArray[np.float64]:
@@ -226,7 +226,7 @@ class System:
     @property
     def threads(self) -> dict[int, Any]:
         """The `refweb.net.threads.ThreadLine` of the net by the numbers of their terms."""
-        numbers = [number for number, term in enumerate(self.terms) if term.observed]
+        numbers = [number for number, term in enumerate(self.terms) if term.elements.observed]
         return dict(zip(numbers, self.net.threads, strict=True))
 
     @property
@@ -342,7 +342,7 @@ class System:
     @property
     def tension_column(self) -> int:
         """Column of the output of lines with their whole tension."""
-        return DAMPED_TENSION if any(f.adds_tension for f in self.terms) else TENSION
+        return DAMPED_TENSION if any(f.elements.adds_tension for f in self.terms) else TENSION
 
     def blocks(self) -> list[NDArray[np.float64]]:
         """New arrays for `stiffness` and `damping` to fill, shape (cells, 3 arity, 3 arity) each."""
@@ -625,7 +625,8 @@ class System:
         if not self.net.threads:
             return self.convex
         plain = all(not thread.wraps and thread.line.law_is("cone").all() for thread in self.net.threads)
-        return plain and self._pulls and self._is_dead([f for f in self.terms if f.balance.internal and not f.observed])
+        inner = [term for term in self.terms if term.balance.internal and not term.elements.observed]
+        return plain and self._pulls and self._is_dead(inner)
 
     @property
     def contact(self) -> bool:

@@ -268,7 +268,7 @@ def test_lines_taken_together_pull_as_each_alone(law):
     cells, data = (np.tile(part, (2 * BLOCK, 1)) for part in (net.net.cells, net.net.line_data.matrix))
     for count in (1, 2, 9, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK + 7):
         together, alone, shown, one = none.copy(), none.copy(), np.zeros((count, 3)), np.zeros((count, 3))
-        term.by_blocks(0.0, x, none, together, cells[:count], blocks_of(data[:count]), shown)
+        term.elements.by_blocks(0.0, x, none, together, cells[:count], blocks_of(data[:count]), shown)
         term.force(0.0, x, none, alone, cells[:count], data[:count], one)
         # the same products, which either may contract with sums
         np.testing.assert_allclose(shown, one, rtol=1e-14, atol=1e-14 * np.abs(data).max())

@@ -77,7 +77,7 @@ def own_energies(total, system):
 
     The energy of a term beside the law of lines, which yield takes away, counts with its sign.
     """
-    stored, beside = np.append(system.working <= 0, True), [f.adds_tension for f in system.terms]
+    stored, beside = np.append(system.working <= 0, True), [f.elements.adds_tension for f in system.terms]
     sizes = np.where([*beside, False], total[:-2], np.abs(total[:-2]))
     return total[:-2][stored].sum(), sizes[stored].sum()
 

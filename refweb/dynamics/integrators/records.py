@@ -227,13 +227,14 @@ class ForceTerms(Record):
         numbers = [lines if term.over_lines else term.data for term in terms]
         fast = [i for i, term in enumerate(terms) if term.velocity.damping is not None]
         viscous = [i for i in fast if terms[i].velocity.implicit is None]
-        still = [i for i in range(1, len(terms)) if i not in fast and terms[i].internal is None]
+        inner = [i for i, term in enumerate(terms) if term.elements.internal]
+        still = [i for i in range(1, len(terms)) if i not in fast and i not in inner]
         booked = [(i, f.balance.power) for i, f in enumerate(terms) if f.balance.power is not None]
         ready = {*fast, *pushing_terms(terms)}
-        powers = [(i, k, (i in ready) + terms[i].velocity.jumps) for i, k in booked if terms[i].internal is None]
+        powers = [(i, k, (i in ready) + terms[i].velocity.jumps) for i, k in booked if i not in inner]
         near, stored = near_of(system), [np.zeros(len(term.cells)) for term in terms]
         cells = [*(terms[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
-        by_blocks = None if net.factors else terms[0].by_blocks
+        by_blocks = None if net.factors else terms[0].elements.by_blocks
         return cls(
             forces=Functions(k.FORCE, [term.force for term in terms]),
             cells=Arrays(INDICES, [*(term.cells for term in terms), *cells]),
@@ -264,12 +265,13 @@ class Relaxing(Record):
     @classmethod
     def of(cls, system):
         """Make the record of a system."""
-        terms = [(i, term) for i, term in enumerate(system.terms) if term.internal is not None]
+        numbers = [i for i, term in enumerate(system.terms) if term.elements.internal]
+        terms = [system.terms[i] for i in numbers]
         return cls(
-            terms=np.array([i for i, _ in terms], dtype=np.int64),
-            kernels=Functions(k.RELAX, [term.internal.relax for _, term in terms]),
-            before=Arrays(VECTOR, [np.zeros(term.internal.space) for _, term in terms]),
-            lost=Arrays(VECTOR, [np.zeros(len(term.cells)) for _, term in terms]),
+            terms=np.array(numbers, dtype=np.int64),
+            kernels=Functions(k.RELAX, [term.elements.internal.relax for term in terms]),
+            before=Arrays(VECTOR, [np.zeros(term.elements.internal.space) for term in terms]),
+            lost=Arrays(VECTOR, [np.zeros(len(term.cells)) for term in terms]),
         )
 
 

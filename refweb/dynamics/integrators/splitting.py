@@ -117,9 +117,9 @@ class Splitting(CentralDifference):
 
     def __init__(self, system, *observed, order=6, **steps):
         for term in system.terms:
-            if term.internal is not None:
+            if internal := term.elements.internal:
                 raise InputError(
-                    f'[solve] method = "explicit" takes no {term.internal.title}: steps of order above 2 go back in '
+                    f'[solve] method = "explicit" takes no {internal.title}: steps of order above 2 go back in '
                     'time as well, where what relaxes would grow; use "central-difference" or "cvode"'
                 )
             timed = term.balance.power is not None or len(term.timing.times) > 0
