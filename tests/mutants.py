@@ -28,7 +28,9 @@ COPIED = ("refweb", "tests", "validation", "README.md", "CONTRIBUTING.md", "pypr
 LONGEST = 1800.0
 """Time that the tests of a bug may take [s]; one that makes them hang is noticed as well."""
 MIRRORS = {
-    "compiled": "compiled/test_kernel.py compiled/test_pointers.py",
+    "compiled": "compiled/test_kernel.py compiled/test_pointers.py compiled/test_keys.py compiled/test_store.py",
+    "compiled/keys": "compiled/test_keys.py compiled/test_kernel.py",
+    "compiled/store": "compiled/test_store.py compiled/test_kernel.py",
     "net/web": "net/test_webs.py",
     "net/lattices": "net/test_webs.py net/test_window_sizes.py",
     "net/faces": "net/test_faces.py",
@@ -306,7 +308,7 @@ MUTANTS = [
     Mutant("net/csv_files", "for end in pairs]) - first", "for end in pairs])"),
     Mutant("registry", "if len(entries) > 1:", "if len(entries) > 2:"),
     Mutant("registry", "(name in SHIPPED[kind] or name not in", "(name not in"),
-    Mutant("compiled/keys", "not in LIBRARIES:", "in LIBRARIES:"),
+    Mutant("compiled/keys", "and not _in_library(value.__name__)", "and _in_library(value.__name__)"),
     Mutant("commands/doubts", "0.5 * high**2 * np.sin(", "high**2 * np.sin("),
     Mutant("commands/doubts", "distances[0] > 0.0", "distances[0] < 0.0"),
     Mutant("scene", "min(max(SHORTEST_INTERVAL, ", "min(min(SHORTEST_INTERVAL, "),
@@ -1008,6 +1010,13 @@ MUTANTS = [
     # Machine code
     Mutant("compiled/keys", "constants = constants[1:]", "pass"),
     Mutant("compiled/keys", "return value.machine_code_key()", 'return "a kernel"'),
+    Mutant("compiled/keys", "described(given, visited), *parts)", "*parts)"),
+    Mutant("compiled/keys", "'' if followed else ONCE", "''"),
+    Mutant("compiled/keys", 'given = "" if function is value else _options(value)', 'given = ""'),
+    Mutant("compiled/keys", "sources, *settings]", "sources]"),
+    Mutant("compiled/numba_internals", "and not result.library.has_dynamic_globals:", "and True:"),
+    Mutant("compiled/kernel", 'if "_key" in self.__dict__ and (changed', "if False and (changed"),
+    Mutant("compiled/store", "if NAMES.fullmatch(path.name) and", "if"),
     Mutant("compiled/store", "if content[:CHECK] == _checksum(content[CHECK:]):", "if content:"),
     Mutant("compiled/kernel", "if features is None or k.apart <= features", "if features is None or not k.apart"),
     Mutant("compiled/numba_internals", 'function.linkage = "internal"', "pass"),

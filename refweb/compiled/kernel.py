@@ -74,10 +74,10 @@ class Kernel:
     def __init__(self, function, signature, apart, counted, options):
         self.py_func, self.apart = function, None if apart is None else frozenset(apart)
         self._given, self._counted, self._options = signature, counted, {**COMMON, **options}
-        self.prepared = False
+        self.prepared = self._keying = False
         if function.__closure__:
-            cells = [keys.described(cell.cell_contents, ()) for cell in function.__closure__]
-            function.__qualname__ += f"_{keys.digest(*cells)[:16]}"
+            cells = [keys.described(keys.content_of(cell), ()) for cell in function.__closure__]
+            function.__qualname__ += f"_{keys.digest(*cells)[-24:-8]}"
 
     @property
     def name(self):
@@ -91,8 +91,34 @@ class Kernel:
 
     @functools.cached_property
     def _key(self):
+        return self._new_key()
+
+    def _new_key(self):
         options = sorted((name, *(sorted(v) if isinstance(v, set) else [v])) for name, v in self._options.items())
-        return keys.digest(keys.of_function(self.py_func), options, self._counted, self.signature)
+        self._keying = True
+        try:
+            return keys.digest(keys.of_function(self.py_func), options, self._counted, self.signature)
+        finally:
+            self._keying = False
+
+    def renew(self):
+        """Forget machine code, if anything that the kernel captures has changed; tell if it has.
+
+        Numba reads globals when it compiles. In a notebook cells run again, with other numbers or helpers. Kernels of
+        this package do not change in a process, and are not looked at.
+        """
+        if self._keying or self.py_func.__module__.startswith("refweb."):
+            return False
+        self._keying = True  # kernels may call each other
+        try:
+            changed = any([item.renew() for item in _kernels_in(self.py_func)])
+        finally:
+            self._keying = False
+        if "_key" in self.__dict__ and (changed or self._new_key() != self._key):
+            for name in ("_key", "_slot", "_body", "_entry", "callees"):
+                self.__dict__.pop(name, None)
+            self.prepared, changed = False, True
+        return changed
 
     @property
     def _linked(self):
@@ -101,6 +127,8 @@ class Kernel:
 
     def machine_code_key(self):
         """Key of its part in the machine code of a caller, see `refweb.compiled.keys.described`."""
+        if self._keying:
+            return f"again {self.name} {keys.ONCE}"
         return self._key if self._linked else _ByAddress(self).machine_code_key()
 
     @functools.cached_property
@@ -205,18 +233,22 @@ class _ByAddress:
         return f"apart {self.kernel._slot.symbol}"
 
 
+def _kernels_in(function):
+    """Kernels that a function captures, by themselves or in tuples, a list."""
+    values = [value for _, value in keys.captured(function)]
+    return [k for value in values for k in (value if isinstance(value, tuple) else (value,)) if isinstance(k, Kernel)]
+
+
 def _collect(function, kernels, visited):
     """Add to ``kernels`` the kernels that are called by their address from a function and what is compiled into it."""
     if function in visited:
         return
     visited.add(function)
-    for _, value in keys.captured(function):
-        for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, Kernel):
-                if item.apart is None:
-                    _collect(item.py_func, kernels, visited)
-                else:
-                    kernels[item] = None
+    for item in _kernels_in(function):
+        if item.apart is None:
+            _collect(item.py_func, kernels, visited)
+        else:
+            kernels[item] = None
 
 
 def needed(kernels, features=None):
@@ -239,6 +271,7 @@ def needed(kernels, features=None):
         if item in wanted:
             continue
         wanted[item] = None
+        item.renew()
         left += [k for k in item.callees if features is None or k.apart <= features]
     return list(wanted)
 

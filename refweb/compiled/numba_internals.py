@@ -151,8 +151,10 @@ class Cache:
         return CompileResult._rebuild(target_context, *pickle.loads(content))
 
     def save_overload(self, signature, result):
-        """Write the machine code of a signature."""
-        store.write(self.file(signature), dumps(result._reduce()))
+        """Write the machine code of a signature, if another process may use it: it contains no address of this one."""
+        name = self.file(signature)
+        if keys.ONCE not in name and not result.library.has_dynamic_globals:
+            store.write(name, dumps(result._reduce()))
 
 
 class _Library(JITCodeLibrary):
@@ -169,6 +171,7 @@ class _Library(JITCodeLibrary):
 
     def _finalize_final_module(self):
         module = self._final_module
+        self._finalize_dynamic_globals()  # of the module for linking, which may be left out below
         functions = [function for function in module.functions if not function.is_declaration]
         if self.cache.linked:
             self._finalized = True  # the functions are, which the next line asks for
@@ -422,7 +425,11 @@ def dispatcher(function, given, cache) -> Any:
     """A dispatcher of numba with a `Cache`; one thread and one process compiles at a time."""
     if PLAIN:
         return numba.njit(cache=function.__code__.co_filename != "<string>", **given)(function)
-    made: Any = numba.njit(pipeline_class=_compiler_of(cache), **given)(function)
+    disabled, _config.DISABLE_JIT = _config.DISABLE_JIT, 0  # kernels have no way without machine code
+    try:
+        made: Any = numba.njit(pipeline_class=_compiler_of(cache), **given)(function)
+    finally:
+        _config.DISABLE_JIT = disabled
     made._cache, compile_one = cache, made.compile
 
     def compile_alone(signature):

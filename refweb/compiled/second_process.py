@@ -55,7 +55,8 @@ def beside(kernels):
         os.kill(child, signal.SIGKILL)
         raise
     finally:
-        os.waitpid(child, 0)
+        with contextlib.suppress(ChildProcessError):  # where the caller ignores SIGCHLD
+            os.waitpid(child, 0)
 
 
 def _copy(kernels):

@@ -19,13 +19,18 @@ import hashlib
 import os
 import pathlib
 import platform
-import tempfile
+import re
 import time
+import uuid
 
 UNUSED = 90 * 24 * 3600.0
 """Time after which an unused file is removed [s]."""
 NOTED = 24 * 3600.0
 """Age of a file above which its use updates its time [s]."""
+PATIENCE = 30.0
+"""Longest time to wait for another process that compiles the same kernel: it may be stopped [s]."""
+NAMES = re.compile(r".*-[0-9a-f]{24}(\.lock)?|refweb-.*\.part")
+"""Names of files that are written here."""
 V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 """Features of a processor that runs code for x86-64-v3."""
 CHECK = 16
@@ -36,12 +41,15 @@ SHIPPED = pathlib.Path(__file__).parent / "machine_code"
 
 @functools.cache
 def folder():
-    """Folder of machine code: ``REFWEB_CACHE``, else the cache folder of the user."""
+    """Folder of machine code: ``REFWEB_CACHE``, else the cache folder of the user; none can be made without a home."""
     if path := os.environ.get("REFWEB_CACHE"):
         return pathlib.Path(path)
     import platformdirs
 
-    return pathlib.Path(platformdirs.user_cache_dir("refweb", appauthor=False)) / "kernels"
+    try:
+        return pathlib.Path(platformdirs.user_cache_dir("refweb", appauthor=False)) / "kernels"
+    except RuntimeError:
+        return pathlib.Path(os.devnull) / "refweb"
 
 
 def portable():
@@ -77,10 +85,12 @@ def write(name, content):
     """Write a file of machine code, if the folder can be written."""
     with contextlib.suppress(OSError):
         folder().mkdir(parents=True, exist_ok=True)
-        number, path = tempfile.mkstemp(dir=folder(), suffix=".part")
-        with os.fdopen(number, "wb") as file:
-            file.write(_checksum(content) + content)
-        os.replace(path, folder() / name)
+        path = folder() / f"refweb-{uuid.uuid4().hex}.part"
+        try:
+            path.write_bytes(_checksum(content) + content)
+            os.replace(path, folder() / name)
+        finally:
+            path.unlink(missing_ok=True)
         prune()
 
 
@@ -90,13 +100,22 @@ def prune():
     before = time.time() - UNUSED
     for path in folder().iterdir():
         with contextlib.suppress(OSError):
-            if path.stat().st_mtime < before:
+            if NAMES.fullmatch(path.name) and path.stat().st_mtime < before:
                 path.unlink()
+
+
+def _locked(fcntl, file):
+    """Lock a file, if no other process has locked it; tell if it is locked."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 @contextlib.contextmanager
 def alone(name):
-    """Lock a name during compilation; other processes wait, and then read the written file."""
+    """Lock a name during compilation; other processes wait up to `PATIENCE`, and then read the written file."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(ImportError, OSError):
             import fcntl  # not on Windows, where each process compiles
@@ -104,6 +123,8 @@ def alone(name):
             folder().mkdir(parents=True, exist_ok=True)
             path = folder() / f"{name}.lock"
             file = stack.enter_context(open(path, "w"))
-            fcntl.flock(file, fcntl.LOCK_EX)
+            until = time.monotonic() + PATIENCE
+            while not _locked(fcntl, file) and time.monotonic() < until:
+                time.sleep(0.01)
             stack.callback(path.unlink, missing_ok=True)
         yield

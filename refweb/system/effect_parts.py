@@ -43,6 +43,9 @@ def parts_of(effects: Sequence[Any], net: Net) -> list[Any]:
             for part in given if isinstance(given, list) else [given]:
                 _check(part, net, title)
                 if isinstance(part, ForceTerm) and _is_foreign(effect):
+                    for kernel in _kernels_of(part).values():
+                        if kernel is not None:
+                            kernel.renew()
                     from .kernel_trial import refuse_overruns
 
                     refuse_overruns(part, net, title)
@@ -104,15 +107,19 @@ def _check_array(part, name, dtype, title):
         )
 
 
+def _kernels_of(term):
+    """Kernels of a term by name, None for those that it does not have."""
+    kernels = {"force": term.force, "energy": term.energy, "tangent.stiffness": term.tangent.stiffness}
+    return kernels | {"tangent.bound": term.tangent.bound, "velocity.damping": term.velocity.damping}
+
+
 def _check_kernels(term, title):
     """Refuse parts that are None in place of left out, and Python functions in place of kernels."""
     for name, kind in (("tangent", Tangent), ("velocity", VelocityForce)):
         if not isinstance(getattr(term, name), kind):
             value = quote(getattr(term, name))
             raise InputError(f"{title}: {name} = {value} must be a {kind.__name__}: leave it out for one without")
-    kernels = {"force": term.force, "energy": term.energy, "tangent.stiffness": term.tangent.stiffness}
-    kernels |= {"tangent.bound": term.tangent.bound, "velocity.damping": term.velocity.damping}
-    for name, function in kernels.items():
+    for name, function in _kernels_of(term).items():
         if not hasattr(function, "signature") and (function is not None or name == "force"):
             of = "None" if function is None else f"a {type(function).__name__}"
             raise InputError(f"{title}: {name} is {of} and must be a kernel: decorate it with refweb.kernels.kernel")
