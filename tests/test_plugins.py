@@ -208,7 +208,7 @@ class Uplift(Table):
 @pytest.fixture
 def clean(monkeypatch):
     """What is registered is gone behind the test."""
-    for name in ("uplift", "misplaced", "counted"):
+    for name in ("uplift", "misplaced", "counted", "unlike"):
         monkeypatch.setitem(registry.EFFECTS, name, None)
         monkeypatch.delitem(registry.EFFECTS, name)
 
@@ -266,6 +266,32 @@ def test_a_step_asks_an_effect_for_its_force_twice(clean):
     nsteps = solution.solver["nsteps"]
     assert nsteps >= 2000 and 2 * nsteps <= term.data[0, 0] < 2.1 * nsteps  # rows ask, too
     assert not no_stiffness.loaded
+
+
+@kernel(FORCE)
+def unlike_its_power(t, x, v, f, cells, data, out):
+    for c in range(len(cells)):
+        f[cells[c, 0], 2] += data[c, 0]
+        out[c, 0] = -data[c, 0] * v[cells[c, 0], 2]
+
+
+@table
+class Unlike(Table):
+    """A force whose power has the wrong sign."""
+
+    def on(self, net):
+        cells = np.array([[net.web.find("centre")[0]]], dtype=np.int32)
+        return ForceTerm("unlike", cells, np.ones((1, 1)), unlike_its_power, Balance("work", power=0))
+
+
+@pytest.mark.parametrize("method", ["central-difference", "cvode"])
+def test_a_power_that_is_not_that_of_the_force_is_named(clean, method):
+    refweb.register("effect", "unlike", Unlike)
+    solve = {"kind": "dynamic", "duration": 2e-2, "method": method}
+    given = {key: SCENE[key] for key in ("web", "accuracy", "output")} | {"solve": solve, "unlike": {}}
+    given["cable"] = {**SCENE["cable"], "prestrain": 0.0}
+    with pytest.raises(refweb.SolverError, match='or see if the power of effect "unlike" is that of its force'):
+        refweb.run(refweb.Scene.from_dict(given))
 
 
 def test_a_fault_of_a_plug_in_is_named_as_its_own(clean, tmp_path, capsys):

@@ -5,8 +5,9 @@ part that two successive steps cancel. Therefore the drift of a cell in a step i
 = −∂E/∂x. A cell that gains energy by the work of others has no drift. If no cell has a part in a drift, its source is a
 corner of a table, a rotation of a body or a force that depends on velocity.
 
-`central_difference` alone calls it, for the text of an error. May change: all of it but the names `described_source`
-and `suspects`; no result depends on it. Tests: ``tests/results/test_results.py``, ``tests/dynamics/test_dynamics.py``.
+`central_difference`, `step_observer` and `simpson_balance` call it, for the text of an error. May change: all of it but
+the names `described_source` and `suspects`; no result depends on it. Tests: ``tests/results/test_results.py``,
+``tests/dynamics/test_dynamics.py``.
 """
 
 from __future__ import annotations
@@ -78,15 +79,20 @@ def _source_of(system, places):
 
 
 def suspects(system):
-    """Further cause of a drift: effects of users with an energy, which no test of refweb holds against their forces."""
-    names = [
-        f'"{parts[0].name}"'
-        for effect, parts in system.acting
-        if any(getattr(part, "energy", None) is not None for part in parts)
-        and not type(getattr(effect, "effect", effect)).__module__.startswith("refweb.")
-    ]
+    """Further cause of a drift: effects of users, whose energy or power no test of refweb holds against forces."""
+    names, kinds = {}, {}
+    for effect, parts in system.acting:
+        if type(getattr(effect, "effect", effect)).__module__.startswith("refweb."):
+            continue
+        for part in parts:
+            energy, balance = getattr(part, "energy", None), getattr(part, "balance", None)
+            for kind, value in (("energy", energy), ("power", getattr(balance, "power", None))):
+                if value is not None:
+                    names[f'"{part.name}"'] = kinds[kind] = None
+    if not names:
+        return ""
     plural = "s" * (len(names) > 1)
-    return f", or see if the energy of effect{plural} {', '.join(names)} is that of its force" if names else ""
+    return f", or see if the {' and the '.join(kinds)} of effect{plural} {', '.join(names)} is that of its force"
 
 
 def _name_of(system, term, cell):

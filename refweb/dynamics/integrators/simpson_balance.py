@@ -309,9 +309,11 @@ class SimpsonBalance:
     def close(self, course, energies, before, remedy):
         """Compare the energies at a row with the work; raise `EnergyDriftError` where a large drift does not fall."""
         if drifts_away.py_func(course, *own_energies(energies, self.system), energies[-2], DRIFT):
+            from .drift_source import suspects
+
             raise EnergyDriftError(
                 f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and "
-                f"{course.time:.6g} s, limit {DRIFT:g}: {remedy}",
+                f"{course.time:.6g} s, limit {DRIFT:g}: {remedy}{suspects(self.system)}",
                 course.drift,
             )
 
