@@ -21,7 +21,7 @@ from refweb.commands import __doc__ as verbs
 from refweb.dynamics.integrators import __doc__ as integrators
 from refweb.effects import __doc__ as effects
 from refweb.effects.base import Balance, ForceTerm, Tangent
-from refweb.kernels import BOUND, FORCE, STIFFNESS, kernel
+from refweb.kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from refweb.net.laws import __doc__ as laws
 from refweb.net.rigid_body import __doc__ as shapes
 from refweb.results.observables import __doc__ as observables
@@ -208,7 +208,7 @@ class Uplift(Table):
 @pytest.fixture
 def clean(monkeypatch):
     """What is registered is gone behind the test."""
-    for name in ("uplift", "misplaced", "counted", "unlike"):
+    for name in ("uplift", "misplaced", "counted", "unlike", "by_global"):
         monkeypatch.setitem(registry.EFFECTS, name, None)
         monkeypatch.delitem(registry.EFFECTS, name)
 
@@ -292,6 +292,47 @@ def test_a_power_that_is_not_that_of_the_force_is_named(clean, method):
     given["cable"] = {**SCENE["cable"], "prestrain": 0.0}
     with pytest.raises(refweb.SolverError, match='or see if the power of effect "unlike" is that of its force'):
         refweb.run(refweb.Scene.from_dict(given))
+
+
+AMOUNT = 0.1
+
+
+@kernel(FORCE)
+def by_a_global(t, x, v, f, cells, data, out):
+    for c in range(len(cells)):
+        f[cells[c, 0], 2] += AMOUNT
+
+
+@kernel(ENERGY)
+def energy_by_a_global(t, x, cells, data, out):
+    for c in range(len(cells)):
+        out[c] = -AMOUNT * x[cells[c, 0], 2]
+
+
+@table
+class ByGlobal(Table):
+    """A force on all nodes, by a number of the cell of a notebook."""
+
+    def on(self, net):
+        cells = np.arange(net.nodes, dtype=np.int32)[:, None]
+        return ForceTerm(
+            "by_global", cells, np.ones((net.nodes, 1)), by_a_global, Balance("spring_energy"), energy_by_a_global
+        )
+
+
+@pytest.mark.parametrize("solve", [{"kind": "static"}, {"kind": "dynamic", "duration": 2e-3, "method": "cvode"}])
+def test_a_run_takes_the_numbers_that_cells_of_a_notebook_have_now(clean, monkeypatch, solve):
+    """Equal to `refweb.Load`, before and after the number changes; kernels of force and energy are compiled before."""
+    refweb.register("effect", "by_global", ByGlobal)
+    tables = {key: SCENE[key] for key in ("web", "cable", "accuracy")} | {"solve": solve}
+    for amount in (0.1, 0.2):
+        monkeypatch.setitem(globals(), "AMOUNT", amount)
+        load = [{"node": "all", "force": [0, 0, amount]}]
+        found, right = (
+            refweb.run(refweb.Scene.from_dict({**tables, **more})).positions
+            for more in ({"by_global": {}}, {"load": load})
+        )
+        np.testing.assert_allclose(found, right, atol=1e-9)
 
 
 def test_a_fault_of_a_plug_in_is_named_as_its_own(clean, tmp_path, capsys):

@@ -11,7 +11,6 @@ import numba
 import numpy as np
 import pytest
 
-import refweb.system.effect_parts
 from refweb.compiled import keys, numba_internals, store
 from refweb.kernels import kernel
 
@@ -178,15 +177,3 @@ def test_kernels_compile_where_numba_is_told_not_to(monkeypatch):
         return 2.0 * a
 
     assert doubled(2.0) == 4.0 and numba.core.config.DISABLE_JIT == 1
-
-
-def test_a_system_renews_kernels_of_effects_of_users():
-    """Kernels of all parts are looked at, whatever method calls them."""
-    term = types.SimpleNamespace(
-        force=outer,
-        energy=None,
-        tangent=types.SimpleNamespace(stiffness=None, bound=None),
-        velocity=types.SimpleNamespace(damping=helper),
-    )
-    found = refweb.system.effect_parts._kernels_of(term)
-    assert [k for k in found.values() if k is not None] == [outer, helper]
