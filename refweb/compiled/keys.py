@@ -7,7 +7,7 @@ May change: how texts are made, if they are the same in every process. Must stay
 depends on, else stale code runs without a word; it holds no docstring, comment or line number. Packages in `LIBRARIES`
 are not followed: none with kernels of its own may stand there. `globals_in` reads the bytecode of CPython ≥ 3.11: a new
 version of Python has to be tried. Must stay as well: all names that `kernel`, `numba_internals` and other files import.
-Tests: ``tests/compiled/test_kernel.py``.
+Tests: ``tests/compiled/test_keys.py``, ``test_kernel.py``.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ May change: the format of files and their names, since a change here gives all o
 `NOTED`. Must stay: ``REFWEB_CACHE``; a file is never read half written or damaged; `V3`, the processors on which
 machine code of wheels runs; `SHIPPED`, which ``pyproject.toml`` packs, `wheel` checks and ``refweb warm --ship`` fills;
 names that `numba_internals` imports, of which `commands.warm` imports `portable`. Tests:
-``tests/compiled/test_kernel.py``.
+``tests/compiled/test_store.py``, ``test_kernel.py``.
 """
 
 from __future__ import annotations

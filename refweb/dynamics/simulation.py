@@ -34,6 +34,7 @@ from .initial_state import (
 )
 from .integrators.crossings import APART, BESIDE, THROUGH
 from .integrators.integrator import MAX_STEPS_PER_ROW, IntegratorState
+from .integrators.momentum_balance import pushing_terms
 from .schedule import FEW_CORNERS, Schedule, blocks, time_of
 
 NO_TWIN = (
@@ -399,8 +400,8 @@ class Simulation:
             solution.controls = [controller.plain(course.time) for controller in controllers]
             self.surfaces = [controller.surfaces for controller in controllers]
         spent = dict(nsteps=course.nsteps, **course.drifts, **self.integrator.spent(course))
-        outer = (f for f in self.system.terms if not f.balance.internal and f.balance.impulse is None)
-        if integrated := sorted({term.name for term in outer}):
+        terms = self.system.terms
+        if integrated := sorted({terms[i].name for i in pushing_terms(terms)}):
             spent["integrated_impulses"] = integrated
         choice = {} if self._ways is None else self._ways.record()
         solution.solver = {**SOLVER, "method": self.scene.solve.method, **choice, **spent}

@@ -327,10 +327,9 @@ def kernels(law, record, width):
         for s in range(count):
             p0, p1, p2, inverse, _, _ = segment(x, cells, data, c, s)
             p = (p0 * inverse, p1 * inverse, p2 * inverse)
+            i, j, first, second = rings_beside(w, s)
             for m in range(size + 1):
-                before = b[s - 1, m] if s > 0 else b[count - 1, m] * w[0].head
-                behind = b[s, m] if s < count - 1 else b[count - 1, m] * w[0].tail
-                slopes[s, m] = -w[s].rate * (before - behind)
+                slopes[s, m] = -w[s].rate * (first * b[i, m] - second * b[j, m])
                 if 3 * s <= m < 3 * s + 6:
                     slopes[s, m] += w[s].slope * p[m % 3] * (-1.0 if m < 3 * s + 3 else 1.0)
 
