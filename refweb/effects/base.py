@@ -350,9 +350,9 @@ class CellElements(NamedTuple):
         True for a force over the lines beside their law, which writes the whole tension to ``out``.
     observed : int
         Number of values per cell in ``out`` that observables read, of a thread.
-    by_blocks : kernel, optional
-        The force of lines for steps of an explicit method, from numbers as `refweb.effects.line_kernels.blocks_of`
-        arranges them.
+    by_blocks : callable, optional
+        Returns the force kernel of lines for steps of an explicit method, its cells and its numbers, for those of the
+        term.
     internal : InternalVariables, optional
         Internal variables that the cells have.
     """

@@ -27,7 +27,8 @@ from ..compiled.rows import numbers_aside, numbers_at, record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..tables import Table, table
 from .base import LINE_OUT, Balance, CellElements, ForceTerm, Tangent
-from .line_kernels import BLOCK, add_row_sums, add_stiffness, line_at, pull_together, strain, strain_of
+from .line_blocks import BLOCK, RUN, SHOWN, SPACE, blocks_of, runs_of
+from .line_kernels import add_row_sums, add_stiffness, line_at, pull_together, strain, strain_of
 
 
 @functools.cache
@@ -129,55 +130,124 @@ class Line(NamedTuple):
 
 
 @functools.cache
-def force_by_blocks(law):
-    """Force kernel of straight elements of a law without columns, for numbers by `line_kernels.blocks_of`.
+def pull_of_block(law):
+    """Kernel that turns the differences ``d`` of displacements of a block into forces, with tensions and strains.
 
-    It has the sums of `kernels` in the same order, in three loops over each block: over nodes, over elements, whose
-    strains and tensions take all lanes of the processor as it has no branch, and over nodes. Elements that follow each
-    other often share their first node, whose force is not written in between. To leave out the sums of blocks without
-    tension gains nothing: ahead of a wave tensions are tiny, but not 0.
+    It has no branch, so that it takes all lanes of the processor. Tension and strain of an element lie side by side, so
+    that they are copied by one instruction.
     """
     stress = law.stress
 
+    @kernel(forceinline=True)
+    def pull(data, block, count, d, shown):
+        natural, ea = numbers_at(data, block, 0), numbers_at(data, block, BLOCK)
+        slackness, smoothing = numbers_at(data, block, 2 * BLOCK), numbers_at(data, block, 3 * BLOCK)
+        g0, r0 = numbers_at(data, block, 4 * BLOCK), numbers_at(data, block, 5 * BLOCK)
+        x0, x1 = numbers_at(data, block, 6 * BLOCK), numbers_at(data, block, 7 * BLOCK)
+        x2, distance = numbers_at(data, block, 8 * BLOCK), numbers_at(data, block, 9 * BLOCK)
+        for k in range(np.uint64(count)):
+            reference, q, s = (x0[k], x1[k], x2[k]), np.uint64(3) * k, np.uint64(2) * k
+            numbers = natural[k], ea[k], slackness[k], smoothing[k], g0[k], r0[k]
+            line = Line(*numbers, reference, distance[k])
+            p0, p1, p2, inverse, e = strain_of(line, d[q], d[q + np.uint64(1)], d[q + np.uint64(2)])
+            tension = stress(e, line)
+            scale = tension * inverse
+            shown[s], shown[s + np.uint64(1)] = tension, e
+            d[q], d[q + np.uint64(1)], d[q + np.uint64(2)] = scale * p0, scale * p1, scale * p2
+
+    return pull
+
+
+@kernel(forceinline=True)
+def show(shown, k, out, c):
+    """Copy tension and strain of element k of a block to those of cell c."""
+    shows, s = record_at(LINE_OUT, out, c, 0), np.uint64(2 * k)
+    tension, strain = shown[s], shown[s + np.uint64(1)]
+    shows.tension, shows.strain = tension, strain
+
+
+@functools.cache
+def force_by_blocks(law):
+    """Force kernel of straight elements of a law without columns, for numbers by `line_blocks.blocks_of`.
+
+    It has the sums of `kernels` in the same order, in three loops over each block: over nodes, over elements, and over
+    nodes. Elements that follow each other often share their first node, whose force is not written in between. To leave
+    out the sums of blocks without tension gains nothing: ahead of a wave tensions are tiny, but not 0.
+    """
+    pull = pull_of_block(law)
+
     @kernel(FORCE, leaf=True)
     def force(t, x, v, f, cells, data, out):
-        d0, d1, d2 = numbers_aside(BLOCK), numbers_aside(BLOCK), numbers_aside(BLOCK)
-        tensions, strains = numbers_aside(BLOCK), numbers_aside(BLOCK)
+        d, shown = numbers_aside(SPACE), numbers_aside(SHOWN)
         for begin in range(0, cells.shape[0], BLOCK):
-            count, first, block = np.uint64(min(BLOCK, cells.shape[0] - begin)), np.uint64(begin), begin // BLOCK
+            count, first = np.uint64(min(BLOCK, cells.shape[0] - begin)), np.uint64(begin)
             for k in range(count):
-                i, j = np.uint64(cells[first + k, 0]), np.uint64(cells[first + k, 1])
-                d0[k], d1[k], d2[k] = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-            natural, ea = numbers_at(data, block, 0), numbers_at(data, block, BLOCK)
-            slackness, smoothing = numbers_at(data, block, 2 * BLOCK), numbers_at(data, block, 3 * BLOCK)
-            g0, r0 = numbers_at(data, block, 4 * BLOCK), numbers_at(data, block, 5 * BLOCK)
-            x0, x1 = numbers_at(data, block, 6 * BLOCK), numbers_at(data, block, 7 * BLOCK)
-            x2, distance = numbers_at(data, block, 8 * BLOCK), numbers_at(data, block, 9 * BLOCK)
-            for k in range(count):
-                reference = x0[k], x1[k], x2[k]
-                numbers = natural[k], ea[k], slackness[k], smoothing[k], g0[k], r0[k]
-                line = Line(*numbers, reference, distance[k])
-                p0, p1, p2, inverse, e = strain_of(line, d0[k], d1[k], d2[k])
-                tension = stress(e, line)
-                scale = tension * inverse
-                tensions[k], strains[k] = tension, e
-                d0[k], d1[k], d2[k] = scale * p0, scale * p1, scale * p2
+                i, j, q = np.uint64(cells[first + k, 0]), np.uint64(cells[first + k, 1]), np.uint64(3) * k
+                d[q], d[q + np.uint64(1)], d[q + np.uint64(2)] = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+            pull(data, begin // BLOCK, count, d, shown)
             row = np.uint64(cells[first, 0])
             f0, f1, f2 = f[row, 0], f[row, 1], f[row, 2]
             for k in range(count):
-                i, j = np.uint64(cells[first + k, 0]), np.uint64(cells[first + k, 1])
+                i, j, q = np.uint64(cells[first + k, 0]), np.uint64(cells[first + k, 1]), np.uint64(3) * k
                 if i != row:
                     f[row, 0], f[row, 1], f[row, 2] = f0, f1, f2
                     f0, f1, f2, row = f[i, 0], f[i, 1], f[i, 2], i
-                f0, f1, f2 = f0 + d0[k], f1 + d1[k], f2 + d2[k]
-                f[j, 0] -= d0[k]
-                f[j, 1] -= d1[k]
-                f[j, 2] -= d2[k]
-                shows = record_at(LINE_OUT, out, begin + k, 0)
-                shows.tension, shows.strain = tensions[k], strains[k]
+                d0, d1, d2 = d[q], d[q + np.uint64(1)], d[q + np.uint64(2)]
+                f0, f1, f2 = f0 + d0, f1 + d1, f2 + d2
+                f[j, 0] -= d0
+                f[j, 1] -= d1
+                f[j, 2] -= d2
+                show(shown, k, out, begin + k)
             f[row, 0], f[row, 1], f[row, 2] = f0, f1, f2
 
     return force
+
+
+@functools.cache
+def force_by_runs(law):
+    """Force kernel as that of `force_by_blocks` for ``cells`` of `line_blocks.runs_of`: all loops take all lanes.
+
+    Forces on second nodes come first, those of long offsets ahead of short ones: where elements stand in the order of
+    their nodes, lower ones first, each node has the sum of `kernels` in the same order.
+    """
+    pull = pull_of_block(law)
+
+    @kernel(FORCE, leaf=True)
+    def force(t, x, v, f, cells, data, out):
+        d, shown = numbers_aside(SPACE), numbers_aside(SHOWN)
+        behind = 0
+        for block in range(data.shape[0]):
+            first, count = behind, 0
+            while behind < cells.shape[0] and (behind == first or record_at(RUN, cells, behind, 0).begin):
+                run = record_at(RUN, cells, behind, 0)
+                low, high, q = numbers_at(x, run.first, 0), numbers_at(x, run.second, 0), np.uint64(3 * run.begin)
+                for k in range(np.uint64(3 * run.count)):
+                    d[q + k] = high[k] - low[k]
+                behind, count = behind + 1, count + run.count
+            pull(data, block, count, d, shown)
+            for r in range(behind - 1, first - 1, -1):
+                run = record_at(RUN, cells, r, 0)
+                high, q = numbers_at(f, run.second, 0), np.uint64(3 * run.begin)
+                for k in range(np.uint64(3 * run.count)):
+                    high[k] -= d[q + k]
+            for r in range(first, behind):
+                run = record_at(RUN, cells, r, 0)
+                low, q = numbers_at(f, run.first, 0), np.uint64(3 * run.begin)
+                for k in range(np.uint64(3 * run.count)):
+                    low[k] += d[q + k]
+                begin, element, stride = run.begin, run.element, run.stride
+                for k in range(run.count):
+                    show(shown, begin + k, out, element + k * stride)
+
+    return force
+
+
+def by_blocks(law, cells, lines):
+    """Force kernel of all elements of a law, its cells and its numbers, by the runs of the net if it has long ones."""
+    runs = runs_of(cells)
+    if runs is None:
+        return force_by_blocks(law), cells, blocks_of(lines)
+    return force_by_runs(law), runs[0], blocks_of(lines, runs[1])
 
 
 def of(net):
@@ -204,7 +274,7 @@ class Elasticity(Table):
     def on(self, net):
         """The term of all lines; ``out`` is tension [N] and strain."""
         force, energy, stiffness, bound, *_ = of(net)
-        by_blocks = force_by_blocks(net.law) if net.order == 1 and not net.law.columns else None
+        together = net.order == 1 and not net.law.columns
         return ForceTerm(
             name="elasticity",
             cells=net.cells,
@@ -213,5 +283,5 @@ class Elasticity(Table):
             energy=energy,
             tangent=Tangent(stiffness, bound),
             balance=Balance("strain_energy", internal=True),
-            elements=CellElements(by_blocks=by_blocks),
+            elements=CellElements(by_blocks=functools.partial(by_blocks, net.law) if together else None),
         )

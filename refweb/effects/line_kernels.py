@@ -15,12 +15,9 @@ import math
 
 import numpy as np
 
-from ..compiled.rows import record_at, width_of
+from ..compiled.rows import record_at
 from ..kernels import kernel
 from ..net.laws.law import LINE
-
-BLOCK = 256
-"""Number of elements whose forces are found together: their numbers stay in the nearest cache."""
 
 
 @kernel(forceinline=True)
@@ -111,17 +108,3 @@ def pull_together(f, cells, c, q, nodes, gradients, scale, p0, p1, p2):
         f[row, 0] -= d * p0
         f[row, 1] -= d * p1
         f[row, 2] -= d * p2
-
-
-def blocks_of(lines):
-    """Line data by blocks of `BLOCK` elements, column after column, shape (blocks, columns · `BLOCK`).
-
-    Parameters
-    ----------
-    lines : ndarray, shape (elements, columns)
-        Numbers of straight elements, of which the first columns, those of `LINE`, are taken.
-    """
-    count, columns = -(-len(lines) // BLOCK), width_of(LINE)
-    blocks = np.zeros((count * BLOCK, columns))
-    blocks[: len(lines)] = lines[:, :columns]
-    return np.ascontiguousarray(blocks.reshape(count, BLOCK, columns).swapaxes(1, 2)).reshape(count, -1)

@@ -112,9 +112,47 @@ NODES, LINES = 1, 2
 """Kinds of `plain_of`: the largest magnitude of displacements, the largest value of a column over elements."""
 
 
+GROUP = 64
+"""Number of rows, or elements, whose largest value is found by itself, so that its place is searched in few of them."""
+
+
 @kernel(leaf=True, forceinline=True)
 def largest_in(lines, column, first, last):
-    """Largest value of a column over the elements from ``first`` to ``last`` − 1, by four maxima at once."""
+    """Largest value of a column over the elements from ``first`` to ``last`` − 1, and one at or before its place.
+
+    The second is the first of a group of elements: between it and its group's end lies that place, or within rounding
+    an equal one.
+    """
+    best, place = -math.inf, first
+    for begin in range(first, last, GROUP):
+        largest = _largest_in(lines, column, begin, min(begin + GROUP, last))
+        if _far_above(largest, best):
+            place = begin
+        best = _larger(best, largest)
+    return best, place
+
+
+@kernel(leaf=True, forceinline=True)
+def largest_square(x, first, last):
+    """Largest squared magnitude of the flat array x over rows ``first`` to ``last`` − 1, and a row as `largest_in`."""
+    best, place = -math.inf, first
+    for begin in range(first, last, GROUP):
+        largest = _largest_square(x, begin, min(begin + GROUP, last))
+        if _far_above(largest, best):
+            place = begin
+        best = _larger(best, largest)
+    return best, place
+
+
+@kernel(leaf=True, forceinline=True)
+def _far_above(a, b):
+    """Tell if a value is above another by more than its rounding."""
+    return a - 1e-15 * abs(a) > b
+
+
+@kernel(leaf=True, forceinline=True)
+def _largest_in(lines, column, first, last):
+    """Largest value of a column, by four maxima at once."""
     a = b = c = d = -math.inf
     k, fours = np.uint64(column), (last - first) // 4 * 4
     for n in range(first, first + fours, 4):
@@ -127,8 +165,8 @@ def largest_in(lines, column, first, last):
 
 
 @kernel(leaf=True, forceinline=True)
-def largest_square(x, first, last):
-    """Largest squared magnitude of the flat array x over rows ``first`` to ``last`` − 1, by four maxima at once."""
+def _largest_square(x, first, last):
+    """Largest squared magnitude of rows, by four maxima at once."""
     a = b = c = d = -math.inf
     fours = (last - first) // 4 * 4
     for n in range(first, first + fours, 4):

@@ -9,8 +9,9 @@ import skfem
 from nets import LAWS, skew_cable, skew_net, skew_web, system
 from oracle import Oracle
 
+from refweb.effects import elasticity, line_blocks
 from refweb.effects.elasticity import Elasticity
-from refweb.effects.line_kernels import BLOCK, blocks_of
+from refweb.effects.line_blocks import BLOCK, runs_of
 from refweb.net import discretisation, elements
 from refweb.net.cable import Cable
 from refweb.net.web import Web
@@ -260,16 +261,68 @@ def test_line_of_zero_length(law, start, moved):
         assert np.isfinite(K).all() and K[0, 0] > 0.0
 
 
+def pulls_together_as_alone(term, x, cells, data):
+    """Forces, tensions and strains of elements by blocks beside those of one after another."""
+    none, shown, one = np.zeros_like(x), np.zeros((len(cells), 3)), np.zeros((len(cells), 3))
+    together, alone = none.copy(), none.copy()
+    force, taken, numbers = term.elements.by_blocks(cells, data)
+    force(0.0, x, none, together, taken, numbers, shown)
+    term.force(0.0, x, none, alone, cells, data, one)
+    # the same products, which either may contract with sums
+    np.testing.assert_allclose(shown, one, rtol=1e-14, atol=1e-14 * np.abs(data).max())
+    np.testing.assert_allclose(together, alone, rtol=0.0, atol=TIGHT * max(np.abs(alone).max(), 1e-300))
+
+
 @pytest.mark.parametrize("law", LAWS, ids=str)
 def test_lines_taken_together_pull_as_each_alone(law):
     """By blocks, and what is left of the last: whatever their number, forces are those of the lines one by one."""
     net = skew_system(law)
-    term, x, none = net.terms[0], displacement(3), np.zeros((6, 3))
     cells, data = (np.tile(part, (2 * BLOCK, 1)) for part in (net.net.cells, net.net.line_data.matrix))
     for count in (1, 2, 9, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK + 7):
-        together, alone, shown, one = none.copy(), none.copy(), np.zeros((count, 3)), np.zeros((count, 3))
-        term.elements.by_blocks(0.0, x, none, together, cells[:count], blocks_of(data[:count]), shown)
-        term.force(0.0, x, none, alone, cells[:count], data[:count], one)
-        # the same products, which either may contract with sums
-        np.testing.assert_allclose(shown, one, rtol=1e-14, atol=1e-14 * np.abs(data).max())
-        np.testing.assert_allclose(together, alone, rtol=0.0, atol=TIGHT * max(np.abs(alone).max(), 1e-300))
+        assert runs_of(cells[:count]) is None
+        pulls_together_as_alone(net.terms[0], displacement(3), cells[:count], data[:count])
+
+
+def grid_of(rows, columns):
+    """Lines of a grid in the order of their first nodes, as webs have them."""
+    node = np.arange(rows * columns).reshape(rows, columns)
+    across = np.stack([node[:, :-1].ravel(), node[:, 1:].ravel()], axis=1)
+    lines = np.concatenate([across, np.stack([node[:-1].ravel(), node[1:].ravel()], axis=1)])
+    return lines[np.lexsort((lines[:, 1], lines[:, 0]))].astype(np.int32)
+
+
+LISTS = {
+    "grid": grid_of(13, 40),
+    "grid, turned ends": np.ascontiguousarray(grid_of(13, 40)[:, ::-1]),
+    "grid, half of the ends turned": np.where(
+        np.arange(987)[:, None] // 300 % 2, grid_of(13, 40)[:, ::-1], grid_of(13, 40)
+    ),
+    "grid, backwards": np.ascontiguousarray(grid_of(13, 40)[::-1]),
+    "chain": grid_of(1, 700),
+    "chain twice": np.repeat(grid_of(1, 300), 2, axis=0),
+    "grid with one element from end to end": np.concatenate([grid_of(9, 30), [[0, 269]]]).astype(np.int32),
+}
+
+
+@pytest.mark.parametrize("cells", LISTS.values(), ids=LISTS)
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_runs_of_lines_pull_as_each_alone(law, cells):
+    """Lines whose nodes follow each other, in any order, each with numbers of its own."""
+    net, rng = skew_system(law), np.random.default_rng(len(cells))
+    data = np.tile(net.net.line_data.matrix, (len(cells), 1))[: len(cells)]
+    data = data * rng.uniform(0.99, 1.01, data.shape)
+    runs, order = runs_of(cells)
+    assert sorted(order) == list(range(len(cells))) and runs[:, 1].sum() == len(cells)
+    pulls_together_as_alone(net.terms[0], displacement(4, cells.max() + 1), cells, data)
+
+
+def test_runs_keep_the_order_of_sums():
+    """Where lines stand in the order of their nodes, forces have the same bits as without runs."""
+    net, cells = skew_system("tension-only"), LISTS["grid"]
+    data = np.tile(net.net.line_data.matrix, (len(cells), 1))[: len(cells)]
+    x, forces = displacement(5, cells.max() + 1), []
+    whole = elasticity.force_by_blocks(net.net.law), cells, line_blocks.blocks_of(data)
+    for force, taken, numbers in (whole, net.terms[0].elements.by_blocks(cells, data)):
+        forces.append(np.zeros_like(x))
+        force(0.0, x, np.zeros_like(x), forces[-1], taken, numbers, np.zeros((len(cells), 2)))
+    assert forces[0].any() and np.array_equal(*forces)

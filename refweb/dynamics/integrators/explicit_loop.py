@@ -55,6 +55,8 @@ from .step import (
     contact_kick,
     give_impulse,
     give_reaction,
+    join_kicks,
+    last_kick,
     move,
     move_supports,
     note_state,
@@ -91,7 +93,7 @@ def inner_stages(
         return False
     terms, inverse, fixed = model.terms, model.inertia.inverse, model.inertia.fixed
     turns = model.inertia.turns
-    x, v, f, first = running.x, running.v, running.f, (terms.of_lines[0], terms.cells[0], terms.numbers)
+    x, v, f, first = running.x, running.v, running.f, (terms.of_lines[0], terms.elements, terms.numbers)
     forces, cells, data, outs = terms.forces, terms.cells, terms.data, terms.outs
     drifted = kicked = now - h
     for n in range(scheme.drifts.size - 1):
@@ -138,6 +140,17 @@ def begin_more(t: float, changing: bool, extra: Matrix, push: Vector, model: Mod
         set_push(t, x, v, outside, terms, extra, push)
 
 
+@kernel(leaf=True)
+def joins_kicks(model, observed, running):
+    """Tell if steps are kicks and drifts alone, and nothing follows that reads velocities at the end of each."""
+    terms, simple = model.terms, True
+    for i in observed.followed:
+        simple = simple and observed.plain[i, 0] > 0
+    forces = terms.viscous.size + terms.powers.shape[0] + model.outside.pushing.size + model.relaxing.terms.size
+    observed_more = observed.sums.shape[0] + observed.windows.slots.size + running.events.size
+    return simple and not model.implicit_contacts.terms.size + model.inertia.turns.moment.size + forces + observed_more
+
+
 @kernel(leaf=True, apart=())
 def run_steps(
     count: int, h: float, changing: bool, scheme: Scheme, model: Model, observed: Observed, running: Running,
@@ -161,6 +174,7 @@ def run_steps(
     watched, fresh, turns = followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0), model.inertia.turns
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
     checked, moves = model.ccd.checks.size > 0, driven.size + len(motions.kernels) > 0
+    joins, due = not (changing or near or stages or checked or moves) and joins_kicks(model, observed, running), False
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
@@ -171,7 +185,10 @@ def run_steps(
         if checked and reject_drift(now - h, kick, drift, stages, model, running):
             return step - 1
         note_motion(driven, mass, x, v, f, before)
-        move(kick, drift, flat_inverse, flat_x, flat_v, flat_f, x, v, turns)
+        if due:
+            join_kicks(last, kick, drift, flat_inverse, flat_x, flat_v, flat_f)
+        else:
+            move(kick, drift, flat_inverse, flat_x, flat_v, flat_f, x, v, turns)
         if stages:
             book_potential(-1.0, now - last, x, terms, work)
         if moves:
@@ -180,13 +197,16 @@ def run_steps(
         if near:
             update_neighbours(drift, x, v, bits, before, model)
             check_last_drift(now - h, model, running)
-        first(now, x, v, f, terms.cells[0], numbers, lines)
+        first(now, x, v, f, terms.elements, numbers, lines)
         for i in terms.still:
             act(i, now, x, v, f, terms)
         if near:
             show_near(nearby, terms)
         add_forces_to_bodies(x, f, turns)
-        if rubbing.size:
+        due = joins and not looks and step < count
+        if due:
+            pass
+        elif rubbing.size:
             contact_kick(begun + step, now, h, x, v, f, inverse, half, extra, running.contacts, running.parts, model)
         elif viscous.size:
             viscous_kick(now, h, x, v, f, inverse, half, extra, terms, turns)
@@ -213,6 +233,9 @@ def run_steps(
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:
+            if due:
+                last_kick(last, flat_inverse, flat_v, flat_f)
+                due = False
             looks = look_again(now, h, step == fresh, stages > 0, space.inside, total, model, observed, running)
         if averaged:
             average(now, x, v, f, lines, where, stages > 0, observed, running.averages, extremes)

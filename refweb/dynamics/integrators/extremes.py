@@ -128,16 +128,18 @@ def plain_value(i, x, lines, plain, scales, known):
     """Write the value of a plain probe, see `refweb.results.probes.plain_of`, to ``known[0]``; whether it is one.
 
     Displacements x are in a row. ``known`` holds behind that the probe before it of a column in this step, −1 for none,
-    the largest of that, which may be of the same elements, and the square of the last displacement.
+    the largest of that, which may be of the same elements, the square of the last displacement, and the row and element
+    from which the places of both are searched.
     """
     kind = plain[i, 0]
     if kind == NODES:
-        known[3] = largest_square(x, plain[i, 1], plain[i, 2])
+        known[3], known[4] = largest_square(x, plain[i, 1], plain[i, 2])
         known[0] = math.sqrt(known[3])
     elif kind > 0:
         j = int(known[1])
         if j < 0 or plain[i, 1] != plain[j, 1] or plain[i, 2] != plain[j, 2] or plain[i, 3] != plain[j, 3]:
-            known[1], known[2] = i, largest_in(lines, plain[i, 1], plain[i, 2], plain[i, 3])
+            known[1] = i
+            known[2], known[5] = largest_in(lines, plain[i, 1], plain[i, 2], plain[i, 3])
         known[0] = scales[i] * known[2]
     return kind > 0
 
@@ -196,9 +198,9 @@ def update_plain_extreme(
     plain = observed.plain
     extremes.values[i], extremes.times[i], extremes.corrections[i] = known[0], t, 0.0
     if plain[i, 0] == NODES:
-        extremes.places[i] = row_of_square(x, plain[i, 1], plain[i, 2], known[3])
+        extremes.places[i] = row_of_square(x, int(known[4]), plain[i, 2], known[3])
     else:
-        extremes.places[i] = element_of(lines, plain[i, 1], plain[i, 2], plain[i, 3], observed.scales[i], known[0])
+        extremes.places[i] = element_of(lines, plain[i, 1], int(known[5]), plain[i, 3], observed.scales[i], known[0])
 
 
 @kernel(leaf=True, forceinline=True)

@@ -22,7 +22,6 @@ import numpy as np
 from numba import from_dtype, types
 
 from ... import kernels as k
-from ...effects.line_kernels import blocks_of
 from ...effects.mass_flow import FollowedMass
 from ...effects.natural_lengths import NaturalLengths
 from ...kernels import (
@@ -37,6 +36,7 @@ from ...kernels import (
     ForceTable,
     Functions,
     IndexTable,
+    Indices,
     IntegerMatrix,
     Integers,
     Matrix,
@@ -185,8 +185,9 @@ class ForceTerms(Record):
     forces, cells, data, outs : table
         Kernel of each term, its cells, its numbers, and what it writes per cell. Behind them ``cells`` has, as a
         column, the numbers of cells that are looked at instead of all, none where all are.
-    of_lines, numbers : table and ndarray
-        Kernel of the first term in steps, one, and what it reads in place of ``data``: the same, or by blocks.
+    of_lines, elements, numbers : table and ndarray
+        Kernel of the first term in steps, one, and what it reads in place of ``cells`` and ``data``: the same, or by
+        blocks.
     still, viscous : ndarray of int
         Terms behind the first whose forces follow from displacement and time alone, and those of velocity whose
         kicks are iterated.
@@ -208,6 +209,7 @@ class ForceTerms(Record):
     data: MatrixTable
     outs: MatrixTable
     of_lines: ForceTable
+    elements: Indices
     numbers: Matrix
     still: Integers
     viscous: Integers
@@ -234,14 +236,17 @@ class ForceTerms(Record):
         powers = [(i, k, (i in ready) + terms[i].velocity.jumps) for i, k in booked if i not in inner]
         near, stored = near_of(system), [np.zeros(len(term.cells)) for term in terms]
         cells = [*(terms[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
+        whole = terms[0].force, terms[0].cells, lines
         by_blocks = None if net.factors else terms[0].elements.by_blocks
+        of_lines, elements, of_blocks = by_blocks(terms[0].cells, lines) if by_blocks else whole
         return cls(
             forces=Functions(k.FORCE, [term.force for term in terms]),
             cells=Arrays(INDICES, [*(term.cells for term in terms), *cells]),
             data=Arrays(MATRIX, [*numbers, *(numbers[i] for i in near)]),
             outs=Arrays(MATRIX, [*outs, *(outs[i] for i in near)]),
-            of_lines=Functions(k.FORCE, [by_blocks or terms[0].force]),
-            numbers=blocks_of(lines) if by_blocks else lines,
+            of_lines=Functions(k.FORCE, [of_lines]),
+            elements=elements,
+            numbers=of_blocks,
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
             beside=np.array([i for i in (*still, *viscous) if terms[i].over_lines], dtype=np.int64),

@@ -63,6 +63,21 @@ def kick_and_drift(kick, drift, inverse, x, v, f):
 
 
 @kernel(leaf=True, forceinline=True)
+def join_kicks(before, kick, drift, inverse, x, v, f):
+    """Make the last kick of a step, and then what `kick_and_drift` does, with one look at each component.
+
+    To go on with the forces of a few blocks of lines, while their nodes are in the nearest cache, takes longer: 1.1
+    times among 3120 lines, and 1.3 times among 79 600.
+    """
+    for q in range(x.size):
+        speed = v[q] + before * inverse[q] * f[q]
+        speed = speed + kick * inverse[q] * f[q]
+        v[q] = speed
+        x[q] += drift * speed
+        f[q] = 0.0
+
+
+@kernel(leaf=True, forceinline=True)
 def move(kick, drift, inverse, flat_x, flat_v, flat_f, x, v, turns):
     """Kick and drift as `kick_and_drift` does, where bodies may turn."""
     if turns.moment.size:
@@ -96,12 +111,24 @@ def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
 
 @kernel(leaf=True, forceinline=True)
 def set_reaction(fixed, f, reaction):
-    """Write the force of the supports on the net, which takes that on them away, to ``reaction``; f in a row."""
-    for k in range(3):
-        reaction[k] = 0.0
-    for n in range(fixed.size):
+    """Write the force of the supports on the net, which takes that on them away, to ``reaction``; f in a row.
+
+    Most supports hold all components of a row, which follow each other.
+    """
+    r0 = r1 = r2 = 0.0
+    n, three = np.uint64(0), np.uint64(3)
+    while n < fixed.size:
         q = np.uint64(fixed[n])
-        reaction[q % np.uint64(3)] -= f[q]
+        axis = q % three
+        if axis == 0 and n + np.uint64(2) < fixed.size and fixed[n + np.uint64(2)] == fixed[n] + 2:
+            r0, r1, r2 = r0 - f[q], r1 - f[q + np.uint64(1)], r2 - f[q + np.uint64(2)]
+            n += three
+        else:
+            r0 -= f[q] if axis == 0 else 0.0
+            r1 -= f[q] if axis == 1 else 0.0
+            r2 -= f[q] if axis == 2 else 0.0
+            n += np.uint64(1)
+    reaction[0], reaction[1], reaction[2] = r0, r1, r2
 
 
 @kernel(leaf=True, forceinline=True)

@@ -24,7 +24,7 @@ class Workspace(Record):
         The place of a value.
     reaction, push : ndarray, shape (3,)
         Force of the supports, and the force that is integrated along the steps [N].
-    known : ndarray, shape (4,)
+    known : ndarray, shape (6,)
         Values of plain probes, see `refweb.dynamics.integrators.extremes.plain_value`.
     before : ndarray, shape (driven, 7)
         State of rows whose motion is prescribed, ahead of a step.
@@ -59,7 +59,7 @@ class Workspace(Record):
         return cls(
             where=np.zeros(2, dtype=np.int64),
             reaction=np.zeros(3),
-            known=np.zeros(4),
+            known=np.zeros(6),
             push=np.zeros(3),
             before=np.empty((len(model.inertia.driven), 7)),
             aside=next(vectors),
