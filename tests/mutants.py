@@ -111,6 +111,7 @@ MIRRORS = {
     "system/broken_lines": "effects/test_rupture.py",
     "effects/base": "test_contract.py dynamics/integrators/test_ida.py",
     "effects/elasticity": "net/test_elements.py test_contract.py",
+    "effects/line_blocks": "net/test_elements.py",
     "effects/line_kernels": "net/test_elements.py test_contract.py",
     "effects/temperature": "effects/test_temperature.py",
     "effects/natural_lengths": "effects/test_viscous.py",
@@ -184,8 +185,8 @@ MIRRORS = {
     "dynamics/schedule": "dynamics/test_one_row.py dynamics/test_default_rows.py dynamics/test_dynamics.py",
     "dynamics/simulation": "test_faults.py dynamics/test_dynamics.py dynamics/test_starts.py",
     "dynamics/integrators/central_difference": "dynamics/test_agreement_by_chance.py dynamics/test_dynamics.py",
-    "dynamics/integrators/explicit_loop": "dynamics/integrators/test_nearby.py dynamics/test_dynamics.py "
-    "dynamics/test_impact.py",
+    "dynamics/integrators/explicit_loop": "dynamics/integrators/test_joined_kicks.py "
+    "dynamics/integrators/test_nearby.py dynamics/test_dynamics.py dynamics/test_impact.py",
     "dynamics/integrators/energy_balance": "dynamics/test_agreement_by_chance.py test_readme.py "
     "dynamics/test_corners.py dynamics/test_impact.py effects/test_moved_bodies.py effects/test_axles.py",
     "dynamics/integrators/ida": "dynamics/integrators/test_ida.py",
@@ -369,7 +370,10 @@ MUTANTS = [
     Mutant("system/multifrontal", "later = later[later >= end]", "later = later[later > end]"),
     Mutant("system/multifrontal", "dsyrk(-1.0, rest, beta=1.0", "dsyrk(-1.0, rest, beta=0.5"),
     Mutant("effects/elasticity", "pulled = (1.0 + e) * stress", "pulled = stress"),
-    Mutant("effects/elasticity", "f[j, 1] -= d1[k]", "f[j, 1] -= d0[k]"),
+    Mutant("effects/elasticity", "f[j, 1] -= d1", "f[j, 1] -= d0"),
+    Mutant("effects/elasticity", "range(behind - 1, first - 1, -1)", "range(behind - 1, first, -1)"),
+    Mutant("effects/elasticity", "element + k * stride", "element + k"),
+    Mutant("effects/line_blocks", "(strides[1:] == strides[:-1])", "(strides[1:] > 0)"),
     Mutant(
         "effects/damping",
         "max(time * rate * tangent(e, line), -above_floor(e, line))",
@@ -589,6 +593,9 @@ MUTANTS = [
     Mutant("effects/thread_slips", "w[r].slip = w[r].slip_before + math.copysign(reach, moved)", "w[r].slip += 0.0"),
     Mutant("dynamics/integrators/step_bound", "within = FASTER * span * (", "within = 0.01 * span * ("),
     Mutant("dynamics/integrators/explicit_loop", "or left <= 0 and end < corner)", "or False)"),
+    Mutant("dynamics/integrators/explicit_loop", "simple = simple and observed.plain[i, 0] > 0", "pass"),
+    Mutant("dynamics/integrators/explicit_loop", "joins and not looks and step < count", "joins and not looks"),
+    Mutant("results/probes", "return a - 1e-15 * abs(a) > b", "return a < b"),
     Mutant("dynamics/integrators/neighbour_list", "skin.past += skin.used", "skin.past += 0.0"),
     Mutant(
         "effects/self_contact/search",

@@ -110,9 +110,14 @@ def _tells_strain(system, scale):
     net, lines = system.net, [term for term in system.terms if term.over_lines]
     if len(net.laws) > 1 or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
         return False
-    columns = [net.line_data[name] for name in ("slackness", "smoothing", "g0", "r0", *net.law.columns)]
-    numbers = np.column_stack([scale * net.line_data.ea, *columns])
-    return bool(np.allclose(numbers, numbers[0], rtol=1e-12, atol=0.0))
+    columns = (net.line_data[name] for name in ("slackness", "smoothing", "g0", "r0", *net.law.columns))
+    return all(_equal(values) for values in (scale * net.line_data.ea, *columns))
+
+
+def _equal(values):
+    """Tell if all values are equal within rounding."""
+    low, high = values.min(), values.max()
+    return bool(low == high or high - low <= 1e-12 * abs(values[0]))
 
 
 AT_REST, REST_SHARE = 1e-6, 0.01

@@ -27,7 +27,7 @@ from ..compiled.rows import numbers_aside, numbers_at, record_at
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..tables import Table, table
 from .base import LINE_OUT, Balance, CellElements, ForceTerm, Tangent
-from .line_blocks import BLOCK, RUN, SHOWN, SPACE, blocks_of, runs_of
+from .line_blocks import BLOCK, OUTPUTS, RUN, SPACE, blocks_of, runs_of
 from .line_kernels import add_row_sums, add_stiffness, line_at, pull_together, strain, strain_of
 
 
@@ -139,7 +139,7 @@ def pull_of_block(law):
     stress = law.stress
 
     @kernel(forceinline=True)
-    def pull(data, block, count, d, shown):
+    def pull(data, block, count, d, outputs):
         natural, ea = numbers_at(data, block, 0), numbers_at(data, block, BLOCK)
         slackness, smoothing = numbers_at(data, block, 2 * BLOCK), numbers_at(data, block, 3 * BLOCK)
         g0, r0 = numbers_at(data, block, 4 * BLOCK), numbers_at(data, block, 5 * BLOCK)
@@ -152,18 +152,18 @@ def pull_of_block(law):
             p0, p1, p2, inverse, e = strain_of(line, d[q], d[q + np.uint64(1)], d[q + np.uint64(2)])
             tension = stress(e, line)
             scale = tension * inverse
-            shown[s], shown[s + np.uint64(1)] = tension, e
+            outputs[s], outputs[s + np.uint64(1)] = tension, e
             d[q], d[q + np.uint64(1)], d[q + np.uint64(2)] = scale * p0, scale * p1, scale * p2
 
     return pull
 
 
 @kernel(forceinline=True)
-def show(shown, k, out, c):
+def write_output(outputs, k, out, c):
     """Copy tension and strain of element k of a block to those of cell c."""
-    shows, s = record_at(LINE_OUT, out, c, 0), np.uint64(2 * k)
-    tension, strain = shown[s], shown[s + np.uint64(1)]
-    shows.tension, shows.strain = tension, strain
+    cell, s = record_at(LINE_OUT, out, c, 0), np.uint64(2 * k)
+    tension, strain = outputs[s], outputs[s + np.uint64(1)]
+    cell.tension, cell.strain = tension, strain
 
 
 @functools.cache
@@ -178,13 +178,13 @@ def force_by_blocks(law):
 
     @kernel(FORCE, leaf=True)
     def force(t, x, v, f, cells, data, out):
-        d, shown = numbers_aside(SPACE), numbers_aside(SHOWN)
+        d, outputs = numbers_aside(SPACE), numbers_aside(OUTPUTS)
         for begin in range(0, cells.shape[0], BLOCK):
             count, first = np.uint64(min(BLOCK, cells.shape[0] - begin)), np.uint64(begin)
             for k in range(count):
                 i, j, q = np.uint64(cells[first + k, 0]), np.uint64(cells[first + k, 1]), np.uint64(3) * k
                 d[q], d[q + np.uint64(1)], d[q + np.uint64(2)] = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-            pull(data, begin // BLOCK, count, d, shown)
+            pull(data, begin // BLOCK, count, d, outputs)
             row = np.uint64(cells[first, 0])
             f0, f1, f2 = f[row, 0], f[row, 1], f[row, 2]
             for k in range(count):
@@ -197,7 +197,7 @@ def force_by_blocks(law):
                 f[j, 0] -= d0
                 f[j, 1] -= d1
                 f[j, 2] -= d2
-                show(shown, k, out, begin + k)
+                write_output(outputs, k, out, begin + k)
             f[row, 0], f[row, 1], f[row, 2] = f0, f1, f2
 
     return force
@@ -214,7 +214,7 @@ def force_by_runs(law):
 
     @kernel(FORCE, leaf=True)
     def force(t, x, v, f, cells, data, out):
-        d, shown = numbers_aside(SPACE), numbers_aside(SHOWN)
+        d, outputs = numbers_aside(SPACE), numbers_aside(OUTPUTS)
         behind = 0
         for block in range(data.shape[0]):
             first, count = behind, 0
@@ -224,7 +224,7 @@ def force_by_runs(law):
                 for k in range(np.uint64(3 * run.count)):
                     d[q + k] = high[k] - low[k]
                 behind, count = behind + 1, count + run.count
-            pull(data, block, count, d, shown)
+            pull(data, block, count, d, outputs)
             for r in range(behind - 1, first - 1, -1):
                 run = record_at(RUN, cells, r, 0)
                 high, q = numbers_at(f, run.second, 0), np.uint64(3 * run.begin)
@@ -237,7 +237,7 @@ def force_by_runs(law):
                     low[k] += d[q + k]
                 begin, element, stride = run.begin, run.element, run.stride
                 for k in range(run.count):
-                    show(shown, begin + k, out, element + k * stride)
+                    write_output(outputs, begin + k, out, element + k * stride)
 
     return force
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 BLOCK = 256
 """Number of elements whose forces are found together: their numbers stay in the nearest cache."""
-SPACE, SHOWN = 3 * BLOCK, 2 * BLOCK
+SPACE, OUTPUTS = 3 * BLOCK, 2 * BLOCK
 """Number of components of their differences, and of their tensions and strains."""
 LONG = 8
 """Mean number of elements of the runs of a net from which they are worth it: a run costs as much as two elements."""

@@ -133,7 +133,7 @@ class Web:
     @property
     def centre(self) -> int:
         """Number of the node nearest the origin, for a cable its middle; among equal ones with least y, then x."""
-        size = np.ptp(self.points, axis=0).max()
+        size = max(np.ptp(values) for values in self.points.T)
         if self.kind == "cable":
             near = np.unique([len(self.lines) // 2, (len(self.lines) + 1) // 2])
         else:

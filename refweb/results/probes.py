@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from ..compiled.rows import record_at
+from ..compiled.rows import numbers_aside, numbers_at, record_at
 from ..effects.base import FELT, STRAIN
 from ..kernels import INTEGERS, MATRIX, kernel, sum_of
 
@@ -112,72 +112,64 @@ NODES, LINES = 1, 2
 """Kinds of `plain_of`: the largest magnitude of displacements, the largest value of a column over elements."""
 
 
-GROUP = 64
-"""Number of rows, or elements, whose largest value is found by itself, so that its place is searched in few of them."""
+GROUP, LANES = 512, 64
+"""Number of rows, or elements, whose largest value is found by itself, so that its place is searched in few of them.
+Number of maxima that are found at once: a loop without a branch takes all lanes of the processor."""
 
 
 @kernel(leaf=True, forceinline=True)
 def largest_in(lines, column, first, last):
     """Largest value of a column over the elements from ``first`` to ``last`` − 1, and one at or before its place.
 
-    The second is the first of a group of elements: between it and its group's end lies that place, or within rounding
-    an equal one.
+    The second is the first of a group of elements: in that group lies the place, or within rounding an equal one.
     """
-    best, place = -math.inf, first
+    best, near, maxima, width = -math.inf, first, numbers_aside(LANES), lines.shape[1]
     for begin in range(first, last, GROUP):
-        largest = _largest_in(lines, column, begin, min(begin + GROUP, last))
+        end = min(begin + GROUP, last)
+        values, largest = numbers_at(lines, begin, column), -math.inf
+        for k in range(LANES):
+            maxima[k] = -math.inf
+        for n in range((end - begin) // LANES if width == 2 else 0):
+            for k in range(np.uint64(LANES)):
+                value = values[np.uint64(2) * (np.uint64(LANES * n) + k)]
+                maxima[k] = value if value > maxima[k] else maxima[k]
+        for n in range((end - begin) // LANES * LANES if width == 2 else 0, end - begin):
+            largest = _larger(largest, values[width * n])
+        for k in range(LANES):
+            largest = _larger(largest, maxima[k])
         if _far_above(largest, best):
-            place = begin
+            near = begin
         best = _larger(best, largest)
-    return best, place
+    return best, near
 
 
 @kernel(leaf=True, forceinline=True)
 def largest_square(x, first, last):
     """Largest squared magnitude of the flat array x over rows ``first`` to ``last`` − 1, and a row as `largest_in`."""
-    best, place = -math.inf, first
+    best, near, maxima = -math.inf, first, numbers_aside(LANES)
     for begin in range(first, last, GROUP):
-        largest = _largest_square(x, begin, min(begin + GROUP, last))
+        end, largest = min(begin + GROUP, last), -math.inf
+        for k in range(LANES):
+            maxima[k] = -math.inf
+        for n in range((end - begin) // LANES):
+            row = np.uint64(begin + LANES * n)
+            for k in range(np.uint64(LANES)):
+                value = _size(x, np.uint64(3) * (row + k))
+                maxima[k] = value if value > maxima[k] else maxima[k]
+        for n in range(begin + (end - begin) // LANES * LANES, end):
+            largest = _larger(largest, _size(x, np.uint64(3 * n)))
+        for k in range(LANES):
+            largest = _larger(largest, maxima[k])
         if _far_above(largest, best):
-            place = begin
+            near = begin
         best = _larger(best, largest)
-    return best, place
+    return best, near
 
 
 @kernel(leaf=True, forceinline=True)
 def _far_above(a, b):
     """Tell if a value is above another by more than its rounding."""
     return a - 1e-15 * abs(a) > b
-
-
-@kernel(leaf=True, forceinline=True)
-def _largest_in(lines, column, first, last):
-    """Largest value of a column, by four maxima at once."""
-    a = b = c = d = -math.inf
-    k, fours = np.uint64(column), (last - first) // 4 * 4
-    for n in range(first, first + fours, 4):
-        m = np.uint64(n)
-        a, b = _larger(a, lines[m, k]), _larger(b, lines[m + np.uint64(1), k])
-        c, d = _larger(c, lines[m + np.uint64(2), k]), _larger(d, lines[m + np.uint64(3), k])
-    for n in range(first + fours, last):
-        a = _larger(a, lines[np.uint64(n), k])
-    return _larger(_larger(a, b), _larger(c, d))
-
-
-@kernel(leaf=True, forceinline=True)
-def _largest_square(x, first, last):
-    """Largest squared magnitude of rows, by four maxima at once."""
-    a = b = c = d = -math.inf
-    fours = (last - first) // 4 * 4
-    for n in range(first, first + fours, 4):
-        q = np.uint64(3 * n)
-        a = _larger(a, _size(x, q))
-        b = _larger(b, _size(x, q + np.uint64(3)))
-        c = _larger(c, _size(x, q + np.uint64(6)))
-        d = _larger(d, _size(x, q + np.uint64(9)))
-    for n in range(first + fours, last):
-        a = _larger(a, _size(x, np.uint64(3 * n)))
-    return _larger(_larger(a, b), _larger(c, d))
 
 
 @kernel(leaf=True, forceinline=True)

@@ -299,7 +299,6 @@ LISTS = {
     ),
     "grid, backwards": np.ascontiguousarray(grid_of(13, 40)[::-1]),
     "chain": grid_of(1, 700),
-    "chain twice": np.repeat(grid_of(1, 300), 2, axis=0),
     "grid with one element from end to end": np.concatenate([grid_of(9, 30), [[0, 269]]]).astype(np.int32),
 }
 

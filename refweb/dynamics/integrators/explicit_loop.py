@@ -44,7 +44,7 @@ from .energy_balance import (
     write_length_force,
 )
 from .events import ended_by, note_events
-from .extremes import look_at, look_with_places, note_time, plain_value, take_over, turns_back
+from .extremes import follow, look_with_places
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_balance import add_half_steps, push_on, set_push
 from .neighbour_list import reach_all, show_near, update_neighbours
@@ -55,8 +55,6 @@ from .step import (
     contact_kick,
     give_impulse,
     give_reaction,
-    join_kicks,
-    last_kick,
     move,
     move_supports,
     note_state,
@@ -105,7 +103,7 @@ def inner_stages(
         book_potential(1.0, kicked, x, terms, running.work)
         if model.ccd.checks.size:
             collides(now - h, kick, drift, REPORT, model, running)
-        move(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
+        move(0.0, kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
         book_potential(-1.0, kicked, x, terms, running.work)
         add_forces(drifted, x, v, f, outs[0], first, terms.still, forces, cells, data, outs)
         add_forces_to_bodies(x, f, turns)
@@ -157,24 +155,23 @@ def run_steps(
     space: Workspace,
 ) -> int:  # fmt: skip
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
-    where, known, push, before, total = space.where, space.known, space.push, space.before, space.total
+    where, known, before, total = space.where, space.known, space.before, space.total
+    push, reaction = space.push, space.reaction
     clock, terms, motions, nearby = running.clock[0], model.terms, model.motions, model.nearby
     mass, inverse, fixed, driven = model.inertia.mass, model.inertia.inverse, model.inertia.fixed, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
-    extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
     viscous, powers, extra, half = terms.viscous, terms.powers, space.extra, space.half
-    plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     lines, first, numbers = terms.outs[0], terms.of_lines[0], terms.numbers
     near, events, averaged = nearby.terms.size > 0, running.events, observed.windows.slots.size > 0
     pushing, rubbing = model.outside.pushing.size > 0, model.implicit_contacts.terms
-    stages, looked, reaction = scheme.drifts.size - 1, extremes.looked, space.reaction
+    extremes, turns, stages = running.extremes, model.inertia.turns, scheme.drifts.size - 1
     kick, drift, last = scheme.kicks[stages] * h, scheme.drifts[stages] * h, scheme.kicks[stages + 1] * h
     sums, bits = observed.sums, flat_v[: 3 * model.inertia.linear * (near and not stages)].view(np.int64)
-    watched, fresh, turns = followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0), model.inertia.turns
+    watched, fresh = observed.followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
     checked, moves = model.ccd.checks.size > 0, driven.size + len(motions.kernels) > 0
-    joins, due = not (changing or near or stages or checked or moves) and joins_kicks(model, observed, running), False
+    joins, waits = not (changing or near or stages or checked or moves) and joins_kicks(model, observed, running), False
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
@@ -185,10 +182,7 @@ def run_steps(
         if checked and reject_drift(now - h, kick, drift, stages, model, running):
             return step - 1
         note_motion(driven, mass, x, v, f, before)
-        if due:
-            join_kicks(last, kick, drift, flat_inverse, flat_x, flat_v, flat_f)
-        else:
-            move(kick, drift, flat_inverse, flat_x, flat_v, flat_f, x, v, turns)
+        move(last if waits else 0.0, kick, drift, flat_inverse, flat_x, flat_v, flat_f, x, v, turns)
         if stages:
             book_potential(-1.0, now - last, x, terms, work)
         if moves:
@@ -203,15 +197,13 @@ def run_steps(
         if near:
             show_near(nearby, terms)
         add_forces_to_bodies(x, f, turns)
-        due = joins and not looks and step < count
-        if due:
-            pass
-        elif rubbing.size:
+        waits = joins and not looks and step < count
+        if rubbing.size:
             contact_kick(begun + step, now, h, x, v, f, inverse, half, extra, running.contacts, running.parts, model)
         elif viscous.size:
             viscous_kick(now, h, x, v, f, inverse, half, extra, terms, turns)
         else:
-            plain_kick(last, flat_inverse, flat_v, flat_f, x, v, turns)
+            plain_kick(waits, last, flat_inverse, flat_v, flat_f, x, v, turns)
         feel(model.contacts, terms)
         if pushing:
             push_on(now, kick, last, x, v, model.outside, terms, extra, push, running.ledger.pushed)
@@ -221,21 +213,13 @@ def run_steps(
         give_reaction(kick, last, fixed, flat_f, reaction, impulse)
         if looks:
             look_inside(now, h, step == fresh, stages == 0, space.inside, where, total, model, observed, running)
-        turned, ending, known[1] = False, begun + step == planned or math.isnan(looked[0]), -1.0
-        note_time(looked, now)
-        for i in followed:
-            simple = plain_value(i, flat_x, lines, plain, scales, known)
-            if not simple:
-                known[0] = look_at(i, now, x, v, f, lines, observed, where)
-            turned = turns_back(i, known[0], signs[i], values[i], recent, ending) or turned
-            if signs[i] * known[0] > signs[i] * values[i]:
-                take_over(simple, i, now, x, v, f, lines, known, observed, where, extremes)
+        ending = begun + step == planned or math.isnan(extremes.looked[0])
+        turned = follow(now, ending, x, v, f, lines, known, where, observed, extremes)
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:
-            if due:
-                last_kick(last, flat_inverse, flat_v, flat_f)
-                due = False
+            plain_kick(not waits, last, flat_inverse, flat_v, flat_f, x, v, turns)
+            waits = False
             looks = look_again(now, h, step == fresh, stages > 0, space.inside, total, model, observed, running)
         if averaged:
             average(now, x, v, f, lines, where, stages > 0, observed, running.averages, extremes)

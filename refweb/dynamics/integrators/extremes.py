@@ -212,6 +212,22 @@ def take_over(simple, i, t, x, v, f, lines, known, observed, where, extremes):
         update_extreme(i, known[0], t, x, v, f, lines, observed, where, extremes)
 
 
+@kernel(leaf=True, forceinline=True)
+def follow(t, ending, x, v, f, lines, known, where, observed, extremes):
+    """Inspect all probes that are followed as `inspect` does, simple ones without a call."""
+    plain, scales, signs, values = observed.plain, observed.scales, observed.signs, extremes.values
+    turned, known[1] = False, -1.0
+    note_time(extremes.looked, t)
+    for i in observed.followed:
+        simple = plain_value(i, x.reshape(-1), lines, plain, scales, known)
+        if not simple:
+            known[0] = look_at(i, t, x, v, f, lines, observed, where)
+        turned = turns_back(i, known[0], signs[i], values[i], extremes.recent, ending) or turned
+        if signs[i] * known[0] > signs[i] * values[i]:
+            take_over(simple, i, t, x, v, f, lines, known, observed, where, extremes)
+    return turned
+
+
 @kernel(leaf=True, apart=("looks",))
 def inspect(
     t: float,

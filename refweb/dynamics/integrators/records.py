@@ -236,9 +236,9 @@ class ForceTerms(Record):
         powers = [(i, k, (i in ready) + terms[i].velocity.jumps) for i, k in booked if i not in inner]
         near, stored = near_of(system), [np.zeros(len(term.cells)) for term in terms]
         cells = [*(terms[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
-        whole = terms[0].force, terms[0].cells, lines
+        by_elements = terms[0].force, terms[0].cells, lines
         by_blocks = None if net.factors else terms[0].elements.by_blocks
-        of_lines, elements, of_blocks = by_blocks(terms[0].cells, lines) if by_blocks else whole
+        of_lines, elements, of_blocks = by_blocks(terms[0].cells, lines) if by_blocks else by_elements
         return cls(
             forces=Functions(k.FORCE, [term.force for term in terms]),
             cells=Arrays(INDICES, [*(term.cells for term in terms), *cells]),

@@ -78,8 +78,11 @@ def join_kicks(before, kick, drift, inverse, x, v, f):
 
 
 @kernel(leaf=True, forceinline=True)
-def move(kick, drift, inverse, flat_x, flat_v, flat_f, x, v, turns):
-    """Kick and drift as `kick_and_drift` does, where bodies may turn."""
+def move(before, kick, drift, inverse, flat_x, flat_v, flat_f, x, v, turns):
+    """Kick and drift as `kick_and_drift` does, where bodies may turn, or `join_kicks` with a kick ``before``."""
+    if before > 0.0:
+        join_kicks(before, kick, drift, inverse, flat_x, flat_v, flat_f)
+        return
     if turns.moment.size:
         note_turns(x, turns)
     kick_and_drift(kick, drift, inverse, flat_x, flat_v, flat_f)
@@ -95,10 +98,11 @@ def last_kick(kick, inverse, v, f):
 
 
 @kernel(leaf=True, forceinline=True)
-def plain_kick(kick, inverse, flat_v, flat_f, x, v, turns):
-    """Kick as `last_kick` does, where bodies may carry nodes."""
-    last_kick(kick, inverse, flat_v, flat_f)
-    update_attached_nodes(x, v, turns)
+def plain_kick(waits, kick, inverse, flat_v, flat_f, x, v, turns):
+    """Kick as `last_kick` does, where bodies may carry nodes, unless it ``waits`` for the next step."""
+    if not waits:
+        last_kick(kick, inverse, flat_v, flat_f)
+        update_attached_nodes(x, v, turns)
 
 
 @kernel(forceinline=True)
@@ -116,18 +120,18 @@ def set_reaction(fixed, f, reaction):
     Most supports hold all components of a row, which follow each other.
     """
     r0 = r1 = r2 = 0.0
-    n, three = np.uint64(0), np.uint64(3)
+    n = 0
     while n < fixed.size:
         q = np.uint64(fixed[n])
-        axis = q % three
-        if axis == 0 and n + np.uint64(2) < fixed.size and fixed[n + np.uint64(2)] == fixed[n] + 2:
+        axis = q % np.uint64(3)
+        if axis == 0 and n + 2 < fixed.size and fixed[n + 2] == fixed[n] + 2:
             r0, r1, r2 = r0 - f[q], r1 - f[q + np.uint64(1)], r2 - f[q + np.uint64(2)]
-            n += three
+            n += 3
         else:
             r0 -= f[q] if axis == 0 else 0.0
             r1 -= f[q] if axis == 1 else 0.0
             r2 -= f[q] if axis == 2 else 0.0
-            n += np.uint64(1)
+            n += 1
     reaction[0], reaction[1], reaction[2] = r0, r1, r2
 
 
