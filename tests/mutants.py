@@ -593,7 +593,6 @@ MUTANTS = [
     Mutant("effects/thread_slips", "w[r].slip = w[r].slip_before + math.copysign(reach, moved)", "w[r].slip += 0.0"),
     Mutant("dynamics/integrators/step_bound", "within = FASTER * span * (", "within = 0.01 * span * ("),
     Mutant("dynamics/integrators/explicit_loop", "or left <= 0 and end < corner)", "or False)"),
-    Mutant("dynamics/integrators/explicit_loop", "simple = simple and observed.plain[i, 0] > 0", "pass"),
     Mutant("dynamics/integrators/explicit_loop", "joins and not looks and step < count", "joins and not looks"),
     Mutant("results/probes", "return a - 1e-15 * abs(a) > b", "return a < b"),
     Mutant("dynamics/integrators/neighbour_list", "skin.past += skin.used", "skin.past += 0.0"),

@@ -14,7 +14,7 @@ def valued(probe, x, lines):
     return values[0], where[0]
 
 
-@pytest.mark.parametrize("count", [*range(1, 11), 64, 65, 200])
+@pytest.mark.parametrize("count", [*range(1, 11), 64, 65, 200, 1200])
 def test_plain_values(count):
     """Of any number of rows, from any first one on, wherever the largest is; −0 and not a number among them."""
     rng = np.random.default_rng(count)
