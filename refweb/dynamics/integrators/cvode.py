@@ -8,7 +8,10 @@ An implicit step solves (I − γJ) z = r with J = [[0, I], [−M⁻¹K, −M⁻
 
     (M + γC + γ²K) z_v = M r_v − γK r_x,    z_x = r_x + γ z_v,
 
-a matrix of half the size. It is symmetric unless an effect is not, and definite without the negative part of K.
+a matrix of half the size. It is symmetric unless an effect is not, and definite without the negative part of K. Where
+no body turns, no mass changes and there are no internal variables, the same without a product with K is
+
+    (M + γC + γ²K) z_x = M (r_x + γ r_v) + γC r_x,    z_v = (z_x − r_x)/γ.
 
 A run of 464 steps of BDF on the square web of 3120 lines, 0.7 s, takes 0.20 s for 570 solutions, 0.12 s for 26
 factorizations, 0.07 s for forces, 0.17 s within SUNDIALS, and 0.19 s for what is observed in the middle and at the end
@@ -215,11 +218,18 @@ class Cvode(Sundials):
             return
         if self._inverts(z, gamma == self._gamma and self._true):
             return
-        n, rotations = self.unknowns, self.rotations
+        n, rotations, gamma = self.unknowns, self.rotations, self._gamma
+        if not (rotations or len(self._inner) or self.system.net.flows):
+            push = self._times_mass(r[:n] + gamma * r[n:])
+            if self._C is not None:
+                push += gamma * (self._C @ r[:n])
+            z[:n] = moved = self._factor.apply(push)
+            z[n:] = (moved - r[:n]) / gamma
+            return
         first, inner, push = rotations.before(r[:n]) if rotations else r[:n], self._inner, r[n:].copy()
         push[inner] = 0.0
-        z[n:] = self._factor.apply(self._times_mass(push) - self._gamma * (self._K @ first))
-        z[:n] = first + self._gamma * (rotations.carried(z[n:]) if rotations else z[n:])
+        z[n:] = self._factor.apply(self._times_mass(push) - gamma * (self._K @ first))
+        z[:n] = first + gamma * (rotations.carried(z[n:]) if rotations else z[n:])
         z[n + inner] = r[n + inner]
 
     def jacobian_times(self, t, y, yp, u, Ju):
