@@ -18,14 +18,14 @@ factorizations with their order and 23 tangents, 0.04 s for forces, 0.11 s withi
 observed in the middle and at the end of each step. The last factors are kept where CVODE asks for them anew and nothing
 has changed, a third of all times.
 
-Corrector iterations take the tangent of an earlier state, and where lines go taut or slack they may fail: a multiple of
-the error is then added in each, and this run takes up to twice as long with rtol = 3.5e-4 to 5e-4 as with 3e-4. Later
-tangents take failures away, but one costs 1.4 ms with its factorization, a solution 0.15 ms and a step without either
-0.4 ms. With rtol = 3e-4, a tangent of each iterate takes 340 steps and 2.7 times as long, of all iterates but the first
-325 and 2 times, of the third and later ones 326 and 1.4 times. In steps that are tried again alone 327 steps take as
-long. Over rtol = 2e-4 to 1e-3 that takes 0.9 times as long, with errors of 1 to 2.5 times the size; by Adams methods it
-takes as long, with the same errors. GMRES with the earlier factors and the true tangent needs 4 to 6 iterations in
-place of one.
+Corrector iterations take the tangent of an earlier state, and where lines go taut or slack they may diverge, with
+corrections three times as large in each; this run takes up to twice as long with rtol = 3.5e-4 to 5e-4 as with 3e-4.
+Tangents of iterates take failures away, but one costs 1.4 ms with its factorization, a solution 0.15 ms and a step
+without either 0.6 ms. With rtol = 3e-4, a tangent of each iterate takes 340 steps and 2.7 times as long, of all
+iterates but the first 325 and 2 times, of the third and later ones 326 and 1.4 times. In steps that are tried again
+alone 327 steps take as long. Over rtol = 2e-4 to 1e-3 that takes 0.9 times as long, with errors of 1 to 2.5 times the
+size; by Adams methods it takes as long, with the same errors. GMRES with the earlier factors and the true tangent needs
+4 to 6 iterations in place of one.
 
 May change: `SHORT`, `STILL`, `SUDDEN`, `FAR`, `ATTEMPTS` and `RENEWED`, which change cost and digits within the
 tolerance. Must stay: arguments of `set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which
