@@ -65,7 +65,7 @@ EFFECTS = {
     "fold": "refweb.effects.fold:Fold",
 }
 """Effects by the name of their table."""
-FACTORIZATIONS = ("qdldl", "superlu", "multifrontal", "rslab")
+FACTORIZATIONS = ("qdldl", "supernodal", "superlu", "multifrontal", "rslab")
 """Libraries that factorize symmetric matrices."""
 SOLVES = {"static": "refweb.settings:Static", "dynamic": "refweb.settings:Dynamic"}
 """Kinds of ``[solve]``."""

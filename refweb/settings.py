@@ -109,9 +109,9 @@ class Static(Table):
         Values of t.
     mass : {"lumped", "consistent"}
         The weight is the same with either; the modes at the equilibrium and the centrifugal forces are not.
-    factorization : {"auto", "qdldl", "superlu", "multifrontal", "rslab"}
-        Library that factorizes the tangent, see `refweb.system.factorization`; "auto" takes, for
-        large nets, rslab where it is installed and else SuperLU, and for still larger ones "multifrontal".
+    factorization : {"auto", "qdldl", "supernodal", "superlu", "multifrontal", "rslab"}
+        Library that factorizes the tangent, see `refweb.system.factorization`; "auto" takes qdldl for small nets,
+        "supernodal" for larger ones, and for still larger ones rslab where it is installed and else "multifrontal".
 
     Raises
     ------
@@ -168,7 +168,7 @@ class Dynamic(Table):
         How linear systems are solved, see `refweb.dynamics.integrators.sundials`.
     mass : {"lumped", "consistent"}
         Mass of the lines at their nodes: row sums of the consistent matrix, or the matrix itself.
-    factorization : {"auto", "qdldl", "superlu", "multifrontal", "rslab"}
+    factorization : {"auto", "qdldl", "supernodal", "superlu", "multifrontal", "rslab"}
         Of CVODE, IDA and a start at an equilibrium: library that factorizes the tangent, as of `Static`.
     start : {"web", "equilibrium"} or path
         State at t = 0: the web as it is, its equilibrium under what acts at t = 0, or the last state in a result

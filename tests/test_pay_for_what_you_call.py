@@ -6,7 +6,6 @@ of the pattern are counted from the lines of the web and the pairs that an effec
 compiled loop is called with.
 """
 
-import importlib.util
 import itertools
 import json
 import os
@@ -218,6 +217,8 @@ def called(given):
     modules, outside = loaded_with(roots(given, method)), list(BASE)
     rests = solve["kind"] == "static" or solve.get("start") == "equilibrium"
     factorized = "system.factorization" in modules
+    if factorized and web == "paper":  # of 2000 unknowns and more
+        modules.add("system.supernodal")
     if given["cable"].get("order", 1) > 1:
         modules.add("net.curved")
     if given["cable"].get("order", 1) > 1 or rests or method in ("cvode", "ida"):
@@ -228,8 +229,6 @@ def called(given):
         outside.append("scipy.sparse.csgraph")
     if factorized:
         outside.append("qdldl")
-        if given["web"].get("mesh") == "hexagon" and importlib.util.find_spec("rslab"):
-            outside.append("rslab")  # of more unknowns than any other
     if method in ("cvode", "ida"):
         outside.append("sksundae")
     if any(body.get("shape") == "mesh" for body in given.get("body", ())):

@@ -47,21 +47,22 @@ eight scenes of different character. ``python -m validation.cost.explicit``, ``v
 **How far it goes.** One process and one thread carry a web as far as memory does. Five load steps of a web from flat,
 with their bounds, take 12 factorizations by rslab of the square web at 118 803 unknowns, 13 of the triangle web at 120
 300 and 22 of the hexagon web at 237 009, which hangs together by far fewer lines, and 10, 13 and 20 by SuperLU, which
-comes with scipy: 9, 7 and 11 times the CPU time of one by SuperLU with rslab, 20, 18 and 28 times by SuperLU.
-Without rslab, fronts factorize from 50 000 unknowns on: one load then takes 6 (squares), 3.6 (triangles) and 4.8 times
-(hexagons) the CPU time of one by SuperLU, and 9.6, 11.9 and 16 times with SuperLU itself. qdldl, which
-factorizes smaller webs, would take 28 to 36 times, and 48 where the CPU has little cache. With rslab the square web
-takes 20 factorizations, 102 s and 3.2 GB at 747 003 unknowns, 21, 208 s and 6.1 GB at 1 465 803, and at a million
-cells, 1 998 000 lines and 2 994 003 unknowns, 23, 545 s and 12.5 GB, with energies proven to 2e-14 of themselves. CPU
-time goes with unknowns to the power 1.25 from 365 403 on, and 1.36 from 118 803: larger webs take more steps. That of
-triangles goes with 1.25 from 30 150 to 120 300, and with 1.37 on to 368 025, where it takes 18 factorizations and 1.8
-GB: each costs by the power 1.1, and their number grows by the power 0.3. That of hexagons goes with 1.28 from 237 009
-to 2 929 509: 31, 371 s and 7.6 GB. Of the 12.5 GB the factor has 3.1 and needs 4.3 while it is made, beside 4 of web,
-pattern and analysis; at that rate two million cells would take 25. Memory is to be counted by what is filled: where a
-process may have no more than 16 GB of addresses, a million cells end it, as libraries ask for more than they use.
-Explicit steps need no matrix: of the million cells a thousand take 27 s, 14 ns an element and step, and 1.3 GB, with a
-set-up of 5 s; both go with unknowns to the power 1.1. Of hexagons, which have more nodes for each line, an element and
-step takes 24 ns at 747 252 lines: out of the cache the time is that of memory. A single web larger than a machine is a
-matter for PETSc: its SNES with the same tangents, spread over machines, and conjugate gradients with a multigrid of the
-soft modes, or MUMPS, in place of the factor. ``python -m validation.cost.scale`` prints these figures for a machine.
+comes with scipy: 9, 7 and 11 times the CPU time of one by SuperLU with rslab, 20, 18 and 28 times by SuperLU. Below 100
+000 unknowns supernodes factorize, with or without rslab, and from there on, without it, fronts: one load then takes 6
+(squares), 3.6 (triangles) and 4.8 times (hexagons) the CPU time of one by SuperLU, and 9.6, 11.9 and 16 times with
+SuperLU itself. qdldl, which factorizes webs of less than 2000 unknowns, would take 28 to 36 times, and 48 where the CPU
+has little cache. With rslab the square web takes 20 factorizations, 102 s and 3.2 GB at 747 003 unknowns, 21, 208 s and
+6.1 GB at 1 465 803, and at a million cells, 1 998 000 lines and 2 994 003 unknowns, 23, 545 s and 12.5 GB, with
+energies proven to 2e-14 of themselves. CPU time goes with unknowns to the power 1.25 from 365 403 on, and 1.36 from 118
+803: larger webs take more steps. That of triangles goes with 1.25 from 30 150 to 120 300, and with 1.37 on to 368 025,
+where it takes 18 factorizations and 1.8 GB: each costs by the power 1.1, and their number grows by the power 0.3. That
+of hexagons goes with 1.28 from 237 009 to 2 929 509: 31, 371 s and 7.6 GB. Of the 12.5 GB the factor has 3.1 and needs
+4.3 while it is made, beside 4 of web, pattern and analysis; at that rate two million cells would take 25. Memory is to
+be counted by what is filled: where a process may have no more than 16 GB of addresses, a million cells end it, as
+libraries ask for more than they use. Explicit steps need no matrix: of the million cells a thousand take 27 s, 14 ns an
+element and step, and 1.3 GB, with a set-up of 5 s; both go with unknowns to the power 1.1. Of hexagons, which have more
+nodes for each line, an element and step takes 24 ns at 747 252 lines: out of the cache the time is that of memory. A
+single web larger than a machine is a matter for PETSc: its SNES with the same tangents, spread over machines, and
+conjugate gradients with a multigrid of the soft modes, or MUMPS, in place of the factor. ``python -m
+validation.cost.scale`` prints these figures for a machine.
 """

@@ -1,20 +1,20 @@
 """Factorizations of tangents: LDLᵀ, whose D shows the signs of the pivots, and LU of unsymmetric matrices.
 
-Four codes compute LDLᵀ. qdldl works column by column, and is fast while the factor fits into the cache. SuperLU of
-scipy computes LU; if all its pivots are on the diagonal, U is D Lᵀ. It is used from `LARGEST` unknowns on. On a CPU
-with 8 MB of cache, a factorization of a square web takes 15 ms with qdldl and 27 ms with SuperLU at 7203 unknowns. It
-takes 0.46 and 0.18 s at 29 403, and 4.6 and 1.4 s at 118 803. `refweb.system.multifrontal` takes positive definite
-matrices alone, and SuperLU all others. It is used from `HUGE` unknowns on: at 118 803 unknowns, a factorization takes
-0.3 times that of SuperLU (squares), 0.15 (triangles) and 0.2 (hexagons, 237 009), and a solution 1.5 times. One load on
-squares takes 6 in place of 9.6 times a factorization by SuperLU; at 29 403 unknowns both take the same time.
+Five codes compute LDLᵀ. qdldl works column by column; it takes less than `MEDIUM` unknowns, for which nothing has to be
+compiled, and every matrix with a pivot of 0. `refweb.system.supernodal` works on blocks of columns by kernels: on a CPU
+with AVX-512 it factorizes a square web in a quarter of qdldl's time at 4563 unknowns and a fifth at 29 403, and solves
+in half of it. `refweb.system.multifrontal` takes positive definite matrices alone, and SuperLU of scipy all others: it
+computes LU; if all its pivots are on the diagonal, U is D Lᵀ. From `HUGE` unknowns on, where both have the same speed,
+fronts take the place of supernodes, since their order fills less the larger a web is: a factorization takes 0.21 s by
+supernodes, 0.34 by fronts and 1.1 by SuperLU at 118 803 unknowns (squares), 0.32 and 0.31 by the first two at 120 300
+(triangles), 0.47 and 0.45 at 237 009 (hexagons) and 0.92 and 1.01 at 305 283 (squares).
 
-rslab (``pip install 'refweb[fast]'``) works on blocks of columns, and keeps its ordering. It is used from `LARGE`
-unknowns on, if it is installed. Five load steps of a square web from flat take 9.4 s CPU with qdldl and 3.8 s with
-rslab at 29 403 unknowns, 1.8 and 1.4 s at 10 443; at 4563 factorizations cost the same. rslab is a young library: if
-the residual of a solution or the signs of its pivots are wrong, qdldl replaces it for the rest of the run, with a
-finding.
+rslab (``pip install 'refweb[fast]'``) works on blocks of columns as well, and keeps its ordering. It is used from
+`HUGE` unknowns on, if it is installed: there it takes as long as fronts for a factorization and half as long for a
+solution. At 29 403 unknowns it takes 52 ms, and supernodes 19. rslab is a young library: if the residual of a solution
+or the signs of its pivots are wrong, qdldl replaces it for the rest of the run, with a finding.
 
-May change: `LARGE`, `LARGEST`, `HUGE` and `NEMIN`, which are measured: they change times, and results by rounding; the
+May change: `MEDIUM`, `LARGE`, `HUGE` and `NEMIN`, which are measured: they change times, and results by rounding; the
 insides of the classes. `FINE` and `ROUGH` decide when a solution is refined or refused. Must stay: keys of `LIBRARIES`,
 the same as `registry.FACTORIZATIONS` and values of scenes; `Lu` and `Factor` have ``update``, ``solve``, ``shift`` and
 ``solutions`` alike, since `statics.newton` holds either. Signs of pivots decide stability in statics and counts of
@@ -33,8 +33,10 @@ import numpy as np
 
 from ..errors import InputError
 
-LARGE, LARGEST, HUGE = 5000, 20_000, 50_000
-"""Numbers of unknowns from which on rslab is used, if it is installed, and SuperLU and fronts if it is not."""
+MEDIUM, HUGE = 2000, 100_000
+"""Numbers of unknowns from which on supernodes are used, and rslab, if it is installed, or fronts, if it is not."""
+LARGE = 5000
+"""Number of unknowns from which on qdldl tries two orderings."""
 FINE, ROUGH = 1e-8, 1e-2
 """Relative residual to which a solution is refined, and relative residual above which a solution is refused."""
 
@@ -48,12 +50,12 @@ class Library:
 
     Parameters
     ----------
-    asked : {"auto", "qdldl", "superlu", "multifrontal", "rslab"}
+    asked : {"auto", "qdldl", "supernodal", "superlu", "multifrontal", "rslab"}
         Library that the scene asks for.
 
     Attributes
     ----------
-    name : {"qdldl", "superlu", "multifrontal", "rslab"}
+    name : {"qdldl", "supernodal", "superlu", "multifrontal", "rslab"}
         Name of the library in use.
     why : str or None
         Its name and the reason for the choice; None before the first factorization.
@@ -77,9 +79,9 @@ class Library:
             return
         self.name = self._asked
         if self._asked == "auto":
-            fast = size >= LARGE and importlib.util.find_spec("rslab")
-            slow = "multifrontal" if size >= HUGE else "superlu" if size >= LARGEST else "qdldl"
-            self.name = "rslab" if fast else slow
+            self.name = "supernodal" if size >= MEDIUM else "qdldl"
+            if size >= HUGE:
+                self.name = "rslab" if importlib.util.find_spec("rslab") else "multifrontal"
         self.why = f"{self.name}, {f'for {size} unknowns' if self._asked == 'auto' else 'as asked for'}"
 
     def fall_back(self, what):
@@ -234,7 +236,20 @@ def _multifrontal(pattern):
     return Multifrontal(pattern)
 
 
-LIBRARIES = {"qdldl": Qdldl, "superlu": _Superlu, "rslab": _Rslab, "multifrontal": _multifrontal}
+def _supernodal(pattern):
+    """A `refweb.system.supernodal.Supernodal`, whose kernels only its caller needs."""
+    from .supernodal import Supernodal
+
+    return Supernodal(pattern)
+
+
+LIBRARIES = {
+    "qdldl": Qdldl,
+    "supernodal": _supernodal,
+    "superlu": _Superlu,
+    "rslab": _Rslab,
+    "multifrontal": _multifrontal,
+}
 
 
 class Factor:

@@ -62,7 +62,7 @@ class System:
         Values with ``on(net)``.
     supported : ndarray of bool, shape (nodes, 3)
         Components of nodes that do not move, or move as prescribed.
-    factorization : {"auto", "qdldl", "superlu", "multifrontal", "rslab"}
+    factorization : {"auto", "qdldl", "supernodal", "superlu", "multifrontal", "rslab"}
         Library that factorizes its symmetric matrices.
 
     Attributes

@@ -1,4 +1,4 @@
-"""LDLᵀ by four libraries: the same solutions and signs of pivots, which is taken, and what is done where one errs.
+"""LDLᵀ by five libraries: the same solutions and signs of pivots, which is taken, and what is done where one errs.
 
 Truth of the signs are eigenvalues by numpy.
 """
@@ -17,7 +17,7 @@ from refweb.system.sparsity import Pattern
 
 THERE = importlib.util.find_spec("rslab") is not None
 needs_rslab = pytest.mark.skipif(not THERE, reason='rslab, of the extra "fast", is not installed')
-LIBRARIES = ["qdldl", "superlu", "multifrontal", pytest.param("rslab", marks=needs_rslab)]
+LIBRARIES = ["qdldl", "supernodal", "superlu", "multifrontal", pytest.param("rslab", marks=needs_rslab)]
 
 
 def pattern(library, n=6):
@@ -102,10 +102,9 @@ def test_the_choice(monkeypatch):
         monkeypatch.setattr(factorization.importlib.util, "find_spec", lambda name, there=there: there or None)
         for size, fast, else_ in (
             (factorization.HUGE, "rslab", "multifrontal"),
-            (factorization.HUGE - 1, "rslab", "superlu"),
-            (factorization.LARGEST, "rslab", "superlu"),
-            (factorization.LARGE, "rslab", "qdldl"),
-            (factorization.LARGE - 1, "qdldl", "qdldl"),
+            (factorization.HUGE - 1, "supernodal", "supernodal"),
+            (factorization.MEDIUM, "supernodal", "supernodal"),
+            (factorization.MEDIUM - 1, "qdldl", "qdldl"),
         ):
             name = fast if there else else_
             library = Library()
@@ -113,7 +112,7 @@ def test_the_choice(monkeypatch):
             library.choose(size)
             assert (library.name, library.why) == (name, f"{name}, for {size} unknowns")
         library = Library("qdldl")
-        library.choose(10 * factorization.LARGE)
+        library.choose(10 * factorization.HUGE)
         assert library.why == "qdldl, as asked for"
     with pytest.raises(InputError, match=r"factorization = \"rslab\" is not installed: pip install 'refweb\[fast\]'"):
         Library("rslab")

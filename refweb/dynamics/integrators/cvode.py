@@ -8,17 +8,24 @@ An implicit step solves (I − γJ) z = r with J = [[0, I], [−M⁻¹K, −M⁻
 
     (M + γC + γ²K) z_v = M r_v − γK r_x,    z_x = r_x + γ z_v,
 
-a matrix of half the size. It is symmetric unless an effect is not, and definite without the negative part of K.
+a matrix of half the size. It is symmetric unless an effect is not, and definite without the negative part of K. Where
+no body turns, no mass changes and there are no internal variables, the same without a product with K is
 
-A run of 464 steps of BDF on the square web of 3120 lines, 0.7 s, takes 0.20 s for 570 solutions, 0.12 s for 26
-factorizations, 0.07 s for forces, 0.17 s within SUNDIALS, and 0.19 s for what is observed in the middle and at the end
-of each step. The last factors are kept where CVODE asks for them anew and nothing has changed, a third of all times.
+    (M + γC + γ²K) z_x = M (r_x + γ r_v) + γC r_x,    z_v = (z_x − r_x)/γ.
 
-Corrector iterations take the tangent of an earlier state, and where lines go taut or slack they may fail: this run
-takes 1.2 to 2.3 times as long with rtol = 3.5e-4 to 5e-4 as with 3e-4. A tangent of each iterate takes a quarter of the
-steps and all failures away, and still three times as long if it is factorized (4 ms each), or twice as long with GMRES
-and the earlier factors, which needs 4 to 6 iterations in place of one. In steps that are tried again alone it takes as
-long as the earlier tangent.
+A run of 464 steps of BDF on the square web of 3120 lines, 0.44 s, takes 0.08 s for 580 solutions, 0.05 s for 27
+factorizations with their order and 23 tangents, 0.04 s for forces, 0.11 s within SUNDIALS, and 0.09 s for what is
+observed in the middle and at the end of each step. The last factors are kept where CVODE asks for them anew and nothing
+has changed, a third of all times.
+
+Corrector iterations take the tangent of an earlier state, and where lines go taut or slack they may diverge, with
+corrections three times as large in each; this run takes up to twice as long with rtol = 3.5e-4 to 5e-4 as with 3e-4.
+Tangents of iterates take failures away, but one costs 1.4 ms with its factorization, a solution 0.15 ms and a step
+without either 0.6 ms. With rtol = 3e-4, a tangent of each iterate takes 340 steps and 2.7 times as long, of all
+iterates but the first 325 and 2 times, of the third and later ones 326 and 1.4 times. In steps that are tried again
+alone 327 steps take as long. Over rtol = 2e-4 to 1e-3 that takes 0.9 times as long, with errors of 1 to 2.5 times the
+size; by Adams methods it takes as long, with the same errors. GMRES with the earlier factors and the true tangent needs
+4 to 6 iterations in place of one.
 
 May change: `SHORT`, `STILL`, `SUDDEN`, `FAR`, `ATTEMPTS` and `RENEWED`, which change cost and digits within the
 tolerance. Must stay: arguments of `set_up`, `precondition`, `jacobian_times`, `jacobian` and `right_side`, by which
@@ -100,6 +107,7 @@ class Cvode(Sundials):
         self._gamma, self._plain, self._set_up_at, self._due = None, False, None, 0
         self._rest, self._tried = np.inf, 0  # largest acceleration at the last set-up at rest, and attempts since then
         self._factored = None  # γ of the factors, None where these are of another tangent
+        self._fastest = None  # bound on |J| of the tangent [1/s], None where it is not known yet
         if self._consistent:
             self._mass_values = system.mass.values.copy()
             self._mass_values[system.pattern.diagonal[self._inner]] = 1.0  # of what has no velocity
@@ -165,7 +173,7 @@ class Cvode(Sundials):
             return
         if not known or not jok and not (self._plain and self.stats["nfev"] < self._due):
             self._stiffness, self._damping = self._tangent(t, y)
-            self._factored = None
+            self._factored = self._fastest = None
             self._K = self.system.pattern.matrix(self._stiffness)
             self._C = None if self._damping is None else self.system.pattern.matrix(self._damping)
             self._due = self.stats["nfev"] + RENEWED
@@ -184,8 +192,10 @@ class Cvode(Sundials):
         def largest(values):
             return (np.add.reduceat(np.abs(values), self.system.pattern.indptr[:-1]) / self._mass).max()
 
-        damped = 0.0 if self._damping is None else largest(self._damping)
-        return gamma * (damped + np.sqrt(largest(self._stiffness))) <= SHORT
+        if self._fastest is None or self.system.net.flows:
+            damped = 0.0 if self._damping is None else largest(self._damping)
+            self._fastest = damped + np.sqrt(largest(self._stiffness))
+        return gamma * self._fastest <= SHORT
 
     def _factorize_step(self, gamma):
         system = self.system
@@ -215,11 +225,18 @@ class Cvode(Sundials):
             return
         if self._inverts(z, gamma == self._gamma and self._true):
             return
-        n, rotations = self.unknowns, self.rotations
+        n, rotations, gamma = self.unknowns, self.rotations, self._gamma
+        if not (rotations or len(self._inner) or self.system.net.flows):
+            push = self._times_mass(r[:n] + gamma * r[n:])
+            if self._C is not None:
+                push += gamma * (self._C @ r[:n])
+            z[:n] = moved = self._factor.apply(push)
+            z[n:] = (moved - r[:n]) / gamma
+            return
         first, inner, push = rotations.before(r[:n]) if rotations else r[:n], self._inner, r[n:].copy()
         push[inner] = 0.0
-        z[n:] = self._factor.apply(self._times_mass(push) - self._gamma * (self._K @ first))
-        z[:n] = first + self._gamma * (rotations.carried(z[n:]) if rotations else z[n:])
+        z[n:] = self._factor.apply(self._times_mass(push) - gamma * (self._K @ first))
+        z[:n] = first + gamma * (rotations.carried(z[n:]) if rotations else z[n:])
         z[n + inner] = r[n + inner]
 
     def jacobian_times(self, t, y, yp, u, Ju):

@@ -17,7 +17,9 @@ A step solves J z = r with J = ∂F/∂y + c ∂F/∂y'. Eliminating displacemen
 
     (M + C/c + K/c²) z_v = (r_v − K r_x/c)/c,    z_x = (r_x + z_v)/c
 
-for every node alike, with r_x = 0 for one without mass.
+for every node alike, with r_x = 0 for one without mass. Where no body turns and no mass changes, the same without K is
+
+    (M + C/c + K/c²) (r_x + z_v) = r_v/c + M r_x + C r_x/c.
 
 May change: private methods, and `UNTESTED`, upwards. Must stay: unknowns stand in the order x, v, λ, μ, also for
 `system.links`; arguments of `residual`, `set_up`, `precondition`, `jacobian_times` and `jacobian`, by which sksundae
@@ -112,6 +114,11 @@ class Ida(Sundials):
     def _set_masses(self, mass):
         self._M.data[self.system.pattern.diagonal] = mass
 
+    def _times_mass(self, v):
+        if self.system.net.consistent_minus_lumped is not None:
+            return self._M @ v
+        return self._M.data[self.system.pattern.diagonal] * v
+
     # The residual
 
     def _parts(self, y):
@@ -148,7 +155,7 @@ class Ida(Sundials):
             r[n + len(heavy) :] = np.concatenate([pairs.excess(x), pairs.speed(x, v)])
         slope = np.zeros(n)
         slope[heavy] = self._parts(yp)[1]
-        balance = self._M @ slope - force
+        balance = self._times_mass(slope) - force
         if len(inner := self._inner):
             balance[inner] += self.system.resistance(t) * rate[inner]
         moved = stored
@@ -197,11 +204,17 @@ class Ida(Sundials):
         n, heavy, bare, c = self.unknowns, self._heavy, self._bare, self._factored
         first, second = r[:n].copy(), np.empty(n)
         first[bare], second[bare], second[heavy] = 0.0, r[bare], r[n:]
-        if self.rotations:
-            first = self.rotations.before(first)
-        velocity = self._factor.apply((second - self._K @ first / c) / c)
-        carried = self.rotations.carried(velocity) if self.rotations else velocity
-        z[:n], z[n:] = (first + carried) / c, velocity[heavy]
+        if self.rotations or self.system.net.flows:
+            first = self.rotations.before(first) if self.rotations else first
+            velocity = self._factor.apply((second - self._K @ first / c) / c)
+            carried = self.rotations.carried(velocity) if self.rotations else velocity
+            z[:n], z[n:] = (first + carried) / c, velocity[heavy]
+            return
+        push = second / c + self._times_mass(first)
+        if self._C is not None:
+            push += self._C @ first / c
+        moved = self._factor.apply(push)
+        z[:n], z[n:] = moved / c, (moved - first)[heavy]
 
     def jacobian_times(self, t, y, yp, res, u, Ju, c):
         """Write J u, J that of the last `set_up`."""
@@ -210,7 +223,7 @@ class Ida(Sundials):
         n, heavy, bare = self.unknowns, self._heavy, self._bare
         velocity, slope = c * u[:n], np.zeros(n)
         velocity[heavy], slope[heavy] = u[n:], c * u[n:]
-        balance = self._M @ slope + self._K @ u[:n]
+        balance = self._times_mass(slope) + self._K @ u[:n]
         if self._C is not None:
             balance += self._C @ velocity
         moved = self.rotations.product(u[:n], self._of_all(u[n:]))[heavy] if self.rotations else u[n:]
