@@ -217,7 +217,7 @@ def called(given):
     modules, outside = loaded_with(roots(given, method)), list(BASE)
     rests = solve["kind"] == "static" or solve.get("start") == "equilibrium"
     factorized = "system.factorization" in modules
-    if factorized and web == "paper":  # of 2000 unknowns and more
+    if factorized and web == "paper" and (solve["kind"] == "dynamic" or given["web"].get("mesh") == "hexagon"):
         modules.add("system.supernodal")
     if given["cable"].get("order", 1) > 1:
         modules.add("net.curved")

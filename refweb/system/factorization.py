@@ -1,26 +1,27 @@
 """Factorizations of tangents: LDLᵀ, whose D shows the signs of the pivots, and LU of unsymmetric matrices.
 
-Five codes compute LDLᵀ. qdldl works column by column; it takes less than `MEDIUM` unknowns, for which nothing has to be
-compiled, and every matrix with a pivot of 0. `refweb.system.supernodal` works on blocks of columns by kernels: on a CPU
-with AVX-512 it factorizes a square web in a quarter of qdldl's time at 4563 unknowns and a fifth at 29 403, and solves
-in half of it. `refweb.system.multifrontal` takes positive definite matrices alone, and SuperLU of scipy all others: it
-computes LU; if all its pivots are on the diagonal, U is D Lᵀ. From `HUGE` unknowns on, where both have the same speed,
-fronts take the place of supernodes, since their order fills less the larger a web is: a factorization takes 0.21 s by
-supernodes, 0.34 by fronts and 1.1 by SuperLU at 118 803 unknowns (squares), 0.32 and 0.31 by the first two at 120 300
-(triangles), 0.47 and 0.45 at 237 009 (hexagons) and 0.92 and 1.01 at 305 283 (squares).
+Five codes compute LDLᵀ. qdldl works column by column; it takes every matrix with a pivot of 0, and less than `MEDIUM`
+unknowns in statics, or `STEPPED` in dynamics, for which nothing has to be compiled. `refweb.system.supernodal` works on
+blocks of columns by kernels: on a CPU with AVX-512 it factorizes a square web in a quarter of qdldl's time at 4563
+unknowns and a fifth at 29 403, and solves in half of it. `refweb.system.multifrontal` takes positive definite matrices
+alone, and SuperLU of scipy all others: it computes LU; if all its pivots are on the diagonal, U is D Lᵀ. From `HUGE`
+unknowns on, where both have the same speed, fronts take the place of supernodes, since their order fills less the
+larger a web is: a factorization takes 0.21 s by supernodes, 0.34 by fronts and 1.1 by SuperLU at 118 803 unknowns
+(squares), 0.32 and 0.31 by the first two at 120 300 (triangles), 0.47 and 0.45 at 237 009 (hexagons) and 0.92 and 1.01
+at 305 283 (squares).
 
 rslab (``pip install 'refweb[fast]'``) works on blocks of columns as well, and keeps its ordering. It is used from
 `HUGE` unknowns on, if it is installed: there it takes as long as fronts for a factorization and half as long for a
 solution. At 29 403 unknowns it takes 52 ms, and supernodes 19. rslab is a young library: if the residual of a solution
 or the signs of its pivots are wrong, qdldl replaces it for the rest of the run, with a finding.
 
-May change: `MEDIUM`, `LARGE`, `HUGE` and `NEMIN`, which are measured: they change times, and results by rounding; the
-insides of the classes. `FINE` and `ROUGH` decide when a solution is refined or refused. Must stay: keys of `LIBRARIES`,
-the same as `registry.FACTORIZATIONS` and values of scenes; `Lu` and `Factor` have ``update``, ``solve``, ``shift`` and
-``solutions`` alike, since `statics.newton` holds either. Signs of pivots decide stability in statics and counts of
-modes. Must stay as well: `weak_pivot`, which `links` and `integrators.massless_nodes` import; `negative_pivots`, which
-`statics.stability` and `studies.turning` import; `Library`, which `system` imports; public names of `Lu`, which other
-files use; `_Rslab`, which a test calls. Tests: ``tests/system/test_factorization.py``.
+May change: `STEPPED`, `MEDIUM`, `LARGE`, `HUGE` and `NEMIN`, which are measured: they change times, and results by
+rounding; the insides of the classes. `FINE` and `ROUGH` decide when a solution is refined or refused. Must stay: keys
+of `LIBRARIES`, the same as `registry.FACTORIZATIONS` and values of scenes; `Lu` and `Factor` have ``update``,
+``solve``, ``shift`` and ``solutions`` alike, since `statics.newton` holds either. Signs of pivots decide stability in
+statics and counts of modes. Must stay as well: `weak_pivot`, which `links` and `integrators.massless_nodes` import;
+`negative_pivots`, which `statics.stability` and `studies.turning` import; `Library`, which `system` imports; public
+names of `Lu`, which other files use; `_Rslab`, which a test calls. Tests: ``tests/system/test_factorization.py``.
 """
 
 from __future__ import annotations
@@ -33,8 +34,10 @@ import numpy as np
 
 from ..errors import InputError
 
-MEDIUM, HUGE = 2000, 100_000
-"""Numbers of unknowns from which on supernodes are used, and rslab, if it is installed, or fronts, if it is not."""
+STEPPED, MEDIUM, HUGE = 2000, 8000, 100_000
+"""Numbers of unknowns from which on supernodes are used, in dynamics and in statics, and rslab, if it is installed, or
+fronts, if it is not. Kernels of supernodes compile for 1.4 s at first, which statics of fewer unknowns save after 20
+runs only."""
 LARGE = 5000
 """Number of unknowns from which on qdldl tries two orderings."""
 FINE, ROUGH = 1e-8, 1e-2
@@ -52,6 +55,8 @@ class Library:
     ----------
     asked : {"auto", "qdldl", "supernodal", "superlu", "multifrontal", "rslab"}
         Library that the scene asks for.
+    medium : int
+        Number of unknowns from which on "auto" uses supernodes.
 
     Attributes
     ----------
@@ -68,8 +73,8 @@ class Library:
         If the library that the scene asks for is not installed.
     """
 
-    def __init__(self, asked="auto"):
-        self._asked, self.name, self.why, self.remarks = asked, "qdldl", None, []
+    def __init__(self, asked="auto", medium=MEDIUM):
+        self._asked, self._medium, self.name, self.why, self.remarks = asked, medium, "qdldl", None, []
         if asked == "rslab" and not importlib.util.find_spec("rslab"):
             raise InputError("[solve] factorization = \"rslab\" is not installed: pip install 'refweb[fast]'")
 
@@ -79,7 +84,7 @@ class Library:
             return
         self.name = self._asked
         if self._asked == "auto":
-            self.name = "supernodal" if size >= MEDIUM else "qdldl"
+            self.name = "supernodal" if size >= self._medium else "qdldl"
             if size >= HUGE:
                 self.name = "rslab" if importlib.util.find_spec("rslab") else "multifrontal"
         self.why = f"{self.name}, {f'for {size} unknowns' if self._asked == 'auto' else 'as asked for'}"

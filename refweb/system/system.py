@@ -164,9 +164,9 @@ class System:
     @cached_property
     def library(self) -> Library:
         """Library that factorizes its symmetric matrices, a `refweb.system.factorization.Library`."""
-        from .factorization import Library
+        from .factorization import MEDIUM, STEPPED, Library
 
-        return Library(self._factorization)
+        return Library(self._factorization, MEDIUM if self.net.quasi_static else STEPPED)
 
     @property
     def fixed(self) -> NDArray[np.bool_]:
