@@ -591,11 +591,11 @@ MUTANTS = [
     Mutant("effects/thread_slips", "if pull == low or pull == high:", "if high - low < 1e-3 * ea:"),
     Mutant("effects/thread_slips", "total += (high - low) * (first + slope * middle)", "total += (high - low) * first"),
     Mutant("effects/thread_slips", "w[r].slip = w[r].slip_before + math.copysign(reach, moved)", "w[r].slip += 0.0"),
-    Mutant("dynamics/integrators/step_bound", "within = FASTER * span * (", "within = 0.01 * span * ("),
+    Mutant("effects/self_contact/search", "FASTER * span * (math.sqrt(speed)", "0.01 * span * (math.sqrt(speed)"),
     Mutant("dynamics/integrators/explicit_loop", "or left <= 0 and end < corner)", "or False)"),
     Mutant("dynamics/integrators/explicit_loop", "joins and not looks and step < count", "joins and not looks"),
     Mutant("results/probes", "return a - 1e-15 * abs(a) > b", "return a < b"),
-    Mutant("dynamics/integrators/neighbour_list", "skin.past += skin.used", "skin.past += 0.0"),
+    Mutant("dynamics/integrators/neighbour_list", "near(skin + first_room + second,", "near(skin + first_room,"),
     Mutant(
         "effects/self_contact/search",
         "of_first = from_axis(p, u, w) - approach",

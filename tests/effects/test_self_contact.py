@@ -308,8 +308,10 @@ def distance(p, q):
     return min(best)
 
 
+@pytest.mark.parametrize("roomy", [False, True])
 @pytest.mark.parametrize("flat, skin", [(1.0, 0.0), (1.0, 0.2), (0.0, 0.1), (1e3, 0.5)])
-def test_search_finds_all_pairs(flat, skin):
+def test_search_finds_all_pairs(flat, skin, roomy):
+    """Within a skin and the rooms of both elements, in the order of elements."""
     rng = np.random.default_rng(5)
     points = rng.uniform(-1.0, 1.0, (60, 3)) * [1.0, 1.0, flat]
     rows = np.array([(n, n + 1) for n in range(59) if n % 5 != 4])
@@ -320,13 +322,15 @@ def test_search_finds_all_pairs(flat, skin):
     cells, data = touch.elements_of(net, np.zeros((len(rows), 0)))
     x = 0.3 * rng.standard_normal((60, 3))
     place = (points + x)[rows]
+    marks = rng.exponential(0.1, (60 * roomy, 4))
+    rooms = marks[rows, 3].max(axis=1) if roomy else np.zeros(len(rows))
     near = search.REACH * 2e-4 + skin
-    expected = {
+    expected = [
         (a, b)
         for a, b in itertools.combinations(range(len(rows)), 2)
-        if not set(rows[a]) & set(rows[b]) and distance(place[a], place[b]) < near
-    }
-    assert {tuple(pair) for pair in search.pairs_within(skin, x, cells, data).tolist()} == expected
+        if not set(rows[a]) & set(rows[b]) and distance(place[a], place[b]) < near + rooms[a] + rooms[b]
+    ]
+    assert [tuple(pair) for pair in search.pairs_within(skin, marks, x, cells, data).tolist()] == expected
     assert expected or not skin
 
 

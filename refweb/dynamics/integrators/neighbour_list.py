@@ -7,21 +7,24 @@ missed. Results are those with all lines to the last bit, since lines without co
 A list is deep enough for the next `LASTS` steps, and for the bound on the steps of the next row if that needs at most
 `LONGEST` steps. Thus a list is made once in several rows, by a search over all lines.
 
-With lines that touch lines, lists differ in four ways. The approach is that of the relative motion of rows, since a
-thrown net moves as a whole. A list that lasts for `INNER` steps is taken from a wider one, which lasts longer. Before a
-new wide list is made, the actual displacements are checked, since waves may move rows back. Its skin is at most
-`WIDEST` of the length of elements, since else every element would be near another, and it lasts for fewer steps, down
-to `FEWEST`, if it costs more than the search. A capture of 1104 lines takes 0.87 of the time that it takes with the
-wide list alone.
+With lines that touch lines, each row has a room of its own in a list, by which it may move in axes that have the mean
+velocity of all rows: two rows come nearer by at most the sum of their rooms. A row has the room that it takes in
+`INNER` steps at its velocity, so that few fast rows do not make lists of slow ones long. In each step the places of
+rows are compared with those at which the list was made, and the list is made anew where a row leaves its room. It is
+taken from a wider one, with rooms for more steps, which is valid while the rooms of the list are within its own. These
+are at most half of `WIDEST` of the length of elements, since else every element would be near another, and last for
+fewer steps, down to `FEWEST`, if the list costs more than the search.
 
-May change: `LASTS`, `LONGEST`, `WIDEST`, `MANY`, `FEWEST`, `PRICE` and `INNER`, which trade searches for evaluations.
-Must stay: no change may miss a contact, so that `WAY`, `SHARE` and `COVERED`, parts of the bound, stay; results are
-those with all lines, bit for bit. Places behind the terms in `records.ForceTerms` are in the order of `near_of`, also
-for `contacts`, `step_bound` and `implicit_contacts`. `ccd` leaves out cells and checks by ``depth``, ``used``,
-``last`` and ``steps`` of `SKIN`: their meaning stays, or a passage is missed; `ccd` writes `fastest`, in one word with
-`top`, and `central_difference` reads and sets back `longest`. Must stay as well: all names that `explicit_loop`,
-`central_difference` and other files import; public names of `NeighbourList`, which other files use. Tests:
-``tests/dynamics/integrators/test_nearby.py``.
+Pairs stand in the order of their elements, so that sums do not depend on where lists are made.
+
+May change: `LASTS`, `LONGEST`, `WIDEST`, `MANY`, `FEWEST`, `PRICE`, `INNER` and `EVEN`, which trade searches for
+evaluations; `FLOOR` and `BEND` upwards. Must stay: no change may miss a contact, so that `WAY`, `SHARE` and `COVERED`,
+parts of the bound, stay; results are those with all lines, bit for bit. Places behind the terms in
+`records.ForceTerms` are in the order of `near_of`, also for `contacts`, `step_bound` and `implicit_contacts`. `ccd`
+leaves out cells and checks by ``depth``, ``used``, ``last`` and ``steps`` of `SKIN`: their meaning stays, or a passage
+is missed; `ccd` writes `fastest`, in one word with `top`, and `central_difference` reads and sets back `longest`. Must
+stay as well: all names that `explicit_loop`, `central_difference` and other files import; public names of
+`NeighbourList`, which other files use. Tests: ``tests/dynamics/integrators/test_nearby.py``.
 """
 
 from __future__ import annotations
@@ -35,6 +38,7 @@ import numpy as np
 from numba import from_dtype, types
 
 from ...compiled.tables import ArraysType
+from ...effects.self_contact.search import rooms_ahead
 from ...kernels import (
     INDICES,
     MATRIX,
@@ -48,11 +52,10 @@ from ...kernels import (
     MatrixTable,
     Record,
     VectorTable,
-    copy_rows,
     kernel,
 )
 from ...net.rotation_bounds import fastest_surface
-from .vector_spread import spread_of, spread_since
+from .vector_spread import spread_of
 
 if TYPE_CHECKING:
     from .records import ForceTerms, Model
@@ -66,8 +69,13 @@ WIDEST, MANY, FEWEST = 0.5, 512.0, 6.0
 should last."""
 PRICE = 400.0
 """Time of the search of the pairs of an element, over that of a pair of the wide list in a step."""
-INNER = 12.0
-"""Number of steps that a list lasts which is taken from a wider one."""
+INNER = 16.0
+"""Number of steps that rooms of rows last in a list that is taken from a wider one."""
+FLOOR, EVEN = 0.6, 0.2
+"""Least room of a row over the largest approach of rows in the last `COVERED` steps: of any two half of that suffices;
+and in the wider list over the way that the spread of velocities is in the steps that it should last."""
+BEND = 0.25
+"""Approach in a step between its ends, over that at its end: accelerations bend the motion."""
 COVERED = 3
 """Number of steps whose motion must be known before a list is made, since peaks are searched in these."""
 WAY = 2.0 * math.sqrt(3.0)
@@ -93,34 +101,38 @@ SKIN = np.dtype(
             "top",
             "fastest",
             "widest",
-            "outer",
+            "turned",
             "past",
+            "listed",
         ],
-        "formats": [*(8 * [float]), np.int64, np.int64, np.int64, *(4 * [float])],
-        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 80, 88, 96, 104],
+        "formats": [*(8 * [float]), np.int64, np.int64, np.int64, *(4 * [float]), np.int64],
+        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 80, 88, 96, 104, 112],
     }
 )
-"""Depth of the skin [m], infinite where all lines are looked at; how much of it may be used up; by how much lines and
-bodies may have come nearer in the last step and the two before; depth that a bound on the next steps asks for; number
-of steps that a list of pairs is to last; the longest of all ways of a step [m]; number of steps of which that is known,
-and above which a list is made, 0 from the start of a run on; the largest component of a velocity, as a whole number and
-as what it is [m/s]; largest depth around pairs [m], infinite where none are found; depth of the wider list of which
-the list is a part [m], infinite where there is none, and how much of that is used up."""
-NOWHERE = np.zeros((0, 3))
-"""Displacements without rows."""
-SWAP = types.void(types.int64, types.int64, types.float64, MATRIX, *map(ArraysType, (INDICES, MATRIX, MATRIX, VECTOR)))
-"""``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of term i, the m-th that acts nearby, in the
-tables of `refweb.dynamics.integrators.records.ForceTerms`, for those within a skin, or for all where it has no
-bound."""
+"""Depth of the skin [m], infinite where all lines are looked at, 0 where rows have rooms; how much of it may be used
+up, less twice the least of the rooms that are left; by how much lines and bodies may have come nearer in the last step
+and the two before; depth that a bound on the next steps asks for; number of steps that a list of pairs is to last; the
+longest of all ways of a step [m]; number of steps of which that is known, and above which a list is made, 0 from the
+start of a run on; the largest component of a velocity, as a whole number and as what it is [m/s]; largest depth around
+pairs [m], infinite where none are found; ways that bodies have turned by at their surfaces since the list was made, and
+before that since the wider one was [m]; 1 where there is a wider list."""
+NOWHERE = np.zeros((0, 3)), np.zeros((0, 4))
+"""Displacements and marks without rows."""
+SWAP = types.void(
+    *(2 * (types.int64,)), types.float64, *(2 * (MATRIX,)), *map(ArraysType, (INDICES, MATRIX, MATRIX, VECTOR))
+)
+"""``(i, m, depth, x, marks, cells, data, outs, stored)``: swaps the cells of term i, the m-th that acts nearby, in the
+tables of `refweb.dynamics.integrators.records.ForceTerms`, for those within a skin and the rooms of their rows, see
+`NeighbourList`, or for all where it has no bound."""
 SwapTable = Annotated[Functions, SWAP]
 NARROW = types.void(
     *(2 * (types.int64,)),
-    types.float64,
-    MATRIX,
+    *(2 * (MATRIX,)),
     *map(ArraysType, (INDICES, INDICES, MATRIX, INDICES, MATRIX, MATRIX, VECTOR)),
 )
-"""``(i, m, depth, x, chosen, wide_cells, wide_data, cells, data, outs, stored)``: takes into the tables the cells of
-term i, the m-th that acts nearby, that are within a skin, of a wider list."""
+"""``(i, m, x, marks, chosen, wide_cells, wide_data, cells, data, outs, stored)``: takes into the tables the cells of
+term i, the m-th that acts nearby, that may act when their rows have moved by their rooms, see `NeighbourList`, of a
+wider list."""
 NarrowTable = Annotated[Functions, NARROW]
 AHEAD = types.void(
     types.int64, types.int64, *(3 * (types.float64,)), *(4 * (MATRIX,)), ArraysType(INDICES), ArraysType(MATRIX)
@@ -146,8 +158,11 @@ class NeighbourList(Record):
         Their numbers.
     skin : ndarray of `SKIN`, shape (1,)
         State of the list.
-    at : ndarray, shape (rows, 3)
-        Displacement at which near pairs were chosen [m]; no rows where steps are planned for rows, and not for spans.
+    at, marks : ndarray, shape (rows, 4)
+        Displacement at which the wider list and the list were made, and room of each row in it [m]; no rows where steps
+        are planned for rows, and not for spans.
+    frame : ndarray, shape (2, 4)
+        Velocity of the axes of the list and of the wider one [m/s], and sum of the drifts since these were made [s].
     cells, data : table
         Space for the cells and numbers of each.
     chosen, wide_cells, wide_data : table
@@ -160,6 +175,8 @@ class NeighbourList(Record):
     terms: Integers
     skin: SkinArray
     at: Matrix
+    marks: Matrix
+    frame: Matrix
     cells: IndexTable
     data: MatrixTable
     chosen: IndexTable
@@ -170,17 +187,19 @@ class NeighbourList(Record):
     def of(cls, system):
         """Make the record of a system."""
         near, skin = near_of(system), np.zeros(1, dtype=SKIN)
-        skin["depth"], skin["outer"], skin["lasts"] = np.inf, np.inf, MANY
+        skin["depth"], skin["lasts"] = np.inf, MANY
         pairs = any(term.contact.foresee is not None for term in system.terms)
-        swaps = Functions(SWAP, [swap_for(system.terms[i]) for i in near])
-        narrows = Functions(NARROW, [narrow_of(system.terms[i].contact.near) for i in near if pairs])
+        swaps = Functions(SWAP, [swap_for(system, i) for i in near])
+        narrows = [narrow_of(system.terms[i].contact.near, system.net.subdivide) for i in near if pairs]
         aheads = Functions(AHEAD, [ahead_for(system.terms[i]) for i in near if pairs])
-        at = np.zeros((system.rows - system.net.spins if pairs else 0, 3))
+        at = np.zeros((system.rows - system.net.spins if pairs else 0, 4))
         skin["widest"] = WIDEST * float(system.net.natural_length.mean()) if pairs else np.inf
         cells, data = [system.terms[i].cells for i in near], [system.terms[i].data for i in near]
         lists = Arrays(INDICES, cells), Arrays(MATRIX, data)
         wide = Arrays(INDICES, cells), Arrays(INDICES, cells), Arrays(MATRIX, data)
-        return cls(swaps, narrows, aheads, np.array(near, dtype=np.int64), skin, at, *lists, *wide)
+        moves = at, np.zeros_like(at), np.zeros((2, 4))
+        numbers = np.array(near, dtype=np.int64)
+        return cls(swaps, Functions(NARROW, narrows), aheads, numbers, skin, *moves, *lists, *wide)
 
     def without(self):
         """Make the record without terms."""
@@ -194,9 +213,10 @@ def near_of(system):
     ]
 
 
-def swap_for(term):
-    """The kernel that swaps the cells of a term."""
-    return swap_of(term.contact.near) if term.contact.finder is None else swap_pairs_of(term.contact.finder)
+def swap_for(system, i):
+    """The kernel that swaps the cells of term i of a system."""
+    contact = system.terms[i].contact
+    return swap_of(contact.near, system.net.subdivide) if contact.finder is None else swap_pairs_of(contact.finder)
 
 
 def ahead_for(term):
@@ -218,9 +238,11 @@ def listed_pairs_of(near):
     """Make a kernel with the answer of a `ContactForce.finder` for pairs that are cells, by their kernel ``near``."""
 
     @kernel()
-    def listed_pairs(skin, x, cells, data):
-        touching = np.empty(cells.shape[0], dtype=np.int64)
-        chosen = touching[: near(skin, x, cells, data, touching)]
+    def listed_pairs(skin, marks, x, cells, data):
+        touching, largest = np.empty(cells.shape[0], dtype=np.int64), 0.0
+        for r in range(marks.shape[0]):
+            largest = max(largest, marks[r, 3])
+        chosen = touching[: near(skin + 2.0 * largest, x, cells, data, touching)]
         rows, numbers = rows_of(chosen, cells, data)
         return chosen, rows, numbers
 
@@ -236,7 +258,8 @@ def ahead_of(pairs, foresee):
         source = 2 * len(data) - len(cells) + m
         cells[i], data[i] = cells[source], data[source]
         if reach < math.inf:
-            _, rows, numbers = pairs(reach, x, cells[source], data[source])
+            marks = rooms_ahead(span, early, v, f, inverse)
+            _, rows, numbers = pairs(0.0, marks, x, cells[source], data[source])
             foresee(span, early, v, f, inverse, rows, numbers)
             cells[i], data[i] = rows, numbers
 
@@ -283,23 +306,51 @@ def show_some(
 
 
 @functools.cache
-def swap_of(near):
+def within_rooms(near, pieces):
+    """Make a kernel ``(skin, x, marks, cells, data)`` of the cells that ``near`` finds within a skin and rooms of rows.
+
+    Two rows come nearer by the sum of their rooms. Cells are looked at by ``pieces``, which are found whole where they
+    are those of a line.
+    """
+
+    @kernel()
+    def cells_near(skin, x, marks, cells, data):
+        touching, piece = np.empty(cells.shape[0], dtype=np.int64), np.empty(pieces, dtype=np.int64)
+        count = 0
+        for first in range(0, cells.shape[0], pieces):
+            end, first_room, second = min(first + pieces, cells.shape[0]), 0.0, 0.0
+            for c in range(first, end):
+                for k in range(cells.shape[1]):
+                    if cells[c, k] < marks.shape[0]:  # rows behind are of rotations
+                        row_room = marks[cells[c, k], 3]
+                        first_room, second = max(first_room, row_room), max(second, min(first_room, row_room))
+            for n in range(near(skin + first_room + second, x, cells[first:end], data[first:end], piece)):
+                touching[count] = first + piece[n]
+                count += 1
+        return touching[:count]
+
+    return cells_near
+
+
+@functools.cache
+def swap_of(near, pieces=1):
     """The kernel that swaps the cells of a term, found by its kernel ``near``, of signature `SWAP`.
 
     Loops call it by its address, since machine code that is called by name is optimized again in each calling kernel.
     """
 
+    cells_near = within_rooms(near, pieces)
+
     @kernel(SWAP)
-    def swap(i, m, depth, x, cells, data, outs, stored):
+    def swap(i, m, depth, x, marks, cells, data, outs, stored):
         if depth == math.inf:
             show_all(i, m, cells, data, outs, stored)
             return
         source = 2 * len(data) - len(cells) + m
-        touching = np.empty(cells[source].shape[0], dtype=np.int64)
-        count = near(depth, x, cells[source], data[source], touching)
-        some, numbers = rows_of(touching[:count], cells[source], data[source])
-        chosen = np.empty((count, 1), dtype=np.int32)
-        for n in range(count):
+        touching = cells_near(depth, x, marks, cells[source], data[source])
+        some, numbers = rows_of(touching, cells[source], data[source])
+        chosen = np.empty((touching.size, 1), dtype=np.int32)
+        for n in range(touching.size):
             chosen[n, 0] = touching[n]
         show_some(i, m, chosen, some, numbers, cells, data, outs, stored)
 
@@ -311,28 +362,28 @@ def swap_pairs_of(pairs):
     """Make the swap of a term whose cells are elements, for the pairs that ``pairs`` finds; see `swap_of`."""
 
     @kernel(SWAP)
-    def swap(i, m, depth, x, cells, data, outs, stored):
+    def swap(i, m, depth, x, marks, cells, data, outs, stored):
         if depth == math.inf:
             show_all(i, m, cells, data, outs, stored)
             return
         source = 2 * len(data) - len(cells) + m
-        chosen, some, numbers = pairs(depth, x, cells[source], data[source])
+        chosen, some, numbers = pairs(depth, marks, x, cells[source], data[source])
         show_some(i, m, chosen.astype(np.int32), some, numbers, cells, data, outs, stored)
 
     return swap
 
 
 @functools.cache
-def narrow_of(near):
+def narrow_of(near, pieces):
     """Make the kernel of `NARROW` of a term, with its kernel ``near`` of signature `refweb.kernels.NEAR`."""
+    cells_near = within_rooms(near, pieces)
 
     @kernel(NARROW)
-    def narrow(i, m, depth, x, chosen, wide_cells, wide_data, cells, data, outs, stored):
-        touching = np.empty(wide_cells[m].shape[0], dtype=np.int64)
-        count = near(depth, x, wide_cells[m], wide_data[m], touching)
-        some, numbers = rows_of(touching[:count], wide_cells[m], wide_data[m])
-        known, rows = chosen[m], np.empty((count, chosen[m].shape[1]), dtype=np.int32)
-        for n in range(count):
+    def narrow(i, m, x, marks, chosen, wide_cells, wide_data, cells, data, outs, stored):
+        touching = cells_near(0.0, x, marks, wide_cells[m], wide_data[m])
+        some, numbers = rows_of(touching, wide_cells[m], wide_data[m])
+        known, rows = chosen[m], np.empty((touching.size, chosen[m].shape[1]), dtype=np.int32)
+        for n in range(touching.size):
             for k in range(known.shape[1]):
                 rows[n, k] = known[touching[n], k]
         show_some(i, m, rows, some, numbers, cells, data, outs, stored)
@@ -341,11 +392,11 @@ def narrow_of(near):
 
 
 @kernel(apart=("near",))
-def set_reference(depth: float, x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Swap the cells of all terms for those within a skin at displacement x."""
+def set_reference(depth: float, x: Matrix, marks: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
+    """Swap the cells of all terms for those within a skin and rooms of their rows at displacement x."""
     for m in range(nearby.terms.size):
         i = nearby.terms[m]
-        nearby.swaps[m](i, m, depth, x, terms.cells, terms.data, terms.outs, terms.stored)
+        nearby.swaps[m](i, m, depth, x, marks, terms.cells, terms.data, terms.outs, terms.stored)
 
 
 @kernel(leaf=True, apart=("near",))
@@ -388,25 +439,25 @@ def look_at_all(system, model):
     skin, terms = model.nearby.skin[0], model.terms
     if skin["depth"] < np.inf:
         for m, i in enumerate(near_of(system)):
-            swap_for(system.terms[i])(i, m, np.inf, NOWHERE, terms.cells, terms.data, terms.outs, terms.stored)
-    skin["depth"] = skin["outer"] = np.inf
+            swap_for(system, i)(i, m, np.inf, *NOWHERE, terms.cells, terms.data, terms.outs, terms.stored)
+    skin["depth"], skin["listed"] = np.inf, 0
 
 
 @kernel(apart=("pairs",))
-def narrow_all(depth: float, x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Take the cells of the wider lists that are within a skin at displacement x."""
+def narrow_all(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
+    """Take the cells of the wider lists that may act when rows have moved by their rooms."""
+    marks = nearby.marks
     chosen, cells, data = nearby.chosen, nearby.wide_cells, nearby.wide_data
     for m in range(nearby.terms.size):
         i = nearby.terms[m]
-        nearby.narrows[m](i, m, depth, x, chosen, cells, data, terms.cells, terms.data, terms.outs, terms.stored)
+        nearby.narrows[m](i, m, x, marks, chosen, cells, data, terms.cells, terms.data, terms.outs, terms.stored)
 
 
 @kernel(apart=("pairs",))
 def take_pairs(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Find what is within the wider skin at displacement x, and set the number of steps that the list should last."""
-    copy_rows(x[: nearby.at.shape[0]], nearby.at)
+    """Find what is within the rooms of the wider list, and set the number of steps that the next should last."""
     skin, pairs, elements = nearby.skin[0], 0, 0
-    set_reference(skin.outer, x, nearby, terms)
+    set_reference(0.0, x, nearby.at, nearby, terms)
     for m in range(nearby.terms.size):
         i = nearby.terms[m]
         nearby.chosen[m] = terms.cells[len(terms.data) + m]
@@ -431,7 +482,7 @@ def reach_all(reach, x, nearby, terms):
         return
     if skin.depth < math.inf and not skin.used + reach <= SHARE * skin.depth:
         skin.depth = math.inf
-        set_reference(skin.depth, x, nearby, terms)
+        set_reference(skin.depth, x, nearby.marks, nearby, terms)
 
 
 @kernel(leaf=True, forceinline=True)
@@ -448,8 +499,8 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
     ``bits`` are the velocities of all places, in a row, as whole numbers; none where nothing acts nearby. The largest
     is known where a check of collisions has found it. Motion that is prescribed is held against the places ``before``;
     to that of a body is added what its rotation adds at its surface. States between the last three steps are covered as
-    well, which is what is looked at for peaks. Of pairs the ways relative to each other are taken where a skin as deep
-    as may be is used up in few steps otherwise.
+    well, which is what is looked at for peaks. Where rows have rooms, these count, and the approach is the way of rows
+    relative to each other.
     """
     if not bits.size:
         return
@@ -463,35 +514,92 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
         for k in range(3):
             path = max(path, abs(x[driven[d], k] - before[d, k]))
     path *= WAY
-    if FEWEST * path > skin.widest and not driven.size:
-        path = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
+    if model.nearby.at.shape[0] and not driven.size:
+        spread = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
+        path = spread if spread < path else path  # what is not a number stays
+    turn = 0.0
     if turns.moment.size:
-        path += 2.0 * abs(drift) * fastest_surface(x, v, turns)
+        turn = 2.0 * abs(drift) * fastest_surface(x, v, turns)
+        path += turn
     skin.earlier, skin.before, skin.last = skin.before, skin.last, path
     skin.longest = max(skin.longest, path)
     skin.used += path
+    if model.nearby.at.shape[0]:
+        nearby = model.nearby
+        nearby.frame[0, 3] += drift
+        nearby.frame[1, 3] += drift
+        skin.turned += turn
+        skin.used = -2.0 * least_room(skin.turned, x, nearby.marks, nearby.frame[0], nearby.at[:0], turns)
+        path *= BEND
     skin.steps += 1
     if skin.steps > skin.unknown and not (skin.depth < math.inf and skin.used + path <= SHARE * skin.depth):
-        choose(drift, x, v, driven.size > 0, model.nearby, model.terms)
+        choose(drift, x, v, turn, model)
+
+
+@kernel(leaf=True)
+def least_room(turned, x, marks, frame, rooms, turns):
+    """Least way that any row may still move within its room of some ``marks``, see `NeighbourList` [m].
+
+    Bodies have turned since, and as much as the ``rooms`` of other marks must be left, if these have rows.
+    """
+    free_way, a, b, c = math.inf, frame[3] * frame[0], frame[3] * frame[1], frame[3] * frame[2]
+    more = rooms.shape[0] > 0
+    for r in range(marks.shape[0]):
+        p, q, s = x[r, 0] - marks[r, 0] - a, x[r, 1] - marks[r, 1] - b, x[r, 2] - marks[r, 2] - c
+        left = SHARE * marks[r, 3] - math.sqrt(p * p + q * q + s * s)
+        left = left - rooms[r, 3] if more else left
+        free_way = left if left < free_way else free_way
+    for n in range(turns.moment.size):
+        r = turns.rows[n, 0]
+        p, q, s = x[r, 0] - marks[r, 0] - a, x[r, 1] - marks[r, 1] - b, x[r, 2] - marks[r, 2] - c
+        left = SHARE * marks[r, 3] - turned - math.sqrt(p * p + q * q + s * s)
+        free_way = min(free_way, left - rooms[r, 3] if more else left)
+    return free_way
+
+
+@kernel()
+def set_marks(steps, drift, turn, smallest_room, largest_room, rooms, x, v, turns, marks, frame):
+    """Give each row the room that it takes in some ``steps`` at its velocity, within two limits.
+
+    It is twice that of the ``rooms`` of other marks at least, if these have rows. Rows move in axes that have the mean
+    velocity of all, and surfaces of bodies by a way ``turn`` more in each step.
+    """
+    for k in range(4):
+        frame[k] = 0.0
+    for r in range(marks.shape[0]):
+        for k in range(3):
+            marks[r, k] = x[r, k]
+            frame[k] += v[r, k] / marks.shape[0]
+    for r in range(marks.shape[0]):
+        p, q, s = v[r, 0] - frame[0], v[r, 1] - frame[1], v[r, 2] - frame[2]
+        marks[r, 3] = min(max(steps * abs(drift) * math.sqrt(p * p + q * q + s * s), smallest_room), largest_room)
+        if rooms.shape[0]:
+            marks[r, 3] = max(marks[r, 3], 2.0 * rooms[r, 3])
+    for n in range(turns.moment.size):
+        marks[turns.rows[n, 0], 3] += steps * turn
 
 
 @kernel(apart=("near",))
-def choose(drift: float, x: Matrix, v: Matrix, driven: bool, nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Choose anew what is near, behind a drift that led to x at velocities v, where motion is ``driven`` or is not."""
+def choose(drift: float, x: Matrix, v: Matrix, turn: float, model: Model) -> None:
+    """Choose anew what is near, behind a drift that led to x at velocities v.
+
+    Surfaces of bodies have moved in it by a way ``turn`` for their rotation.
+    """
+    nearby, terms, turns = model.nearby, model.terms, model.inertia.turns
     skin = nearby.skin[0]
     path, recent = skin.last, skin.last + skin.before + skin.earlier
     if not nearby.at.shape[0]:
         skin.depth, skin.used = max(LASTS * path, 4.0 * recent, min(skin.wished, LONGEST * path)), 0.0
-        set_reference(skin.depth, x, nearby, terms)
+        set_reference(skin.depth, x, nearby.marks, nearby, terms)
         return
-    depth = max(INNER * path, 4.0 * recent)
-    if skin.outer < math.inf:
-        skin.past += skin.used
-        if not skin.past + depth <= SHARE * skin.outer:
-            skin.past = spread_since(x, nearby.at)
-    if not skin.past + depth <= SHARE * skin.outer < math.inf:
-        near = path if driven else abs(drift) * spread_of(v[: nearby.at.shape[0]])
-        skin.outer, skin.past = max(min(skin.lasts * near, skin.widest), 2.0 * depth), 0.0
+    none, marks, frame = nearby.at[:0], nearby.marks, nearby.frame[0]
+    set_marks(INNER, drift, turn, FLOOR * recent, math.inf, none, x, v, turns, marks, frame)
+    skin.past, skin.turned = skin.past + skin.turned, 0.0
+    if not (skin.listed > 0 and least_room(skin.past, x, nearby.at, nearby.frame[1], marks, turns) > 0.0):
+        largest_room = 0.5 * skin.widest
+        smallest_room = min(EVEN * skin.lasts * abs(drift) * spread_of(v[: marks.shape[0]]), largest_room)
+        set_marks(skin.lasts, drift, turn, smallest_room, largest_room, marks, x, v, turns, nearby.at, nearby.frame[1])
+        skin.listed, skin.past = 1, 0.0
         take_pairs(x, nearby, terms)
-    skin.depth, skin.used = depth, 0.0
-    narrow_all(depth, x, nearby, terms)
+    skin.depth, skin.used = 0.0, -2.0 * least_room(0.0, x, marks, frame, none, turns)
+    narrow_all(x, nearby, terms)

@@ -1,15 +1,13 @@
 """Spread of rows of vectors: no two differ by more.
 
 May change: how the bound is computed. Must stay: it may be too large and never too small, since `ccd`, `neighbour_list`
-and `explicit_loop` bound motion by it; arguments of both kernels; `spread_of`, which `ccd`, `explicit_loop` and other
-files import; `spread_since`, which `neighbour_list` imports. Tests: ``tests/dynamics/integrators/test_nearby.py``.
+and `explicit_loop` bound motion by it; its arguments; `spread_of`, which `ccd`, `explicit_loop` and other files import.
+Tests: ``tests/dynamics/integrators/test_nearby.py``.
 """
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
 
 from ...kernels import kernel
 
@@ -25,13 +23,3 @@ def spread_of(rows):
         a1, b1 = y if y > a1 else a1, y if y < b1 else b1
         a2, b2 = z if z > a2 else a2, z if z < b2 else b2
     return math.sqrt((a0 - b0) ** 2 + (a1 - b1) ** 2 + (a2 - b2) ** 2)
-
-
-@kernel()
-def spread_since(x, at):
-    """Spread, as of `spread_of`, of the displacements of rows since they were ``at`` [m]."""
-    difference = np.empty(at.shape)
-    for r in range(at.shape[0]):
-        for k in range(3):
-            difference[r, k] = x[r, k] - at[r, k]
-    return spread_of(difference)

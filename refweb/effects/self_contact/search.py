@@ -6,8 +6,9 @@ elements. Elements that share a node make no pair, nor do those that are listed 
 
 May change: `BOXES`, the size of the grid. Must stay: that no pair within reach is missed, `REACH` included; what
 `near_pairs` and `paired` return, for all kernels of this folder; the order of pairs, which decides the last digits of
-results; `axes_apart`, which `line_line_penalty` imports; `distances` and `foresee`, which `table` imports; `FASTER`,
-which `integrators.step_bound` imports. Tests: ``tests/effects/test_self_contact.py`` compares with all pairs.
+results; `axes_apart`, which `line_line_penalty` imports; `distances`, `foresee` and `pairs_by_room`, which `table`
+imports; `rooms_ahead`, which `integrators.neighbour_list` imports; `FASTER`, which `integrators.step_bound` imports.
+Tests: ``tests/effects/test_self_contact.py`` compares with all pairs.
 """
 
 from __future__ import annotations
@@ -29,13 +30,18 @@ REACH = math.sqrt(2.0)
 extends beyond its ends."""
 FASTER = 1.5
 """Allowance for what other contacts add to the relative speed of a pair in a span."""
+ROUNDED = 1e-12
+"""Allowance for rounding in the rooms of rows."""
 BOXES = 4
 """Largest number of cells of the grid over that of elements."""
 
 
 @kernel()
-def middles(x, cells, data, buffer):
-    """Write middle, half vector and half length of elements to ``buffer (elements, 7)``; the largest half length."""
+def middles(marks, x, cells, data, buffer):
+    """Write middle, half vector, half length and room of elements to ``buffer (elements, 8)``.
+
+    The result is the largest sum of both. The last column of ``marks`` has the rooms of rows; without rows they are 0.
+    """
     widest = 0.0
     for c in range(cells.shape[0]):
         i, j, square, ends = cells[c, 0], cells[c, 1], 0.0, record_at(ELEMENT, data, c, 0).ends
@@ -44,7 +50,8 @@ def middles(x, cells, data, buffer):
             buffer[c, k], buffer[c, 3 + k] = 0.5 * (a + b), 0.5 * (b - a)
             square += (b - a) * (b - a)
         buffer[c, 6] = 0.5 * math.sqrt(square)
-        widest = max(widest, buffer[c, 6])
+        buffer[c, 7] = max(marks[i, 3], marks[j, 3]) if marks.shape[0] else 0.0
+        widest = max(widest, buffer[c, 6] + buffer[c, 7])
     return widest
 
 
@@ -153,7 +160,7 @@ def set_ranges(box, count, start, ranges):
 
 @kernel()
 def fill(reach, count, start, order, rows, cells, data, pairs):
-    """Write all pairs of elements nearer than a reach to ``pairs``, as far as it has room; their number."""
+    """Write all pairs of elements nearer than a reach and both rooms to ``pairs``, as far as it holds; their number."""
     ranges, amount = np.empty((5, 2), dtype=np.int64), 0
     for box in range(start.size - 1):
         if start[box] == start[box + 1]:
@@ -163,10 +170,11 @@ def fill(reach, count, start, order, rows, cells, data, pairs):
             ranges[0, 0] = m + 1
             for part in range(beside):
                 for n in range(ranges[part, 0], ranges[part, 1]):
-                    if not boxes_meet(reach, m, n, rows):
+                    within = reach + rows[m, 7] + rows[n, 7]
+                    if not boxes_meet(within, m, n, rows):
                         continue
                     a, b = min(order[m], order[n]), max(order[m], order[n])
-                    if nonadjacent(a, b, cells, data) and segments_meet(reach, m, n, rows):
+                    if nonadjacent(a, b, cells, data) and segments_meet(within, m, n, rows):
                         if amount < pairs.shape[0]:
                             pairs[amount, 0], pairs[amount, 1] = a, b
                         amount += 1
@@ -174,25 +182,46 @@ def fill(reach, count, start, order, rows, cells, data, pairs):
 
 
 @kernel()
-def pairs_within(skin, x, cells, data):
-    """Numbers of all pairs of elements that may push each other when they come nearer by ``skin`` [m], shape (., 2)."""
-    none, buffer = np.empty((0, 2), dtype=np.int64), np.empty((cells.shape[0], 7))
+def in_order(count, amount, unsorted):
+    """The first pairs of those that are found of a number of elements, in the order of their elements."""
+    begin, filled = np.zeros(count + 1, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    pairs = np.empty((amount, 2), dtype=np.int64)
+    for n in range(amount):
+        begin[unsorted[n, 0] + 1] += 1
+    for a in range(count):
+        begin[a + 1] += begin[a]
+    for n in range(amount):
+        a, b = unsorted[n, 0], unsorted[n, 1]
+        at = begin[a] + filled[a]
+        filled[a] += 1
+        while at > begin[a] and pairs[at - 1, 1] > b:
+            pairs[at, 1] = pairs[at - 1, 1]
+            at -= 1
+        pairs[at, 1] = b
+        pairs[begin[a] + filled[a] - 1, 0] = a
+    return pairs
+
+
+@kernel()
+def pairs_within(skin, marks, x, cells, data):
+    """Numbers of all pairs of elements that may push each other, in order, shape (., 2).
+
+    They come nearer by ``skin`` [m] and the rooms of both, see `middles`.
+    """
+    none, buffer = np.empty((0, 2), dtype=np.int64), np.empty((cells.shape[0], 8))
     if cells.shape[0] < 2:
         return none
     reach = REACH * record_at(ELEMENT, data, 0, 0).touch + skin
-    low, width, count = boxes_of(2.0 * middles(x, cells, data, buffer) + reach, buffer)
+    low, width, count = boxes_of(2.0 * middles(marks, x, cells, data, buffer) + reach, buffer)
     if count[0] == 0:
         return none
     order, start, rows = sorted_by_box(low, width, count, buffer)
-    first_pairs = np.empty((cells.shape[0] + 64, 2), dtype=np.int64)
-    amount = fill(reach, count, start, order, rows, cells, data, first_pairs)
-    pairs = np.empty((amount, 2), dtype=np.int64)
-    if amount > first_pairs.shape[0]:
-        fill(reach, count, start, order, rows, cells, data, pairs)
-        return pairs
-    for n in range(amount):  # numba's slices take longer to compile
-        pairs[n, 0], pairs[n, 1] = first_pairs[n, 0], first_pairs[n, 1]
-    return pairs
+    unsorted = np.empty((cells.shape[0] + 64, 2), dtype=np.int64)
+    while True:
+        amount = fill(reach, count, start, order, rows, cells, data, unsorted)
+        if amount <= unsorted.shape[0]:
+            return in_order(cells.shape[0], amount, unsorted)
+        unsorted = np.empty((amount, 2), dtype=np.int64)
 
 
 @kernel()
@@ -218,11 +247,17 @@ def paired(chosen, cells, data):
 
 
 @kernel()
-def near_pairs(skin, x, cells, data):
-    """(numbers of the elements, nodes, numbers) of all pairs within a skin of touching."""
-    chosen = pairs_within(skin, x, cells, data)
+def pairs_by_room(skin, marks, x, cells, data):
+    """(numbers of the elements, nodes, numbers) of all pairs within a skin, and the rooms of rows, of touching."""
+    chosen = pairs_within(skin, marks, x, cells, data)
     rows, numbers = paired(chosen, cells, data)
     return chosen, rows, numbers
+
+
+@kernel()
+def near_pairs(skin, x, cells, data):
+    """The same within a skin alone."""
+    return pairs_by_room(skin, np.empty((0, 4)), x, cells, data)
 
 
 @kernel()
@@ -233,17 +268,33 @@ def foresee(span, early, v, f, inverse, cells, data):
     balance turns within half a period of its line, so that it does not act for a longer span.
     """
     for c in range(cells.shape[0]):
-        fastest = hardest = 0.0
+        fastest = 0.0
         for i in range(2):
             for j in range(2, 4):
                 r, q, speed, push = cells[c, i], cells[c, j], 0.0, 0.0
                 for k in range(3):
                     speed += (v[r, k] - v[q, k]) ** 2
                     push += (inverse[r, k] * f[r, k] - inverse[q, k] * f[q, k]) ** 2
-                fastest, hardest = max(fastest, speed), max(hardest, push)
+                fastest = max(fastest, math.sqrt(speed) + early * math.sqrt(push))
         pair = record_at(PAIR, data, c, 0)
-        pair.speed = FASTER * (math.sqrt(fastest) + early * math.sqrt(hardest))
+        pair.speed = FASTER * fastest
         pair.approach = span * pair.speed
+
+
+@kernel()
+def rooms_ahead(span, early, v, f, inverse):
+    """Rooms of rows as marks, see `middles`: no pair comes nearer by more than those of its elements in `foresee`."""
+    marks, mean = np.zeros((v.shape[0], 4)), np.zeros(3)
+    for r in range(v.shape[0]):
+        for k in range(3):
+            mean[k] += v[r, k] / v.shape[0]
+    for r in range(v.shape[0]):
+        speed = push = 0.0
+        for k in range(3):
+            speed += (v[r, k] - mean[k]) ** 2
+            push += (inverse[r, k] * f[r, k]) ** 2
+        marks[r, 3] = FASTER * span * (math.sqrt(speed) + early * math.sqrt(push)) * (1.0 + ROUNDED)
+    return marks
 
 
 @kernel()

@@ -144,6 +144,37 @@ def test_a_thrown_net_is_the_same_row_by_row(layers, end):
     np.testing.assert_allclose(sum(sizes), end, rtol=1e-12)  # roundings of 1e-16 a step
 
 
+@pytest.mark.parametrize("turned", [0.0, 0.02], ids=["still", "turning"])
+def test_rooms_hold_what_comes_near(turned):
+    """All pairs and lines that touch after rows have moved anyhow within their rooms are in the lists, in order."""
+    from refweb.dynamics.integrators import neighbour_list
+
+    keys = {"web.layers": 8, "web.cell_area": 0.6, "body.0.position": [0.0, 0.0, 1.2]}
+    system, rng = refweb.Scene.load("capture-stage", keys).build(), np.random.default_rng(3)
+    pairs, lines = (term for term in system.terms if term.contact.foresee or term.contact.places)
+    marks, x = np.zeros((system.rows - system.net.spins, 4)), np.zeros((system.rows, 3))
+    nodes = system.net.bodies[0].row
+    x[:nodes] = rng.normal(0.0, 0.2, (nodes, 3))
+    marks[:, 3] = rng.exponential(0.02, len(marks))
+    marks[nodes, 3] += turned
+    found = neighbour_list.within_rooms(lines.contact.near, 1)(0.0, x, marks, lines.cells, lines.data)
+    listed = pairs.contact.finder(0.0, marks, x, pairs.cells, pairs.data)[0]
+    order = listed[:, 0] * len(pairs.cells) + listed[:, 1]
+    assert (np.diff(order) > 0).all() and 0 < len(found) < len(lines.cells)
+    none, touching = np.zeros((0, 4)), [0, 0]
+    for _ in range(30):
+        way = rng.normal(size=(len(marks), 3))
+        moved = x.copy()
+        way *= ((marks[:, 3] - turned * (np.arange(len(marks)) == nodes)) / np.linalg.norm(way, axis=1))[:, None]
+        moved[: len(marks)] += way
+        now = pairs.contact.finder(0.0, none, moved, pairs.cells, pairs.data)[0]
+        assert np.isin(now[:, 0] * len(pairs.cells) + now[:, 1], order).all()
+        near = neighbour_list.within_rooms(lines.contact.near, 1)(0.0, moved, none, lines.cells, lines.data)
+        assert np.isin(near, found).all()
+        touching = [touching[0] + len(now), touching[1] + len(near)]
+    assert min(touching) > 0
+
+
 def distances(net, body, x):
     """From the sphere around a body to each line, as segments between its nodes, or more: from their box to its box."""
     a, b = ((net.points + x)[net.cells[:, k]] - (net.points + x)[body.row] for k in (0, 1))
@@ -223,7 +254,7 @@ def test_far_from_a_body_few_lines_are_looked_at():
     assert everything == 2 * 8 * 7 and skin["depth"] == np.inf  # whoever comes next looks at all
     term = solver.system.terms[1]
     swap, arrays = neighbour_list.swap_of(term.contact.near), (lists.cells, lists.data, lists.outs, lists.stored)
-    swap(1, 0, 0.05, course.x, *arrays)
+    swap(1, 0, 0.05, course.x, np.zeros((0, 4)), *arrays)
     chosen = lists.cells[-1][:, 0]
     assert 0 < len(chosen) < 0.5 * everything
     np.testing.assert_array_equal(lists.cells[1], term.cells[chosen])
