@@ -595,7 +595,7 @@ MUTANTS = [
     Mutant("dynamics/integrators/explicit_loop", "or left <= 0 and end < corner)", "or False)"),
     Mutant("dynamics/integrators/explicit_loop", "joins and not looks and step < count", "joins and not looks"),
     Mutant("results/probes", "return a - 1e-15 * abs(a) > b", "return a < b"),
-    Mutant("dynamics/integrators/neighbour_list", "near(skin + first_room + second,", "near(skin + first_room,"),
+    Mutant("dynamics/integrators/neighbour_list", "near(skin + first_margin + second,", "near(skin + first_margin,"),
     Mutant(
         "effects/self_contact/search",
         "of_first = from_axis(p, u, w) - approach",

@@ -7,13 +7,13 @@ missed. Results are those with all lines to the last bit, since lines without co
 A list is deep enough for the next `LASTS` steps, and for the bound on the steps of the next row if that needs at most
 `LONGEST` steps. Thus a list is made once in several rows, by a search over all lines.
 
-With lines that touch lines, each row has a room of its own in a list, by which it may move in axes that have the mean
-velocity of all rows: two rows come nearer by at most the sum of their rooms. A row has the room that it takes in
+With lines that touch lines, each row has a margin of its own in a list, by which it may move in axes that have the mean
+velocity of all rows: two rows come nearer by at most the sum of their margins. A row has the margin that it takes in
 `INNER` steps at its velocity, so that few fast rows do not make lists of slow ones long. In each step the places of
-rows are compared with those at which the list was made, and the list is made anew where a row leaves its room. It is
-taken from a wider one, with rooms for more steps, which is valid while the rooms of the list are within its own. These
-are at most half of `WIDEST` of the length of elements, since else every element would be near another, and last for
-fewer steps, down to `FEWEST`, if the list costs more than the search.
+rows are compared with those at which the list was made, and the list is made anew where a row leaves its margin. It is
+taken from a wider one, with margins for more steps, which is valid while the margins of the list are within its own.
+These are at most half of `WIDEST` of the length of elements, since else every element would be near another, and last
+for fewer steps, down to `FEWEST`, if the list costs more than the search.
 
 Pairs stand in the order of their elements, so that sums do not depend on where lists are made.
 
@@ -38,7 +38,7 @@ import numpy as np
 from numba import from_dtype, types
 
 from ...compiled.tables import ArraysType
-from ...effects.self_contact.search import rooms_ahead
+from ...effects.self_contact.search import margins_ahead
 from ...kernels import (
     INDICES,
     MATRIX,
@@ -70,10 +70,10 @@ should last."""
 PRICE = 400.0
 """Time of the search of the pairs of an element, over that of a pair of the wide list in a step."""
 INNER = 16.0
-"""Number of steps that rooms of rows last in a list that is taken from a wider one."""
+"""Number of steps that margins of rows last in a list that is taken from a wider one."""
 FLOOR, EVEN = 0.6, 0.2
-"""Least room of a row over the largest approach of rows in the last `COVERED` steps: of any two half of that suffices;
-and in the wider list over the way that the spread of velocities is in the steps that it should last."""
+"""Least margin of a row over the largest approach of rows in the last `COVERED` steps: of any two half of that
+suffices; and in the wider list over the way that the spread of velocities is in the steps that it should last."""
 BEND = 0.25
 """Approach in a step between its ends, over that at its end: accelerations bend the motion."""
 COVERED = 3
@@ -109,20 +109,20 @@ SKIN = np.dtype(
         "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 80, 88, 96, 104, 112],
     }
 )
-"""Depth of the skin [m], infinite where all lines are looked at, 0 where rows have rooms; how much of it may be used
-up, less twice the least of the rooms that are left; by how much lines and bodies may have come nearer in the last step
-and the two before; depth that a bound on the next steps asks for; number of steps that a list of pairs is to last; the
-longest of all ways of a step [m]; number of steps of which that is known, and above which a list is made, 0 from the
-start of a run on; the largest component of a velocity, as a whole number and as what it is [m/s]; largest depth around
-pairs [m], infinite where none are found; ways that bodies have turned by at their surfaces since the list was made, and
-before that since the wider one was [m]; 1 where there is a wider list."""
+"""Depth of the skin [m], infinite where all lines are looked at, 0 where rows have margins; how much of it may be used
+up, less twice the least of the margins that are left; by how much lines and bodies may have come nearer in the last
+step and the two before; depth that a bound on the next steps asks for; number of steps that a list of pairs is to last;
+the longest of all ways of a step [m]; number of steps of which that is known, and above which a list is made, 0 from
+the start of a run on; the largest component of a velocity, as a whole number and as what it is [m/s]; largest depth
+around pairs [m], infinite where none are found; ways that bodies have turned by at their surfaces since the list was
+made, and before that since the wider one was [m]; 1 where there is a wider list."""
 NOWHERE = np.zeros((0, 3)), np.zeros((0, 4))
 """Displacements and marks without rows."""
 SWAP = types.void(
     *(2 * (types.int64,)), types.float64, *(2 * (MATRIX,)), *map(ArraysType, (INDICES, MATRIX, MATRIX, VECTOR))
 )
 """``(i, m, depth, x, marks, cells, data, outs, stored)``: swaps the cells of term i, the m-th that acts nearby, in the
-tables of `refweb.dynamics.integrators.records.ForceTerms`, for those within a skin and the rooms of their rows, see
+tables of `refweb.dynamics.integrators.records.ForceTerms`, for those within a skin and the margins of their rows, see
 `NeighbourList`, or for all where it has no bound."""
 SwapTable = Annotated[Functions, SWAP]
 NARROW = types.void(
@@ -131,7 +131,7 @@ NARROW = types.void(
     *map(ArraysType, (INDICES, INDICES, MATRIX, INDICES, MATRIX, MATRIX, VECTOR)),
 )
 """``(i, m, x, marks, chosen, wide_cells, wide_data, cells, data, outs, stored)``: takes into the tables the cells of
-term i, the m-th that acts nearby, that may act when their rows have moved by their rooms, see `NeighbourList`, of a
+term i, the m-th that acts nearby, that may act when their rows have moved by their margins, see `NeighbourList`, of a
 wider list."""
 NarrowTable = Annotated[Functions, NARROW]
 AHEAD = types.void(
@@ -159,8 +159,8 @@ class NeighbourList(Record):
     skin : ndarray of `SKIN`, shape (1,)
         State of the list.
     at, marks : ndarray, shape (rows, 4)
-        Displacement at which the wider list and the list were made, and room of each row in it [m]; no rows where steps
-        are planned for rows, and not for spans.
+        Displacement at which the wider list and the list were made, and margin of each row in it [m]; no rows where
+        steps are planned for rows, and not for spans.
     frame : ndarray, shape (2, 4)
         Velocity of the axes of the list and of the wider one [m/s], and sum of the drifts since these were made [s].
     cells, data : table
@@ -258,7 +258,7 @@ def ahead_of(pairs, foresee):
         source = 2 * len(data) - len(cells) + m
         cells[i], data[i] = cells[source], data[source]
         if reach < math.inf:
-            marks = rooms_ahead(span, early, v, f, inverse)
+            marks = margins_ahead(span, early, v, f, inverse)
             _, rows, numbers = pairs(0.0, marks, x, cells[source], data[source])
             foresee(span, early, v, f, inverse, rows, numbers)
             cells[i], data[i] = rows, numbers
@@ -306,11 +306,11 @@ def show_some(
 
 
 @functools.cache
-def within_rooms(near, pieces):
-    """Make a kernel ``(skin, x, marks, cells, data)`` of the cells that ``near`` finds within a skin and rooms of rows.
+def within_margins(near, pieces):
+    """Make a kernel ``(skin, x, marks, cells, data)`` of the cells that ``near`` finds within a skin and margins.
 
-    Two rows come nearer by the sum of their rooms. Cells are looked at by ``pieces``, which are found whole where they
-    are those of a line.
+    Two rows come nearer by the sum of their margins. Cells are looked at by ``pieces``, which are found whole where
+    they are those of a line.
     """
 
     @kernel()
@@ -318,13 +318,13 @@ def within_rooms(near, pieces):
         touching, piece = np.empty(cells.shape[0], dtype=np.int64), np.empty(pieces, dtype=np.int64)
         count = 0
         for first in range(0, cells.shape[0], pieces):
-            end, first_room, second = min(first + pieces, cells.shape[0]), 0.0, 0.0
+            end, first_margin, second = min(first + pieces, cells.shape[0]), 0.0, 0.0
             for c in range(first, end):
                 for k in range(cells.shape[1]):
                     if cells[c, k] < marks.shape[0]:  # rows behind are of rotations
-                        row_room = marks[cells[c, k], 3]
-                        first_room, second = max(first_room, row_room), max(second, min(first_room, row_room))
-            for n in range(near(skin + first_room + second, x, cells[first:end], data[first:end], piece)):
+                        row_margin = marks[cells[c, k], 3]
+                        first_margin, second = max(first_margin, row_margin), max(second, min(first_margin, row_margin))
+            for n in range(near(skin + first_margin + second, x, cells[first:end], data[first:end], piece)):
                 touching[count] = first + piece[n]
                 count += 1
         return touching[:count]
@@ -339,7 +339,7 @@ def swap_of(near, pieces=1):
     Loops call it by its address, since machine code that is called by name is optimized again in each calling kernel.
     """
 
-    cells_near = within_rooms(near, pieces)
+    cells_near = within_margins(near, pieces)
 
     @kernel(SWAP)
     def swap(i, m, depth, x, marks, cells, data, outs, stored):
@@ -376,7 +376,7 @@ def swap_pairs_of(pairs):
 @functools.cache
 def narrow_of(near, pieces):
     """Make the kernel of `NARROW` of a term, with its kernel ``near`` of signature `refweb.kernels.NEAR`."""
-    cells_near = within_rooms(near, pieces)
+    cells_near = within_margins(near, pieces)
 
     @kernel(NARROW)
     def narrow(i, m, x, marks, chosen, wide_cells, wide_data, cells, data, outs, stored):
@@ -393,7 +393,7 @@ def narrow_of(near, pieces):
 
 @kernel(apart=("near",))
 def set_reference(depth: float, x: Matrix, marks: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Swap the cells of all terms for those within a skin and rooms of their rows at displacement x."""
+    """Swap the cells of all terms for those within a skin and margins of their rows at displacement x."""
     for m in range(nearby.terms.size):
         i = nearby.terms[m]
         nearby.swaps[m](i, m, depth, x, marks, terms.cells, terms.data, terms.outs, terms.stored)
@@ -445,7 +445,7 @@ def look_at_all(system, model):
 
 @kernel(apart=("pairs",))
 def narrow_all(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Take the cells of the wider lists that may act when rows have moved by their rooms."""
+    """Take the cells of the wider lists that may act when rows have moved by their margins."""
     marks = nearby.marks
     chosen, cells, data = nearby.chosen, nearby.wide_cells, nearby.wide_data
     for m in range(nearby.terms.size):
@@ -455,7 +455,7 @@ def narrow_all(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
 
 @kernel(apart=("pairs",))
 def take_pairs(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
-    """Find what is within the rooms of the wider list, and set the number of steps that the next should last."""
+    """Find what is within the margins of the wider list, and set the number of steps that the next should last."""
     skin, pairs, elements = nearby.skin[0], 0, 0
     set_reference(0.0, x, nearby.at, nearby, terms)
     for m in range(nearby.terms.size):
@@ -499,8 +499,8 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
     ``bits`` are the velocities of all places, in a row, as whole numbers; none where nothing acts nearby. The largest
     is known where a check of collisions has found it. Motion that is prescribed is held against the places ``before``;
     to that of a body is added what its rotation adds at its surface. States between the last three steps are covered as
-    well, which is what is looked at for peaks. Where rows have rooms, these count, and the approach is the way of rows
-    relative to each other.
+    well, which is what is looked at for peaks. Where rows have margins, these count, and the approach is the way of
+    rows relative to each other.
     """
     if not bits.size:
         return
@@ -529,7 +529,7 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
         nearby.frame[0, 3] += drift
         nearby.frame[1, 3] += drift
         skin.turned += turn
-        skin.used = -2.0 * least_room(skin.turned, x, nearby.marks, nearby.frame[0], nearby.at[:0], turns)
+        skin.used = -2.0 * least_margin(skin.turned, x, nearby.marks, nearby.frame[0], nearby.at[:0], turns)
         path *= BEND
     skin.steps += 1
     if skin.steps > skin.unknown and not (skin.depth < math.inf and skin.used + path <= SHARE * skin.depth):
@@ -537,32 +537,32 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
 
 
 @kernel(leaf=True)
-def least_room(turned, x, marks, frame, rooms, turns):
-    """Least way that any row may still move within its room of some ``marks``, see `NeighbourList` [m].
+def least_margin(turned, x, marks, frame, margins, turns):
+    """Least way that any row may still move within its margin of some ``marks``, see `NeighbourList` [m].
 
-    Bodies have turned since, and as much as the ``rooms`` of other marks must be left, if these have rows.
+    Bodies have turned since, and as much as the ``margins`` of other marks must be left, if these have rows.
     """
     free_way, a, b, c = math.inf, frame[3] * frame[0], frame[3] * frame[1], frame[3] * frame[2]
-    more = rooms.shape[0] > 0
+    more = margins.shape[0] > 0
     for r in range(marks.shape[0]):
         p, q, s = x[r, 0] - marks[r, 0] - a, x[r, 1] - marks[r, 1] - b, x[r, 2] - marks[r, 2] - c
         left = SHARE * marks[r, 3] - math.sqrt(p * p + q * q + s * s)
-        left = left - rooms[r, 3] if more else left
+        left = left - margins[r, 3] if more else left
         free_way = left if left < free_way else free_way
     for n in range(turns.moment.size):
         r = turns.rows[n, 0]
         p, q, s = x[r, 0] - marks[r, 0] - a, x[r, 1] - marks[r, 1] - b, x[r, 2] - marks[r, 2] - c
         left = SHARE * marks[r, 3] - turned - math.sqrt(p * p + q * q + s * s)
-        free_way = min(free_way, left - rooms[r, 3] if more else left)
+        free_way = min(free_way, left - margins[r, 3] if more else left)
     return free_way
 
 
 @kernel()
-def set_marks(steps, drift, turn, smallest_room, largest_room, rooms, x, v, turns, marks, frame):
-    """Give each row the room that it takes in some ``steps`` at its velocity, within two limits.
+def set_marks(steps, drift, turn, smallest_margin, largest_margin, margins, x, v, turns, marks, frame):
+    """Give each row the margin that it takes in some ``steps`` at its velocity, within two limits.
 
-    It is twice that of the ``rooms`` of other marks at least, if these have rows. Rows move in axes that have the mean
-    velocity of all, and surfaces of bodies by a way ``turn`` more in each step.
+    It is twice that of the ``margins`` of other marks at least, if these have rows. Rows move in axes that have the
+    mean velocity of all, and surfaces of bodies by a way ``turn`` more in each step.
     """
     for k in range(4):
         frame[k] = 0.0
@@ -572,9 +572,9 @@ def set_marks(steps, drift, turn, smallest_room, largest_room, rooms, x, v, turn
             frame[k] += v[r, k] / marks.shape[0]
     for r in range(marks.shape[0]):
         p, q, s = v[r, 0] - frame[0], v[r, 1] - frame[1], v[r, 2] - frame[2]
-        marks[r, 3] = min(max(steps * abs(drift) * math.sqrt(p * p + q * q + s * s), smallest_room), largest_room)
-        if rooms.shape[0]:
-            marks[r, 3] = max(marks[r, 3], 2.0 * rooms[r, 3])
+        marks[r, 3] = min(max(steps * abs(drift) * math.sqrt(p * p + q * q + s * s), smallest_margin), largest_margin)
+        if margins.shape[0]:
+            marks[r, 3] = max(marks[r, 3], 2.0 * margins[r, 3])
     for n in range(turns.moment.size):
         marks[turns.rows[n, 0], 3] += steps * turn
 
@@ -595,11 +595,13 @@ def choose(drift: float, x: Matrix, v: Matrix, turn: float, model: Model) -> Non
     none, marks, frame = nearby.at[:0], nearby.marks, nearby.frame[0]
     set_marks(INNER, drift, turn, FLOOR * recent, math.inf, none, x, v, turns, marks, frame)
     skin.past, skin.turned = skin.past + skin.turned, 0.0
-    if not (skin.listed > 0 and least_room(skin.past, x, nearby.at, nearby.frame[1], marks, turns) > 0.0):
-        largest_room = 0.5 * skin.widest
-        smallest_room = min(EVEN * skin.lasts * abs(drift) * spread_of(v[: marks.shape[0]]), largest_room)
-        set_marks(skin.lasts, drift, turn, smallest_room, largest_room, marks, x, v, turns, nearby.at, nearby.frame[1])
+    if not (skin.listed > 0 and least_margin(skin.past, x, nearby.at, nearby.frame[1], marks, turns) > 0.0):
+        largest_margin = 0.5 * skin.widest
+        smallest_margin = min(EVEN * skin.lasts * abs(drift) * spread_of(v[: marks.shape[0]]), largest_margin)
+        set_marks(
+            skin.lasts, drift, turn, smallest_margin, largest_margin, marks, x, v, turns, nearby.at, nearby.frame[1]
+        )
         skin.listed, skin.past = 1, 0.0
         take_pairs(x, nearby, terms)
-    skin.depth, skin.used = 0.0, -2.0 * least_room(0.0, x, marks, frame, none, turns)
+    skin.depth, skin.used = 0.0, -2.0 * least_margin(0.0, x, marks, frame, none, turns)
     narrow_all(x, nearby, terms)

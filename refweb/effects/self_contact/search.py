@@ -6,8 +6,8 @@ elements. Elements that share a node make no pair, nor do those that are listed 
 
 May change: `BOXES`, the size of the grid. Must stay: that no pair within reach is missed, `REACH` included; what
 `near_pairs` and `paired` return, for all kernels of this folder; the order of pairs, which decides the last digits of
-results; `axes_apart`, which `line_line_penalty` imports; `distances`, `foresee` and `pairs_by_room`, which `table`
-imports; `rooms_ahead`, which `integrators.neighbour_list` imports; `FASTER`, which `integrators.step_bound` imports.
+results; `axes_apart`, which `line_line_penalty` imports; `distances`, `foresee` and `pairs_by_margin`, which `table`
+imports; `margins_ahead`, which `integrators.neighbour_list` imports; `FASTER`, which `integrators.step_bound` imports.
 Tests: ``tests/effects/test_self_contact.py`` compares with all pairs.
 """
 
@@ -31,16 +31,17 @@ extends beyond its ends."""
 FASTER = 1.5
 """Allowance for what other contacts add to the relative speed of a pair in a span."""
 ROUNDED = 1e-12
-"""Allowance for rounding in the rooms of rows."""
+"""Allowance for rounding in the margins of rows."""
 BOXES = 4
 """Largest number of cells of the grid over that of elements."""
 
 
 @kernel()
 def middles(marks, x, cells, data, buffer):
-    """Write middle, half vector, half length and room of elements to ``buffer (elements, 8)``.
+    """Write middle, half vector, half length and margin of elements to ``buffer (elements, 8)``.
 
-    The result is the largest sum of both. The last column of ``marks`` has the rooms of rows; without rows they are 0.
+    The result is the largest sum of both. The last column of ``marks`` has the margins of rows; without rows they are
+    0.
     """
     widest = 0.0
     for c in range(cells.shape[0]):
@@ -160,7 +161,7 @@ def set_ranges(box, count, start, ranges):
 
 @kernel()
 def fill(reach, count, start, order, rows, cells, data, pairs):
-    """Write all pairs of elements nearer than a reach and both rooms to ``pairs``, as far as it holds; their number."""
+    """Write all pairs of elements nearer than a reach and both margins, as far as ``pairs`` holds; their number."""
     ranges, amount = np.empty((5, 2), dtype=np.int64), 0
     for box in range(start.size - 1):
         if start[box] == start[box + 1]:
@@ -206,7 +207,7 @@ def in_order(count, amount, unsorted):
 def pairs_within(skin, marks, x, cells, data):
     """Numbers of all pairs of elements that may push each other, in order, shape (., 2).
 
-    They come nearer by ``skin`` [m] and the rooms of both, see `middles`.
+    They come nearer by ``skin`` [m] and the margins of both, see `middles`.
     """
     none, buffer = np.empty((0, 2), dtype=np.int64), np.empty((cells.shape[0], 8))
     if cells.shape[0] < 2:
@@ -247,8 +248,8 @@ def paired(chosen, cells, data):
 
 
 @kernel()
-def pairs_by_room(skin, marks, x, cells, data):
-    """(numbers of the elements, nodes, numbers) of all pairs within a skin, and the rooms of rows, of touching."""
+def pairs_by_margin(skin, marks, x, cells, data):
+    """(numbers of the elements, nodes, numbers) of all pairs within a skin, and the margins of rows, of touching."""
     chosen = pairs_within(skin, marks, x, cells, data)
     rows, numbers = paired(chosen, cells, data)
     return chosen, rows, numbers
@@ -257,7 +258,7 @@ def pairs_by_room(skin, marks, x, cells, data):
 @kernel()
 def near_pairs(skin, x, cells, data):
     """The same within a skin alone."""
-    return pairs_by_room(skin, np.empty((0, 4)), x, cells, data)
+    return pairs_by_margin(skin, np.empty((0, 4)), x, cells, data)
 
 
 @kernel()
@@ -282,7 +283,7 @@ def foresee(span, early, v, f, inverse, cells, data):
 
 
 @kernel()
-def rooms_ahead(span, early, v, f, inverse):
+def margins_ahead(span, early, v, f, inverse):
     """Rooms of rows as marks, see `middles`: no pair comes nearer by more than those of its elements in `foresee`."""
     marks, mean = np.zeros((v.shape[0], 4)), np.zeros(3)
     for r in range(v.shape[0]):

@@ -23,7 +23,7 @@ from ...tables import Table, boolean, real, table
 from ..base import Balance, CellElements, ContactForce, Crossing, ForceTerm, Tangent, Timing, VelocityForce, without
 from ..natural_lengths import shortest_of
 from .pair import APART, ELEMENT
-from .search import distances, foresee, near, near_pairs, paired, pairs_by_room
+from .search import distances, foresee, near, near_pairs, paired, pairs_by_margin
 
 if TYPE_CHECKING:
     from ...net.net import Net
@@ -139,7 +139,7 @@ class SelfContact(Table):
                     'does not take: use [solve] kind = "dynamic" and a [damping], or a smaller web'
                 )
             common = dict(cells=cells, data=data, elements=CellElements(np.arange(len(cells)), without(BROKEN)))
-            search = ContactForce(near=near, finder=pairs_by_room, foresee=foresee)
+            search = ContactForce(near=near, finder=pairs_by_margin, foresee=foresee)
         beside = line_line_ccd.neighbours(net, data[:, APART:], 2.0 * self.radius)
         kernels = line_line_ccd.meets, line_line_ccd.soon
         follows = Crossing(*kernels, 2.0 * self.radius, self.stiffness_on(net), *beside)

@@ -145,8 +145,8 @@ def test_a_thrown_net_is_the_same_row_by_row(layers, end):
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.02], ids=["still", "turning"])
-def test_rooms_hold_what_comes_near(turned):
-    """All pairs and lines that touch after rows have moved anyhow within their rooms are in the lists, in order."""
+def test_margins_hold_what_comes_near(turned):
+    """All pairs and lines that touch after rows have moved anyhow within their margins are in the lists, in order."""
     from refweb.dynamics.integrators import neighbour_list
 
     keys = {"web.layers": 8, "web.cell_area": 0.6, "body.0.position": [0.0, 0.0, 1.2]}
@@ -157,7 +157,7 @@ def test_rooms_hold_what_comes_near(turned):
     x[:nodes] = rng.normal(0.0, 0.2, (nodes, 3))
     marks[:, 3] = rng.exponential(0.02, len(marks))
     marks[nodes, 3] += turned
-    found = neighbour_list.within_rooms(lines.contact.near, 1)(0.0, x, marks, lines.cells, lines.data)
+    found = neighbour_list.within_margins(lines.contact.near, 1)(0.0, x, marks, lines.cells, lines.data)
     listed = pairs.contact.finder(0.0, marks, x, pairs.cells, pairs.data)[0]
     order = listed[:, 0] * len(pairs.cells) + listed[:, 1]
     assert (np.diff(order) > 0).all() and 0 < len(found) < len(lines.cells)
@@ -169,7 +169,7 @@ def test_rooms_hold_what_comes_near(turned):
         moved[: len(marks)] += way
         now = pairs.contact.finder(0.0, none, moved, pairs.cells, pairs.data)[0]
         assert np.isin(now[:, 0] * len(pairs.cells) + now[:, 1], order).all()
-        near = neighbour_list.within_rooms(lines.contact.near, 1)(0.0, moved, none, lines.cells, lines.data)
+        near = neighbour_list.within_margins(lines.contact.near, 1)(0.0, moved, none, lines.cells, lines.data)
         assert np.isin(near, found).all()
         touching = [touching[0] + len(now), touching[1] + len(near)]
     assert min(touching) > 0
