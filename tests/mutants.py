@@ -370,9 +370,9 @@ MUTANTS = [
     Mutant("system/multifrontal", "later = later[later >= end]", "later = later[later > end]"),
     Mutant("system/multifrontal", "dsyrk(-1.0, rest, beta=1.0", "dsyrk(-1.0, rest, beta=0.5"),
     Mutant("effects/elasticity", "pulled = (1.0 + e) * stress", "pulled = stress"),
-    Mutant("effects/elasticity", "f[j, 1] -= d1", "f[j, 1] -= d0"),
-    Mutant("effects/elasticity", "range(behind - 1, first - 1, -1)", "range(behind - 1, first, -1)"),
-    Mutant("effects/elasticity", "element + k * stride", "element + k"),
+    Mutant("effects/line_blocks", "f[j, 1] -= d1", "f[j, 1] -= d0"),
+    Mutant("effects/line_blocks", "range(behind - 1, first - 1, -1)", "range(behind - 1, first, -1)"),
+    Mutant("effects/line_blocks", "element + k * stride", "element + k"),
     Mutant("effects/line_blocks", "(strides[1:] == strides[:-1])", "(strides[1:] > 0)"),
     Mutant(
         "effects/damping",

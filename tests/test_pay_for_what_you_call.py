@@ -117,6 +117,8 @@ def roots(given, method):
     yield from (registered(LAWS[name]) for name in laws)
     if "elastic-plastic" in laws:
         yield "effects.plastic"
+    if not static and method not in ("cvode", "ida") and "table" not in laws and "reel" not in given:
+        yield "effects.line_blocks"
     if "viscous" in cable:
         yield "effects.viscous"
     if given["web"].get("path", "").endswith(".csv"):

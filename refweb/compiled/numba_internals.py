@@ -141,14 +141,18 @@ class Cache:
         return any(path.exists() for path in self._paths(signature))
 
     def load_overload(self, signature, target_context):
-        """The machine code of a signature; None if there is none."""
+        """The machine code of a signature; None if there is none, or none that this version of the package can load."""
         content = next(
             (machine_code for path in self._paths(signature) if (machine_code := store.read(path)) is not None), None
         )
         if content is None:
             return None
         rtsys.initialize(target_context)
-        return CompileResult._rebuild(target_context, *pickle.loads(content))
+        try:
+            parts = pickle.loads(content)
+        except (AttributeError, ImportError):  # a class among its types stands in another module by now
+            return None
+        return CompileResult._rebuild(target_context, *parts)
 
     def save_overload(self, signature, result):
         """Write the machine code of a signature, if another process may use it: it contains no address of this one."""

@@ -89,3 +89,22 @@ def test_a_caller_may_ignore_the_end_of_its_processes(monkeypatch):
     monkeypatch.setattr(os, "waitpid", gone)
     with second_process.beside([None] * second_process.LEAST):
         pass
+
+
+def test_a_class_of_an_argument_may_move_to_another_module(tmp_path):
+    """Machine code names the classes of its arguments: where one is not found any more, it is compiled again."""
+    line = "from typing import NamedTuple\n\nclass Line(NamedTuple):\n    ea: float\n"
+    pull = "from {0} import Line\nfrom refweb.kernels import kernel\n\n\n@kernel()\ndef doubled(line):\n"
+    pull += (
+        "    return 2.0 * line.ea\n\n\n@kernel()\ndef outer(a):\n    return doubled(Line(a))\n\n\nprint(outer(3.0))\n"
+    )
+    environment = {**os.environ, "REFWEB_CACHE": str(tmp_path / "cache")}
+    for name, before in (("here", None), ("there", "here")):
+        (tmp_path / f"{name}.py").write_text(line, encoding="utf-8")
+        (tmp_path / "pull.py").write_text(pull.format(name), encoding="utf-8")
+        if before:
+            (tmp_path / f"{before}.py").unlink()
+        done = subprocess.run(
+            [sys.executable, "pull.py"], env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=300
+        )
+        assert done.returncode == 0 and done.stdout == "6.0\n", done.stderr

@@ -9,7 +9,7 @@ import skfem
 from nets import LAWS, skew_cable, skew_net, skew_web, system
 from oracle import Oracle
 
-from refweb.effects import elasticity, line_blocks
+from refweb.effects import line_blocks
 from refweb.effects.elasticity import Elasticity
 from refweb.effects.line_blocks import BLOCK, runs_of
 from refweb.net import discretisation, elements
@@ -320,7 +320,7 @@ def test_runs_keep_the_order_of_sums():
     net, cells = skew_system("tension-only"), LISTS["grid"]
     data = np.tile(net.net.line_data.matrix, (len(cells), 1))[: len(cells)]
     x, forces = displacement(5, cells.max() + 1), []
-    whole = elasticity.force_by_blocks(net.net.law), cells, line_blocks.blocks_of(data)
+    whole = line_blocks.force_by_blocks(net.net.law), cells, line_blocks.blocks_of(data)
     for force, taken, numbers in (whole, net.terms[0].elements.by_blocks(cells, data)):
         forces.append(np.zeros_like(x))
         force(0.0, x, np.zeros_like(x), forces[-1], taken, numbers, np.zeros((len(cells), 2)))
