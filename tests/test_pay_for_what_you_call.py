@@ -117,7 +117,10 @@ def roots(given, method):
     yield from (registered(LAWS[name]) for name in laws)
     if "elastic-plastic" in laws:
         yield "effects.plastic"
-    if not static and method not in ("cvode", "ida") and "table" not in laws and "reel" not in given:
+    explicit = not static and method not in ("cvode", "ida")
+    if (
+        explicit and len(laws) == 1 and "table" not in laws and "reel" not in given
+    ):  # one law without numbers of its own
         yield "effects.line_blocks"
     if "viscous" in cable:
         yield "effects.viscous"
