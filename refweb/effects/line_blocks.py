@@ -30,7 +30,8 @@ BLOCK = 256
 SPACE, OUTPUTS = 3 * BLOCK, 2 * BLOCK
 """Number of components of their differences, and of their tensions and strains."""
 LONG = 8
-"""Mean number of elements of the runs of a net from which they are worth it: a run costs as much as two elements."""
+"""Mean number of elements of the runs of a net from which on they are used. A line takes 5.4 ns without runs, and with
+runs of 2.3, 4, 10 and 22 elements 6.6, 5.4, 4.6 and 4.0, on a CPU with AVX-512."""
 RUN = np.dtype([(name, np.int32) for name in ("begin", "count", "first", "second", "element", "stride")])
 """Where a run begins in the order of its block, 0 for the first of a block, its number of elements, the rows of the
 nodes of its first element, the number of that, and from each element to the next."""
