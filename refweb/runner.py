@@ -384,9 +384,7 @@ def _cpu_by_effect(system, solution):
     state, share, scene = solution.state, {}, solution.scene
     calls = solution.solver["nfev"] or 0
     if scene.solve.kind == "dynamic":
-        from .dynamics.budget import steps_with_twin
-
-        calls *= steps_with_twin(scene)
+        calls *= 1.0 + solution.twin_steps / max(solution.solver["nsteps"] or 0, 1)
     for term in system.terms:
         if state is None:
             break

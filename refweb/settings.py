@@ -342,7 +342,7 @@ class Accuracy(Table):
     Parameters
     ----------
     error : {"twin", "none"}
-        In dynamics by a twin, a second run with a smaller error, or not at all. In statics "none" leaves out the error
+        In dynamics by a twin, a second run with other steps, or not at all. In statics "none" leaves out the error
         of smoothing; the other errors follow from the solution itself and cost next to nothing.
     digits : int, optional
         Of dynamics: significant digits that the ± of every observable has to leave. Accuracy is raised until that is

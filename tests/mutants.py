@@ -163,8 +163,8 @@ MIRRORS = {
     "statics": "statics/test_reused_factorization.py statics/test_statics.py dynamics/test_accuracy.py",
     "dynamics/accuracy_loop": "dynamics/test_budget.py test_faults.py dynamics/test_accuracy.py",
     "dynamics/budget": "dynamics/test_budget.py",
-    "dynamics/twin_error": "dynamics/test_agreement_by_chance.py dynamics/test_one_row.py "
-    "dynamics/test_events.py dynamics/test_dynamics.py",
+    "dynamics/twin_error": "dynamics/test_coarser_twin.py dynamics/test_agreement_by_chance.py "
+    "dynamics/test_one_row.py dynamics/test_events.py dynamics/test_dynamics.py",
     "dynamics/gradients": "dynamics/test_dynamic_gradients.py dynamics/test_gradient_jumps.py",
     "dynamics/kinks": "dynamics/test_dynamic_gradients.py dynamics/test_gradient_jumps.py",
     "dynamics/linear_run": "dynamics/test_dynamic_gradients.py dynamics/test_gradient_jumps.py",
@@ -185,7 +185,8 @@ MIRRORS = {
     "dynamics/control_laws": "dynamics/test_control.py",
     "dynamics/schedule": "dynamics/test_one_row.py dynamics/test_default_rows.py dynamics/test_dynamics.py",
     "dynamics/simulation": "test_faults.py dynamics/test_dynamics.py dynamics/test_starts.py",
-    "dynamics/integrators/central_difference": "dynamics/test_agreement_by_chance.py dynamics/test_dynamics.py",
+    "dynamics/integrators/central_difference": "dynamics/test_coarser_twin.py dynamics/test_agreement_by_chance.py "
+    "dynamics/test_dynamics.py",
     "dynamics/integrators/explicit_loop": "dynamics/integrators/test_joined_kicks.py "
     "dynamics/integrators/test_nearby.py dynamics/test_dynamics.py dynamics/test_impact.py",
     "dynamics/integrators/energy_balance": "dynamics/test_agreement_by_chance.py test_readme.py "
@@ -870,6 +871,9 @@ MUTANTS = [
     Mutant("dynamics/integrators/step_limits", "stop = self._corners[ahead] if", "stop = self._corners[-1] if"),
     Mutant("dynamics/history", "SPREAD = 3.0", "SPREAD = 1.5"),
     Mutant("dynamics/twin_error", "MOST_CHANCE, TELLING = 10.0", "MOST_CHANCE, TELLING = 1.0"),
+    Mutant("dynamics/twin_error", "self._course.stopped == stopped", "True"),
+    Mutant("dynamics/integrators/central_difference", "STABLE, FEWEST, SHORT = 0.75,", "STABLE, FEWEST, SHORT = 1.0,"),
+    Mutant("dynamics/integrators/central_difference", "return min(ratio, 1.0 / ratio)", "return ratio"),
     Mutant("dynamics/history", "distances[name] = 0.5 * time * float(along.max())", "distances[name] = 0.0"),
     Mutant(
         "dynamics/twin_error",

@@ -5,7 +5,7 @@ Each run has a value of it.
 
 May change: constants (number and size of repeated runs) and words of messages. Must stay: keys of
 `AccuracyState.arrays`, which stand in ``checkpoint.npz`` and which `runner._before` checks; codes of findings, those of
-`findings.CODES`. Runs fill ``reduced``, ``findings``, ``throw`` and ``twin_end`` of the solution, which `runner` and
+`findings.CODES`. Runs fill ``reduced``, ``findings``, ``throw`` and ``twin_…`` of the solution, which `runner` and
 `results` read. Must stay as well: `CLIMBS`, `reach_digits` and `run_within_drift`, which `simulation` imports. Tests:
 ``tests/dynamics/test_budget.py``, ``test_accuracy.py``.
 """
@@ -103,7 +103,7 @@ def run_within_drift(simulation, folder, tell):
                 solution.findings.append(Finding("repeated", message, "solve", NOTE))
                 simulation.again(folder)
                 continue
-            ended = twin.ended(tell) if twin else None
+            ended = twin.ended(tell, run.course.stopped) if twin else None
         break
     if twin and isinstance(twin.failure, Spent):
         raise twin.failure
@@ -117,7 +117,7 @@ def run_within_drift(simulation, folder, tell):
         named = {o.name: o for o in scene.observables}
         bounded = {name: named[name].bounded(result, simulation.system) for name, result in solution.reduced.items()}
         solution.reduced = bounded
-        solution.twin_end = ended.course.x, ended.course.v
+        solution.twin_end, solution.twin_steps = (ended.course.x, ended.course.v), ended.course.nsteps
         if folder is not None:
             folder.keep_twin(solution.twin_end)
     elif twin:

@@ -118,9 +118,9 @@ class Budget:
             raise Spent(f"{100.0 * share:.2g} % of it took {spent:.3g} s")
 
 
-def steps_with_twin(scene):
-    """Steps of a run and its step refinement, over those of the run; at order 2, √2 times the steps halve the error."""
-    return 1.0 + math.sqrt(2.0) if scene.accuracy.error == "twin" else 1.0
+def steps_with_twin(scene, by=None):
+    """Steps of a run and its step refinement, over those of the run; that has ``by`` times these, else √2 times."""
+    return 1.0 + (by or math.sqrt(2.0)) if scene.accuracy.error == "twin" else 1.0
 
 
 def check_budget(simulation, share, twin=False):

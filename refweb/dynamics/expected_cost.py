@@ -17,7 +17,7 @@ from ..registry import INTEGRATORS
 from ..results.units import prefixed
 from .budget import steps_with_twin
 from .method_choice import TURNING, step_price
-from .schedule import Counts
+from .schedule import Counts, spans_of
 
 TELLING = 0.95
 """Share of the step below which the step with all contacts is reported as well."""
@@ -108,7 +108,7 @@ def expected_cost(scene, system):
         texts = [f"{_seconds(rule.step)}{', where all is touched' * n}, by {rule.by}" for n, rule in enumerate(rules)]
         shortest = solve.duration / scene.output.interval
         steps = [max(solve.duration / rule.step, shortest) for rule in rules]
-    each = len(integrator.drifts) * steps_with_twin(scene)
+    each = len(integrator.drifts) * steps_with_twin(scene, integrator.coarser_by(spans_of(scene, system)))
     written = Counts.of(scene).seconds(len(system.net.cells))
     prices = [steps[0] * each * step_price(system), steps[-1] * each * step_price(system, touched=True)]
     prices = [price + written for price in prices]

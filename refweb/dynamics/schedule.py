@@ -122,6 +122,13 @@ def times_between(times):
     return (times[:-1, None] + shares * np.diff(times)[:, None]).ravel()
 
 
+def spans_of(scene, system):
+    """Times between rows, times of the comparison with a step refinement and corners of tables [s], in their order."""
+    rows, corners = row_times(scene), system.corners
+    corners = corners[(corners > 0.0) & (corners < rows[-1])]
+    return np.diff(np.union1d(np.union1d(rows, times_between(rows)), corners))
+
+
 class Block(NamedTuple):
     """Rows of one call of an integrator.
 

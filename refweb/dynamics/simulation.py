@@ -315,7 +315,7 @@ class Simulation:
         self.overlaps, self._lines = _overlaps_of(self.scene, self.system), None
         self._through, self._silent = _through_of(self.system), _silent_of(self.system)
         self.solution.frames.clear()
-        self.solution.twin_end = None
+        self.solution.twin_end, self.solution.twin_steps = None, 0
         if folder is not None:
             folder.restart(self.solution.summary())
 

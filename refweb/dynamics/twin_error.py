@@ -1,7 +1,8 @@
-"""± of dynamic results from a step-refinement run, or twin: a second run with a smaller error.
+"""± of dynamic results from a step-refinement run, or twin: a second run with other steps.
 
 The error of results and of the times of events is the difference of both runs, times a factor by the order of the
-method, times `SPREAD`. The second run takes place beside the first or after it.
+method, times `SPREAD`. The second run takes place beside the first or after it. It has fewer steps where that says the
+error (`coarser_by` of the integrator), and more where it does not, or where fewer steps fail.
 
 May change: `PAUSE`, private functions that do not change a factor. Must stay: fields of `TwinRun`; rows are those of
 `Watch.compared`; the name `THREADS`, which `sweeps.case` sets. A changed factor, or another constant than `PAUSE`,
@@ -18,13 +19,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..errors import SolverError
 from ..findings import Finding
 from ..results.solution import Result
 from .budget import check_budget
 from .divergence import divergence
 from .history import SPREAD
 from .integrators.integrator import IntegratorState
-from .schedule import blocks, time_of
+from .schedule import blocks, spans_of, time_of
 
 THREADS = True
 """True if twins may have a thread of their own: not in processes that share a machine as it is."""
@@ -68,7 +70,7 @@ class TwinRun(NamedTuple):
 
 
 class Twin:
-    """A run with a smaller error than that of the integrator of a simulation.
+    """A run with another error than that of the integrator of a simulation.
 
     Within a ``with`` block it runs in a separate thread if the integrator's loop needs no interpreter, and it ends with
     the block at the latest. Else it runs when its outcome is requested.
@@ -88,12 +90,14 @@ class Twin:
         self._simulation, self._stop = simulation, threading.Event()
         self._thread = self._course = self._last = self._rows = self._share_rows = self.failure = None
         self._time, self._tell = 0.0, lambda text, share: None
+        rule = getattr(simulation.integrator, "coarser_by", None)
+        self._by = None if rule is None else rule(spans_of(simulation.scene, simulation.system))
 
     def __enter__(self):
         integrator = self._simulation.integrator
         alone = self._simulation.schedule.commands is None  # two runs with commands would write to the same arrays
         if integrator.beside and THREADS and alone:
-            twin = integrator.refined()  # made here, so that one thread finds what the system finds once
+            twin = integrator.refined(self._by)  # made here, so that one thread finds what the system finds once
             self._thread = threading.Thread(target=self._run, args=(lambda: twin,), daemon=True)
             self._thread.start()
         return self
@@ -135,8 +139,21 @@ class Twin:
         except Exception as error:  # whatever it is, it belongs into the warnings of the run itself
             self.failure = error
 
-    def ended(self, tell):
-        """Wait for it; what came of it, a `TwinRun`, None where it has failed; ``tell`` is called with its progress."""
+    def ended(self, tell, stopped):
+        """Wait for the `TwinRun`; a coarser run that fails, or that ends otherwise, is replaced by a finer one.
+
+        Parameters
+        ----------
+        tell : callable
+            Called with the progress.
+        stopped : bool
+            True if an event has ended the first run.
+
+        Returns
+        -------
+        TwinRun or None
+            None if the run has failed.
+        """
         self._tell = tell
         self._report()
         if self._thread is not None:
@@ -144,6 +161,10 @@ class Twin:
                 self._thread.join(PAUSE)
                 self._report()
         else:
+            self._run(lambda: self._simulation.integrator.refined(self._by))
+        ends_alike = self._course is not None and self._course.stopped == stopped
+        if self._by is not None and not ends_alike and (self.failure is None or isinstance(self.failure, SolverError)):
+            self._thread = self._course = self.failure = self._by = None
             self._run(self._simulation.integrator.refined)
         if self._course is None or self._rows is None or self._share_rows is None:
             return None
@@ -194,7 +215,7 @@ def _of_chance(times, off, apart, end, order, floor):
 
 
 def with_errors(results, floors, twin, kept_rows, rows_refined, order=2.0, drifts=None, energy=0.0, snaps=None):
-    """Results with ±: the difference from a run with a smaller error, times ``order`` and `SPREAD`.
+    """Results with ±: the difference from a run with other steps, times ``order`` and `SPREAD`.
 
     Two runs may agree by chance on a peak, or at the end, although the motions differ. Therefore ± uses the larger of
     the difference of the result and the largest mean difference of the observable before it. Means are root mean
@@ -286,7 +307,7 @@ def add_errors(simulation, run, twin, rows):
     solution = simulation.solution
     first_run, refined = run.course, twin.course
     if first_run.stopped != refined.stopped:
-        which = ["the run", "its step refinement, the second run of a smaller error"][:: 1 if first_run.stopped else -1]
+        which = ["the run", "its step refinement, a second run with other steps"][:: 1 if first_run.stopped else -1]
         text = "no errors are known: an event ends {}, but not {}".format(*which)
         solution.findings.append(Finding("no-error", text, "event"))
         return 0.0

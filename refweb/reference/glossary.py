@@ -144,7 +144,7 @@ GLOSSARY = {
         "momentum balance": "Momentum minus impulses of loads and supports.",
         "work": "Energy that loads, motions and reels have given [J].",
         "impulse": "Integral of a force over time [N s].",
-        "step refinement": "Second run with half the step (or tighter tolerance) that yields ±; short: twin.",
+        "step refinement": "Second run with other steps or a tighter tolerance that yields ±; short: twin.",
         "breakpoint": "Time at which a table over time has a corner; steps end there.",
         "row": "Line of the history, one each output interval.",
         "frame": "State that is written as VTU files; also the axes of `[frame]`.",

@@ -190,6 +190,8 @@ class SolutionData:
     twin_end : (ndarray, ndarray), optional
         Displacement [m] and velocity [m/s] at the end of the step-refinement run, each of shape (rows, 3); None without
         such a run.
+    twin_steps : int
+        Number of steps of the step-refinement run, 0 without such a run.
     frames : list of (int, refweb.results.state.State)
         Row numbers and states of a run without a folder. A run with a folder keeps none in memory: its frames are
         files, which are read when they are needed.
@@ -217,6 +219,7 @@ class SolutionData:
     controls: list[Any] = field(default_factory=list)
     broken_before: list[int] = field(default_factory=list)
     twin_end: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    twin_steps: int = 0
     frames: list[tuple[int, Any]] = field(default_factory=list)
     reduced: dict[str, Result] = field(default_factory=dict)
     horizon: dict[str, Any] = field(default_factory=dict)

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..dynamics.budget import Spent, budget_of, steps_with_twin
+from ..dynamics.budget import Spent, budget_of
 from ..dynamics.twin_error import largest_mean
 from ..errors import InputError, SolverError
 from ..registry import EFFECTS, INTEGRATORS, name_of
@@ -117,7 +117,7 @@ class FurtherRuns:
         self.static = scene.solve.kind == "static"
         spent = clock.spent()
         first = max(spent["cpu_s"] - spent["compile_s"], 1e-3)
-        self._single = first if self.static else first / steps_with_twin(simulation.scene)
+        self._single = first / (1.0 + solution.twin_steps / max(solution.solver["nsteps"] or 0, 1))
         self.budget = budget_of(scene.accuracy.budget, first)
         self._compared = {None: (_results(solution), as_history(solution.columns, rows))}
 

@@ -376,7 +376,7 @@ def test_an_event_that_ends_one_of_two_runs():
     )
     assert [result.error for result in solution.results.values()] == [None, None]
     (warning,) = solution.warnings
-    which = ["the run", "its step refinement, the second run of a smaller error"]
+    which = ["the run", "its step refinement, a second run with other steps"]
     one, other = which if solution.events[0]["time"] is not None else which[::-1]
     assert warning == f"no errors are known: an event ends {one}, but not {other}"
 

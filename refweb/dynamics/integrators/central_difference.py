@@ -49,7 +49,10 @@ from .step_bound import SPAN, safe_step
 from .workspace import Workspace
 
 TWIN_STEPS = math.sqrt(2.0)
-"""Steps of a step-refinement run over those of a run: with a method of order 2 it has half the error."""
+"""Ratio of the steps of a run and of its step-refinement run: with a method of order 2 that of their errors is 2."""
+STABLE, FEWEST, SHORT = 0.75, 8, 0.1
+"""Largest step of a coarser run over the bound of stability; least number of steps in the spans of rows that it takes;
+largest share of the time that spans of fewer steps may have."""
 SHARED = tuple(CLOCK.names or ())[: (CLOCK.names or ()).index("least_energy")]
 """Numbers that a course and the loop's clock have in common."""
 
@@ -72,7 +75,7 @@ class CentralDifference(Integrator):
     step_size : float, optional
         A fixed step instead [s], at most the bound.
     finer : float
-        Factor on the number of steps in each row, ≥ 1.
+        Factor on the number of steps in each row.
 
     Attributes
     ----------
@@ -243,14 +246,38 @@ class CentralDifference(Integrator):
         finer = self.finer * (TWIN_STEPS if by is None else by)
         return type(self)(self.system, *self.observed, **self._keys, finer=finer)
 
-    def error_share(self, course, finer):
-        """Error of a finer run over that of this one.
+    def coarser_by(self, spans):
+        """Factor 1/`TWIN_STEPS` on the steps where many lines may touch lines, see `integrator.Integrator`.
+
+        None elsewhere, and if these steps were above `STABLE` of the bound, or if spans of fewer than `FEWEST` steps
+        take more than `SHORT` of the time: of 3 steps 1/√2 are 3 again.
+
+        Lines in contact move chaotically. Two runs are soon two samples of one motion, and a coarser run is as good a
+        sample as a finer one, for half of the steps. Of 670 results of 134 nets that are thrown into folds 1 is off by
+        more than ± by a coarser run, and 9 by a finer one, with a ± half as wide in the median. Elsewhere a finer run
+        says more: of 8364 results of 697 random impacts 40 are off by more than ± by a coarser run whose difference
+        counts once, and 19 by a finer run, whose difference counts twice. With a factor of 1.25 more it is 21, ± is
+        wider by a third in the median, and five times as wide for the mean stress of a web that a ball hits.
+        """
+        if not len(self.model.nearby.at):
+            return None
+        spans, safety = np.asarray(spans), self.safety
+        if self.step_size:
+            safety = self.step_size / (self.stretch * self.bound())
+        short = spans[self.steps_in(spans) < FEWEST].sum()
+        return 1.0 / TWIN_STEPS if TWIN_STEPS * safety <= STABLE and short <= SHORT * spans.sum() else None
+
+    def error_share(self, course, compared):
+        """Error of the finer of two runs over that of the other, see `refweb.dynamics.integrators.integrator`.
 
         It follows from the actual numbers of steps, with order 2: peaks, contact and slack lines reduce higher orders.
+        The error of a run is its difference from a coarser one, not twice that, where motion is regular; as two samples
+        of a chaotic motion differ, whichever has more steps, the larger factor counts in both cases.
         """
-        if not finer.nsteps:
+        if not compared.nsteps:
             return 0.5
-        return (course.nsteps / course.time / (finer.nsteps / finer.time)) ** 2
+        ratio = (course.nsteps / course.time / (compared.nsteps / compared.time)) ** 2
+        return min(ratio, 1.0 / ratio)
 
     def next_knob(self, share):
         """Factor on the safety for errors that are ``share`` times what they may be."""

@@ -271,7 +271,7 @@ def plan(end: float, changing: bool, scheme: Scheme, model: Model, running: Runn
         clock.step = span / steps
         return False
     clock.planned = max(int(math.ceil(max(steps, scheme.least_steps) * (1.0 - 1e-9))), 1)
-    if scheme.finer > 1.0:
+    if scheme.finer != 1.0:
         clock.planned = int(math.ceil(scheme.finer * clock.planned))
     return True
 

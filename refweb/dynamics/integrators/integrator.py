@@ -292,7 +292,8 @@ class Integrator(Protocol):
     by name that ``refweb cost`` compares. ``tolerances``: a dict of absolute tolerances by unit, "m" and "m/s"; ± is at
     least a multiple of these. ``prepare()``: compiles kernels before a run. ``evaluations(duration)``: number of
     evaluations of forces for a time [s], if it is known before a run. ``steps_in(spans)``: number of steps for each of
-    some spans of time [s], shape (spans,).
+    some spans of time [s], shape (spans,). ``coarser_by(spans)``: a ``by`` below 1 for `refined` whose run shows the
+    error as well, in less time, or None; ``spans`` are times between rows and corners of tables [s], shape (spans,).
     """
 
     method: str
@@ -380,23 +381,25 @@ class Integrator(Protocol):
         ...
 
     def refined(self, by: float | None = None) -> Integrator:
-        """The method on the same system, with the same probes, sums and events and a smaller error.
+        """The method on the same system, with the same probes, sums and events and another error.
 
         Parameters
         ----------
         by : float, optional
-            How many times as fine steps or tolerances are; by default as a twin has them, whose difference says what
-            the error is.
+            How many times as fine steps or tolerances are; by default finer, so that the difference says what the
+            error is.
         """
         ...
 
-    def error_share(self, course: IntegratorState, finer: IntegratorState) -> float:
-        """Error of a finer run over that of this one, by the order of the method [1].
+    def error_share(self, course: IntegratorState, compared: IntegratorState) -> float:
+        """Error of the finer of two runs over that of the other, by the order of the method, below 1 [1].
+
+        The error of the run is taken as the difference of both over 1 − this share.
 
         Parameters
         ----------
-        course, finer : IntegratorState
-            A run at its end, and that of ``refined()``.
+        course, compared : IntegratorState
+            A run at its end, and that of ``refined(by)``.
         """
         ...
 

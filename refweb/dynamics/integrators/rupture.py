@@ -87,8 +87,12 @@ class Rupturing:
             inner.on_progress = self._report
         return inner
 
+    def coarser_by(self, spans):
+        """Ask for more steps: a larger error changes the order of breaks, after which no ± is known."""
+        return None
+
     def refined(self, by=None):
-        """Make the integrator of the system without breaks, with a smaller error."""
+        """Make the integrator of the system without breaks, with another error."""
         return Rupturing(lambda *parts: self._make(*parts).refined(by), self._intact, self._probes, *self._rest)
 
     def start(self, x=None, v=None):

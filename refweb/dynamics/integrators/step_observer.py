@@ -349,7 +349,7 @@ class StepObserver(Integrator):
         method._monitors = (method._measurements,)
         return method
 
-    def error_share(self, course: IntegratorState, finer: IntegratorState) -> float:
+    def error_share(self, course: IntegratorState, compared: IntegratorState) -> float:
         """Error of a finer run over that of this one: it goes with the tolerance to the power 2/3 at order 2."""
         return TWIN_TOLERANCES ** (-2.0 / 3.0)
 
