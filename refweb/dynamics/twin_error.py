@@ -2,7 +2,8 @@
 
 The error of results and of the times of events is the difference of both runs, times a factor by the order of the
 method, times `SPREAD`. The second run takes place beside the first or after it. It has fewer steps where that says the
-error (`coarser_by` of the integrator), and more where it does not, or where fewer steps fail.
+error (`coarser_by` of the integrator), and more where it does not, or where fewer steps fail: in a chaotic motion the
+energy drift of a run may be near its limit, and beyond it in a finer run.
 
 May change: `PAUSE`, private functions that do not change a factor. Must stay: fields of `TwinRun`; rows are those of
 `Watch.compared`; the name `THREADS`, which `sweeps.case` sets. A changed factor, or another constant than `PAUSE`,
@@ -30,6 +31,8 @@ from .schedule import blocks, spans_of, time_of
 
 THREADS = True
 """True if twins may have a thread of their own: not in processes that share a machine as it is."""
+AGAIN = 2.0
+"""Factor on the steps of an explicit run after one of √2 times the steps that has failed."""
 PAUSE = 0.2
 """Time between two looks at a twin that is waited for [s]."""
 
@@ -90,8 +93,10 @@ class Twin:
         self._simulation, self._stop = simulation, threading.Event()
         self._thread = self._course = self._last = self._rows = self._share_rows = self.failure = None
         self._time, self._tell = 0.0, lambda text, share: None
-        rule = getattr(simulation.integrator, "coarser_by", None)
-        self._by = None if rule is None else rule(spans_of(simulation.scene, simulation.system))
+        rule, self._by, self._left = getattr(simulation.integrator, "coarser_by", None), None, []
+        if rule is not None:
+            self._by = rule(spans_of(simulation.scene, simulation.system))
+            self._left = [AGAIN] if self._by is None else [None, AGAIN]
 
     def __enter__(self):
         integrator = self._simulation.integrator
@@ -139,8 +144,15 @@ class Twin:
         except Exception as error:  # whatever it is, it belongs into the warnings of the run itself
             self.failure = error
 
+    def _shows_nothing(self, stopped):
+        """Tell if the run has failed, or if it has fewer steps and ends otherwise than the first run by an event."""
+        if self.failure is not None:
+            return isinstance(self.failure, SolverError)
+        fewer = self._by is not None and self._by < 1.0
+        return fewer and self._course is not None and self._course.stopped != stopped
+
     def ended(self, tell, stopped):
-        """Wait for the `TwinRun`; a coarser run that fails, or that ends otherwise, is replaced by a finer one.
+        """Wait for the `TwinRun`; an explicit one that shows nothing is replaced by a finer one.
 
         Parameters
         ----------
@@ -162,10 +174,9 @@ class Twin:
                 self._report()
         else:
             self._run(lambda: self._simulation.integrator.refined(self._by))
-        ends_alike = self._course is not None and self._course.stopped == stopped
-        if self._by is not None and not ends_alike and (self.failure is None or isinstance(self.failure, SolverError)):
-            self._thread = self._course = self.failure = self._by = None
-            self._run(self._simulation.integrator.refined)
+        while self._left and self._shows_nothing(stopped):
+            self._by, self._thread, self._course, self.failure = self._left.pop(0), None, None, None
+            self._run(lambda: self._simulation.integrator.refined(self._by))
         if self._course is None or self._rows is None or self._share_rows is None:
             return None
         watch, course = self._simulation.watch, self._course
