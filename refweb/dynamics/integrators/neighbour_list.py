@@ -313,9 +313,8 @@ def within_margins(near, pieces):
     they are those of a line.
     """
 
-    @kernel()
-    def cells_near(skin, x, marks, cells, data):
-        touching, piece = np.empty(cells.shape[0], dtype=np.int64), np.empty(pieces, dtype=np.int64)
+    @kernel(leaf=True)
+    def note_near(skin, x, marks, cells, data, touching, piece):
         count = 0
         for first in range(0, cells.shape[0], pieces):
             end, first_margin, second = min(first + pieces, cells.shape[0]), 0.0, 0.0
@@ -327,7 +326,12 @@ def within_margins(near, pieces):
             for n in range(near(skin + first_margin + second, x, cells[first:end], data[first:end], piece)):
                 touching[count] = first + piece[n]
                 count += 1
-        return touching[:count]
+        return count
+
+    @kernel()
+    def cells_near(skin, x, marks, cells, data):
+        touching, piece = np.empty(cells.shape[0], dtype=np.int64), np.empty(pieces, dtype=np.int64)
+        return touching[: note_near(skin, x, marks, cells, data, touching, piece)]
 
     return cells_near
 
