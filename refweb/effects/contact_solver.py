@@ -53,6 +53,8 @@ from .vectors import cross, dot, solve
 
 SETTLING = 1
 """Number of sweeps after which θ is constant: with a warm start a second sweep changes nothing."""
+CLOSE = 1e-9
+"""Step of Newton's method for the size of a slip, over that, behind which the next would be rounding."""
 UNMIXED = 1e-15
 """Size of the mixed term of J M⁻¹ Jᵀ, over its terms along the tangents, below which it is rounding."""
 
@@ -233,7 +235,7 @@ def slip_size(b, c, y, z, slip):
         total = p + q + s
         step = total * (math.sqrt(total) - 1.0) / (p * by_slip + q * by_b + s * by_c)
         r += step
-        if not abs(step) > 1e-15 * r:
+        if not abs(step) > CLOSE * r:
             break
     return r
 

@@ -260,7 +260,7 @@ def ahead_of(pairs, foresee):
         if reach < math.inf:
             marks = margins_ahead(span, early, v, f, inverse)
             _, rows, numbers = pairs(0.0, marks, x, cells[source], data[source])
-            foresee(span, early, v, f, inverse, rows, numbers)
+            foresee(span, early, x, v, f, inverse, rows, numbers)
             cells[i], data[i] = rows, numbers
 
     return ahead

@@ -239,7 +239,7 @@ def paired(chosen, cells, data):
         pair.length, pair.second = first.length, second.length
         pair.friction, pair.slip_velocity, pair.rolls = first.friction, first.slip_velocity, first.rolls
         pair.elements[0], pair.elements[1] = a, b
-        pair.approach = pair.speed = math.inf
+        pair.approach = pair.speed = pair.closing = math.inf
         for k in range(3):
             pair.vectors[0, k] = first.ends[1, k] - first.ends[0, k]
             pair.vectors[1, k] = second.ends[0, k] - first.ends[0, k]
@@ -262,24 +262,32 @@ def near_pairs(skin, x, cells, data):
 
 
 @kernel()
-def foresee(span, early, v, f, inverse, cells, data):
+def foresee(span, early, x, v, f, inverse, cells, data):
     """Write how near the elements of each pair may come in a span [s], and how fast they are then.
 
     Their nodes have the velocities v, and what the forces f add within a time ``early`` [s]. A force that is not in
-    balance turns within half a period of its line, so that it does not act for a longer span.
+    balance turns within half a period of its line, so that it does not act for a longer span. All points of both are
+    apart by their distance, along the line between the nearest two, so that it falls by what nodes move along that.
     """
     for c in range(cells.shape[0]):
-        fastest = 0.0
+        (p, u, w), fastest, closest = place_of(x, cells, data, c), 0.0, 0.0
+        s, t, square = nearest(p, u, w)
+        q = p[0] + s * u[0] - t * w[0], p[1] + s * u[1] - t * w[1], p[2] + s * u[2] - t * w[2]
+        inverse_size = 1.0 / math.sqrt(square) if square > 0.0 else 0.0
         for i in range(2):
             for j in range(2, 4):
-                r, q, speed, push = cells[c, i], cells[c, j], 0.0, 0.0
+                r, o, speed, push, apart = cells[c, i], cells[c, j], 0.0, 0.0, 0.0
                 for k in range(3):
-                    speed += (v[r, k] - v[q, k]) ** 2
-                    push += (inverse[r, k] * f[r, k] - inverse[q, k] * f[q, k]) ** 2
-                fastest = max(fastest, math.sqrt(speed) + early * math.sqrt(push))
+                    speed += (v[r, k] - v[o, k]) ** 2
+                    push += (inverse[r, k] * f[r, k] - inverse[o, k] * f[o, k]) ** 2
+                    apart += (v[r, k] - v[o, k]) * q[k]
+                speed, push = math.sqrt(speed), early * math.sqrt(push)
+                fastest = max(fastest, speed + push)
+                toward = -apart * inverse_size if square > 0.0 else speed
+                closest = max(closest, toward + (FASTER - 1.0) * speed + FASTER * push)
         pair = record_at(PAIR, data, c, 0)
         pair.speed = FASTER * fastest
-        pair.approach = span * pair.speed
+        pair.approach, pair.closing = span * pair.speed, span * closest
 
 
 @kernel()
