@@ -183,7 +183,11 @@ def fill(reach, count, start, order, columns, cells, data, pairs):
                 for n in range(ranges[part, 0], ranges[part, 1]):
                     if not meets[n]:
                         continue
-                    a, b, within = min(order[m], order[n]), max(order[m], order[n]), reach + columns[7, m] + columns[7, n]
+                    a, b, within = (
+                        min(order[m], order[n]),
+                        max(order[m], order[n]),
+                        reach + columns[7, m] + columns[7, n],
+                    )
                     if nonadjacent(a, b, cells, data) and segments_meet(within, m, n, columns):
                         if amount < pairs.shape[0]:
                             pairs[amount, 0], pairs[amount, 1] = a, b
