@@ -69,7 +69,7 @@ WIDEST, MANY, FEWEST = 0.5, 512.0, 6.0
 should last."""
 PRICE = 400.0
 """Time of the search of the pairs of an element, over that of a pair of the wide list in a step."""
-INNER = 16.0
+INNER = 24.0
 """Number of steps that margins of rows last in a list that is taken from a wider one."""
 FLOOR, EVEN = 0.6, 0.2
 """Least margin of a row over the largest approach of rows in the last `COVERED` steps: of any two half of that

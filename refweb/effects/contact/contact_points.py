@@ -365,9 +365,7 @@ def in_reach(depth, spins):
     @kernel(forceinline=True)
     def in_reach(skin, x, cells, data, c, nodes, functions):
         spot = within(x, cells, data, c, nodes, functions, 0.5)
-        if spot.depth + 0.5 * abs(dot(spot.gradient, spot.d)) + skin <= 0.0:
-            return False
-        return boxed(skin, x, cells, data, c, nodes, functions)
+        return not spot.depth + 0.5 * abs(dot(spot.gradient, spot.d)) + skin <= 0.0
 
     return in_reach
 
