@@ -325,11 +325,11 @@ def rub(h, number, contact, f, inverse, parts):
 @kernel(leaf=True)
 def gauss_seidel(h, number, f, inverse, contacts, parts, count, laws):
     """Solve contacts in turn, in reverse order if ``number`` is odd; return the largest change of a velocity [m/s]."""
-    largest, way, n = 0.0, -1 if number % 2 else 1, count - 1 if number % 2 else 0
+    largest, stride, n = 0.0, -1 if number % 2 else 1, count - 1 if number % 2 else 0
     while 0 <= n < count:
         term, end = contacts[n].term, n
         while 0 <= end < count and contacts[end].term == term:
-            end += way
+            end += stride
         largest, n = max(largest, laws[term](h, number, n, end, f, inverse, contacts, parts)), end
     return largest
 
