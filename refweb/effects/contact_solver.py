@@ -28,7 +28,7 @@ nodes in a fluid. A force term has a kernel that detects its contacts, and one f
 while all others stay. `friction_law` is friction with damping. A force on a node that is attached to a body is a force
 and a moment on the body: rows of the body replace those of the node.
 
-May change: `SETTLING` and `UNMIXED`, which move results within the error of a step. Must stay: the law in
+May change: `SETTLING`, `CLOSE` and `UNMIXED`, which move results within the error of a step. Must stay: the law in
 `friction_law`, which is that of `contact.friction`; fields of `refweb.kernels.CONTACT` that are read and written;
 `prepare`, `carry`, `gauss_seidel`, `warm_start` and `commit`, which `integrators.implicit_contacts` and
 `integrators.step` call. Another order of contacts or sums changes the last digits of results. Must stay as well: all

@@ -91,9 +91,10 @@ class Foreseen(NamedTuple):
     Attributes
     ----------
     depth : float
-        Depth that it may come to [m]; 0 where it stays out of reach.
+        Depth that it may come to [m]; 0 where it stays out of reach. Where stiffness does not depend on depth, that of
+        the middle of the body stands for any: to find it takes most of the time of a bound.
     length : float
-        |y'| at the deepest place [m].
+        |y'| at the deepest place [m], 0 where stiffness depends on neither.
     """
 
     depth: float

@@ -20,14 +20,14 @@ overlap is further than c from all ends, these closed forms are exact to roundin
 lie along each other push with 2 κ f h (c² − h²)·2 along their common length, so that the push of a pair is at most k r
 again. Therefore the stiffness of a pair is of the order of k at any angle, and parallel lines need no shorter steps.
 
-Columns of cells and data are described in `pair`. May change: `FAR`; `MARGIN` and `MOST` upwards, by which explicit
-steps are shorter; tests of what is far, if no contact is missed. Must stay: `OF_REACH`, which follows from the meaning
-of ``reach`` in bounds, and the marks `NOT_SEEN` and `NO_PUSH`; one energy, which `overlap_integrals`, the closed form
-here and `penetration.HELD` share; 1.875 in `room_left`, which follows from it and stands again in
-`line_line_damping.add_bounds`; `pushed`, of which damping and friction make theirs; `add_forces`, `add_all_second`,
-`stored`, `depth_ahead`, `steepest` and `MOST`, which `line_line_damping` imports for its forces, stiffness and bounds;
-`bound`, which `line_line_friction` calls; `force`, `energy`, `stiffness` and `bound`, which `table` takes by name.
-Tests: ``tests/effects/test_self_contact.py``.
+Columns of cells and data are described in `pair`. May change: `FAR`; `MARGIN`, `MOST`, `ROWS` and `ROWS_DEEP` upwards,
+and `SHALLOW` downwards, by which explicit steps are shorter; tests of what is far, if no contact is missed. Must stay:
+`OF_REACH`, which follows from the meaning of ``reach`` in bounds, and the marks `NOT_SEEN` and `NO_PUSH`; one energy,
+which `overlap_integrals`, the closed form here and `penetration.HELD` share; 1.875 in `room_left`, which follows from
+it and stands again in `line_line_damping.add_bounds`; `pushed`, of which damping and friction make theirs;
+`add_forces`, `add_all_second`, `stored`, `depth_ahead`, `steepest` and `MOST`, which `line_line_damping` imports for
+its forces, stiffness and bounds; `bound`, which `line_line_friction` calls; `force`, `energy`, `stiffness` and `bound`,
+which `table` takes by name. Tests: ``tests/effects/test_self_contact.py``.
 """
 
 from __future__ import annotations
