@@ -351,12 +351,15 @@ def room_left(limit, touch, scale, stored_now, moving):
 
 @kernel(forceinline=True)
 def depth_ahead(reach, speed, x, mass, cells, data, c):
-    """c² − D that pair c may come to within a reach at some speed, see `refweb.effects.contact.penalty.foresight`."""
+    """(c² − D that pair c may come to within a reach at some speed, whether it touches now).
+
+    See `refweb.effects.contact.penalty.foresight`.
+    """
     geometry, of, pair = place_of(x, cells, data, c), numbers_of(data, c), record_at(PAIR, data, c, 0)
     square, touch = nearest(geometry.p, geometry.u, geometry.w)[2], of.touch
     closing, reach = min(reach, pair.closing), min(reach, pair.approach)
     if not square < (REACH * touch + closing) ** 2:
-        return 0.0
+        return 0.0, False
     first_mass, second_mass = mass[cells[c, 0]] + mass[cells[c, 1]], mass[cells[c, 2]] + mass[cells[c, 3]]
     reduced = (
         first_mass * second_mass / (first_mass + second_mass)
@@ -367,53 +370,36 @@ def depth_ahead(reach, speed, x, mass, cells, data, c):
     moving = 0.5 * reduced * speed * speed
     p, u, w = geometry
     left, axes = max(math.sqrt(square) - closing, 0.0), axes_apart(p, u, w, touch, reach)
-    return room_left(
-        min(2.0 * touch * touch - left * left, touch * touch - axes * axes),
-        touch,
-        of.scale,
-        stored(x, cells, data, c),
-        moving,
-    )
+    limit = min(2.0 * touch * touch - left * left, touch * touch - axes * axes)
+    return room_left(limit, touch, of.scale, stored(x, cells, data, c), moving), square < touch * touch
 
 
 @kernel()
 def note_pairs(reach, speed, x, mass, cells, data, rates_here, largest):
     """Write the sum of the bounds of all pairs of each row, and the largest that it may be.
 
-    That is `MOST` times the largest of a pair; where pairs have speeds of their own see `note_planned`.
+    That is `MOST` times the largest of a pair. In a span, in which each pair has a speed of its own, a row has all
+    pairs that touch at its start, but no more than an element whose middle another like it touches as deep as it can;
+    and no less than any pair alone that may touch in the span. In a capture two or three of some ten pairs touch a row
+    at one time, most of them for less than a span, and of those that come near few touch.
     """
-    if cells.shape[0] and record_at(PAIR, data, 0, 0).speed < math.inf:
-        note_planned(reach, speed, x, mass, cells, data, rates_here, largest)
-        return
+    in_span = cells.shape[0] > 0 and record_at(PAIR, data, 0, 0).speed < math.inf
     for c in range(cells.shape[0]):
-        depth = depth_ahead(reach, speed, x, mass, cells, data, c)
-        if depth > 0.0:
-            value = 2.0 * steepest(numbers_of(data, c), depth)
-            for n in range(4):
-                rates_here[cells[c, n]] += value
-                largest[cells[c, n]] = max(largest[cells[c, n]], MOST * value)
-
-
-@kernel()
-def note_planned(reach, speed, x, mass, cells, data, rates_here, largest):
-    """Write the same for a span in which each pair has a speed of its own, with no further limit.
-
-    A row has all pairs that touch at its start, but no more than an element whose middle another like it touches as
-    deep as it can; and no less than any pair alone that may touch in the span. In a capture two or three of some ten
-    pairs touch a row at one time, most of them for less than a span, and of those that come near few touch.
-    """
-    for c in range(cells.shape[0]):
-        depth = depth_ahead(reach, speed, x, mass, cells, data, c)
-        if depth > 0.0:
-            of, (p, u, w) = numbers_of(data, c), place_of(x, cells, data, c)
+        depth, touches = depth_ahead(reach, speed, x, mass, cells, data, c)
+        if not depth > 0.0:
+            continue
+        of = numbers_of(data, c)
+        value, limit = 2.0 * steepest(of, depth), math.inf
+        most = MOST * value
+        if in_span:
             value, limit = row_sum(of, depth), steepest(of, of.touch * of.touch)
-            touches = nearest(p, u, w)[2] < of.touch * of.touch
-            for n in range(4):
-                r = cells[c, n]
-                largest[r] = max(largest[r], value)
-                if touches:
-                    rates_here[r] = max(rates_here[r], min(rates_here[r] + value, limit))
-    for r in range(largest.size):
+            most = value
+        for n in range(4):
+            r = cells[c, n]
+            largest[r] = max(largest[r], most)
+            if touches or not in_span:
+                rates_here[r] = max(rates_here[r], min(rates_here[r] + value, limit))
+    for r in range(largest.size if in_span else 0):
         rates_here[r], largest[r] = max(rates_here[r], largest[r]), math.inf
 
 
