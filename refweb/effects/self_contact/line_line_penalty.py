@@ -390,13 +390,13 @@ def note_pairs(reach, speed, x, mass, cells, data, rates_here, largest):
             continue
         of = numbers_of(data, c)
         value, limit = 2.0 * steepest(of, depth), math.inf
-        most = MOST * value
+        highest = MOST * value
         if in_span:
             value, limit = row_sum(of, depth), steepest(of, of.touch * of.touch)
-            most = value
+            highest = value
         for n in range(4):
             r = cells[c, n]
-            largest[r] = max(largest[r], most)
+            largest[r] = max(largest[r], highest)
             if touches or not in_span:
                 rates_here[r] = max(rates_here[r], min(rates_here[r] + value, limit))
     for r in range(largest.size if in_span else 0):
