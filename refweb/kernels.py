@@ -16,9 +16,10 @@ all its digits, which it loses when positions are the unknowns.
                    (3,)``, but for a constant
 `DETECT`           ``(x, cells, data, contacts, parts, begin)``: writes the contacts of all cells, see `CONTACT`, from
                    ``begin`` on; the number behind them, also where ``contacts`` has no space for all
-`LAW`              ``(h, number, n, f, inverse, contacts, parts)``: finds the force of contact n in a kick of size h,
-                   sweep ``number``, and adds its change to f; the change of the velocity [m/s]. ``inverse (rows, 3)``
-                   is 1/m, 0 where a support holds
+`LAW`              ``(h, number, first, end, f, inverse, contacts, parts)``: finds in turn the forces of contacts
+                   from ``first`` on, before or down to ``end``, in a kick of size h, sweep ``number``, and adds their
+                   changes to f; the largest change of a velocity [m/s]. ``inverse (rows, 3)`` is 1/m, 0 where a
+                   support holds
 `NEAR`             ``(skin, x, cells, data, chosen)``: writes the numbers of all cells that may touch when they come
                    nearer by ``skin`` [m] to ``chosen``; their number
 `MEETS`            ``(margin, path, kick, drift, x, v, f, inverse, cells, data, due, met)``: whether lines of any cell
@@ -127,7 +128,7 @@ MEMORY = np.dtype([("tag", np.int64), ("step", np.int64), ("force", float, (3,))
 CONTACTS, PARTS = types.Array(from_dtype(CONTACT), 1, "C"), types.Array(from_dtype(PART), 1, "C")
 MEMORIES = types.Array(from_dtype(MEMORY), 2, "C")
 DETECT = types.int64(MATRIX, INDICES, MATRIX, MATRIX, CONTACTS, PARTS, types.int64)
-LAW = types.float64(_f, types.int64, types.int64, MATRIX, MATRIX, CONTACTS, PARTS)
+LAW = types.float64(_f, *(3 * (types.int64,)), MATRIX, MATRIX, CONTACTS, PARTS)
 DUE = np.dtype([("path", float), ("chosen", np.int64)])
 """A cell that is checked only when it is due: the approach in all drifts after which that is [m]. The list also has the
 numbers of the cells that are due soon. Behind all cells stand three more: the approach so far, with how many are due

@@ -323,9 +323,14 @@ MUTANTS = [
     Mutant("net/grown_core", "past < WIDENING * width", "past < width"),
     Mutant("net/grown_core", "by_tt = g1 * g1 *", "by_tt = g1 *"),
     Mutant("effects/contact/contact_points", " or abs(step - xi) > 0.5 * moved", ""),
-    Mutant("effects/contact/contact_points", "spot.depth + reach, dot(", "spot.depth + 0.9 * reach, dot("),
+    Mutant("effects/contact/contact_points", "deep + reach, dot(", "deep + 0.9 * reach, dot("),
     Mutant("effects/contact/contact_points", "deep + slope * (xi - before)", "deep"),
     Mutant("effects/contact/penalty", " or nodes == 2 and not reaches(reach, x, cells, data, c, nodes, functions)", ""),
+    Mutant(
+        "effects/contact/penalty",
+        "reaches(reach, x, cells, data, c, nodes, functions)\n            return",
+        "1\n            return",
+    ),
     Mutant("net/shapes/rounding", "ROUNDING = 0.02", "ROUNDING = 0.03"),
     Mutant("net/shapes/plane", "(0.0, 0.0, -1.0), (0.0", "(0.0, 0.0, 1.0), (0.0"),
     Mutant("net/shapes/terrain", "- (thickness or DEEP * longest)", "+ (thickness or DEEP * longest)"),
@@ -715,6 +720,11 @@ MUTANTS = [
     Mutant("dynamics/integrators/ccd", "kind == THROUGH and met[3] == 0)", "kind == THROUGH and met[3] == 1)"),
     Mutant("dynamics/integrators/ccd", "    paths.free -= path\n", ""),
     Mutant("effects/self_contact/line_line_friction", "(1.0 - a, a, b - 1.0, -b)", "(1.0 - a, a, -b, b - 1.0)"),
+    Mutant(
+        "effects/self_contact/line_line_penalty", "ROWS, ROWS_DEEP, SHALLOW = 1.15,", "ROWS, ROWS_DEEP, SHALLOW = 1.0,"
+    ),
+    Mutant("effects/self_contact/line_line_penalty", "if touches or not in_span", "if not touches or not in_span"),
+    Mutant("effects/self_contact/search", "toward + (FASTER - 1.0) * speed", "toward"),
     Mutant("effects/self_contact/line_line_penalty", "if square > (REACH * of.touch) ** 2", "if square > of.touch**2"),
     Mutant("dynamics/integrators/ccd", "due[NEXT].path - paths.past - path)", "due[NEXT].path - paths.past)"),
     Mutant("dynamics/integrators/ccd", "due[PAST].path = paths.past", "due[PAST].path = 0.0"),

@@ -501,6 +501,18 @@ def test_bound_sees_only_bodies_within_reach():
     np.testing.assert_allclose(near, 2.0 / np.sqrt((4 * 1e3 * 1e-4 / 0.5 + 2e6) / mass), rtol=1e-14)
 
 
+def test_bound_sees_only_boxes_within_reach():
+    """A box that is 0.5 m above the middle of a line, and further from both of its ends."""
+    web = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=2).web()
+    cable = refweb.Cable(law="linear", modulus=1e3, area=1e-4, density=100.0)
+    box = CLASSES["Body"](name="box", shape="box", size=(0.1, 0.1, 0.2), position=(0.25, 0.0, 0.6), fixed=True)
+    system = nets.system(web, cable, [box, CLASSES["Contact"](stiffness=1e6)])
+    far, near = (CentralDifference(system).bound(reach=reach) for reach in (0.49, 0.51))
+    mass = 100.0 * 1e-4 * 0.5
+    np.testing.assert_allclose(far, 2.0 / np.sqrt(4 * 1e3 * 1e-4 / 0.5 / mass), rtol=1e-14)
+    np.testing.assert_allclose(near, 2.0 / np.sqrt((4 * 1e3 * 1e-4 / 0.5 + 2.5e6) / mass), rtol=1e-14)
+
+
 def drive(net, system):
     (driven,) = system.drives
     assert isinstance(driven, PrescribedMotion) and system.supported[driven.cells[:, 0]].all()

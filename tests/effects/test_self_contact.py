@@ -10,11 +10,11 @@ import pytest
 from scipy.optimize import brentq, lsq_linear
 
 import refweb
-from refweb.compiled.rows import matrix_of
+from refweb.compiled.rows import matrix_of, records_of
 from refweb.dynamics import schedule
 from refweb.dynamics.integrators.crossings import BESIDE, checks_of
 from refweb.effects.self_contact import line_line_damping, line_line_friction, line_line_penalty, search, table
-from refweb.effects.self_contact.pair import PAIR
+from refweb.effects.self_contact.pair import PAIR, numbers_of
 from refweb.errors import InputError, SolverError
 from refweb.kernels import ALL_DUE, DUE
 from refweb.net import discretisation
@@ -284,6 +284,82 @@ def test_bound_is_above_row_sums():
         rows, rates = np.linalg.norm(blocks, 2, axis=(2, 3)).sum(axis=1), np.zeros(4)
         line_line_penalty.bound(0.0, 0.0, x, np.ones(4), rates, ONE, pair.data)
         assert rows.max() <= rates.max()
+
+
+def any_pairs(count):
+    """(rows, data, places) of pairs that are 1 thick and up to 60 long, crossed or along each other, slack or taut."""
+    rng = np.random.default_rng(1)
+    natural = np.exp(rng.uniform(np.log(1.2), np.log(60.0), (2, count)))
+    natural[1] = np.where(rng.random(count) < 0.5, natural[0], natural[1])
+    length = natural * rng.choice([1.0, 1.01, 1.05, 0.8, 0.5], (2, count))
+    angle, height = np.arcsin(np.exp(rng.uniform(np.log(3e-3), 0.0, count))), np.sqrt(1.0 - rng.random(count) ** 2)
+    s = rng.choice([0.0, 1.0], count) + rng.choice([0.0, 0.02, 0.3], count) * rng.standard_normal(count)
+    t, still = rng.uniform(-0.1, 1.1, count), np.zeros(count)
+    u = np.stack([length[0], still, still], axis=1)
+    w = length[1][:, None] * np.stack([np.cos(angle), np.sin(angle), still], axis=1)
+    first = s[:, None] * u - t[:, None] * w + np.stack([still, still, height], axis=1)
+    data = np.zeros(count, PAIR)
+    data["touch"] = data["scale"] = 1.0
+    data["length"], data["second"] = natural
+    data["approach"] = data["speed"] = data["closing"] = np.inf
+    places = np.stack([0.0 * u, u, first, first + w], axis=1)
+    return np.arange(4 * count, dtype=np.int32).reshape(count, 4), matrix_of(data), places
+
+
+def test_no_row_of_a_pair_is_above_its_bound():
+    """Whatever the angle, where c² − D is at most what the nearest points, or both axes, leave; and some come close."""
+    cells, data, places = any_pairs(6000)
+    x, blocks, highest = places.reshape(-1, 3), np.zeros((len(cells), 12, 12)), [0.0, 0.0]
+    line_line_penalty.stiffness(0.0, x, x, blocks, cells, data, False)
+    rows = (
+        np.linalg.norm(blocks.reshape(-1, 4, 3, 4, 3).transpose(0, 1, 3, 2, 4), 2, axis=(3, 4)).sum(axis=2).max(axis=1)
+    )
+    apart = search.distances(x, cells, data)
+    for c in np.flatnonzero(rows > 0.0):
+        (a, b, d, e), of = places[c], numbers_of(data, c)
+        axes = search.axes_apart(tuple(a - d), tuple(b - a), tuple(e - d), 1.0, 0.0)
+        depth = min(1.0, 2.0 - apart[c] ** 2, 1.0 - axes**2)
+        deep = int(depth > line_line_penalty.SHALLOW)
+        highest[deep] = max(highest[deep], rows[c] / line_line_penalty.row_sum(of, depth))
+    assert 0.85 < min(highest) and max(highest) < 1.0
+
+
+def test_a_span_counts_all_pairs_that_touch_and_one_that_may():
+    """Of a row with several; no more than the middle of an element takes from another like it."""
+    data, x = np.zeros(3, PAIR), np.zeros((14, 3))
+    data["touch"], data["scale"], data["length"], data["second"] = 0.1, 1.0, 1.0, 1.0
+    data["approach"] = data["closing"] = 0.2
+    data["speed"] = 1e3
+    cells = np.array([(0, 1, 2 + 2 * n, 3 + 2 * n) for n in range(3)], dtype=np.int32)
+    x[:2] = (-0.5, 0.0, 0.0), (0.5, 0.0, 0.0)
+
+    def rate(*heights):
+        for n, height in enumerate(heights):
+            x[2 + 2 * n], x[3 + 2 * n] = (0.1 * n, -0.5, height), (0.1 * n, 0.5, height)
+        rates = np.zeros(14)
+        line_line_penalty.bound(
+            np.inf, 0.0, x, np.ones(14), rates, cells[: len(heights)], matrix_of(data[: len(heights)])
+        )
+        return rates[0]
+
+    of = numbers_of(matrix_of(data), 0)
+    alone, most = line_line_penalty.row_sum(of, 0.01), line_line_penalty.steepest(of, 0.01)
+    assert alone < most < 2.0 * alone
+    assert rate(0.2) == rate(0.05) == rate(0.2, 0.2, 0.2) == rate(0.05, 0.2) == alone
+    assert rate(0.05, 0.05) == rate(0.05, 0.05, 0.05) == most
+    assert rate(0.5) == 0.0
+
+
+def test_distances_fall_by_no_more_than_what_is_foreseen():
+    """Of pairs whose velocities change by half; those that move apart may come near by that half alone."""
+    cells, data, places = any_pairs(300)
+    rng, x, still, span = np.random.default_rng(2), places.reshape(-1, 3), np.zeros((1200, 3)), 0.1
+    v = rng.standard_normal(x.shape)
+    before, numbers = search.distances(x, cells, data), records_of(PAIR, data)
+    search.foresee(span, 0.0, x, v, still, still, cells, data)
+    falls = np.max([before - search.distances(x + span * share * v, cells, data) for share in (0.5, 1.0, 1.5)], axis=0)
+    assert (falls <= numbers["closing"] + 1e-12).all() and (numbers["closing"] <= numbers["approach"] + 1e-12).all()
+    assert (falls > 0.8 * numbers["closing"]).any() and (numbers["closing"] < 0.5 * numbers["approach"]).any()
 
 
 # Which pairs

@@ -120,6 +120,11 @@ def depths_of(system, term):
 def lines_in_touch(depths, elements, pieces):
     """Numbers of the cells of lines that show a depth."""
     chosen, count = np.empty(elements.size, dtype=np.int64), 0
+    if pieces == 1:  # in half of the time
+        for c in range(elements.size):
+            chosen[count] = c
+            count += 0 if depths[np.uint64(elements[c]), 0] <= 0.0 else 1
+        return chosen[:count]
     for first in range(0, elements.size, pieces):
         apart = True
         for c in range(first, first + pieces):

@@ -91,9 +91,10 @@ class Foreseen(NamedTuple):
     Attributes
     ----------
     depth : float
-        Depth that it may come to [m]; 0 where it stays out of reach.
+        Depth that it may come to [m]; 0 where it stays out of reach. Where stiffness does not depend on depth, that of
+        the middle of the body stands for any: to find it takes most of the time of a bound.
     length : float
-        |y'| at the deepest place [m].
+        |y'| at the deepest place [m], 0 where stiffness depends on neither.
     """
 
     depth: float
@@ -117,9 +118,16 @@ def foresight(depth, spins, pieces, nodes, functions):
     ) -> Foreseen:
         reduced_mass, body, pair = 0.0, mass[cells[c, nodes]], pair_of(data, c, nodes)
         course = course_of(x, cells, data, c)
-        first, last = spot_of(x, cells, data, c, course, 0.0).depth, spot_of(x, cells, data, c, course, 1.0).depth
+        first = spot_of(x, cells, data, c, course, 0.0).depth
+        constant = nodes == 2 and reach > 0.0 and pair.exponent == 1.0 and not pair.once
+        if constant and first + reach > 0.0:
+            return Foreseen(thickness(pair.shape), 0.0)
+        last = spot_of(x, cells, data, c, course, 1.0).depth
         if nodes == 2 and 0.5 * (first + last + math.sqrt(dot(course.d, course.d))) + reach <= 0.0:
             return Foreseen(0.0, 0.0)
+        if constant:
+            touches = last + reach > 0.0 or reaches(reach, x, cells, data, c, nodes, functions)
+            return Foreseen(thickness(pair.shape) if touches else 0.0, 0.0)
         xi, deep = deepest(x, cells, data, c)
         _, d, _ = point(x, cells, data, c, nodes, functions, xi)
         length = math.sqrt(dot(d, d))

@@ -23,7 +23,7 @@ import functools
 from ...compiled.rows import record_at
 from ...kernels import DETECT, LAW, kernel
 from ..base import ImplicitContactKernels
-from ..contact_solver import acceleration, apply_force, set_part
+from ..contact_solver import acceleration, apply_force, set_part, way_of
 from ..line_kernels import direction
 from ..vectors import add, solve
 from .force import drag_on, end_of, slope_of
@@ -67,8 +67,17 @@ def newton_step(h, n, count, u, rest, contacts):
 
 
 @kernel(LAW, leaf=True)
-def drag_law(h, number, n, f, inverse, contacts, parts):
-    """Law of drag, for all contacts of one row together; the first of these has their force."""
+def drag_law(h, number, first, end, f, inverse, contacts, parts):
+    """Law of drag, for all contacts of one row together, see `drag_row`."""
+    largest = 0.0
+    for n in range(first, end, way_of(first, end)):
+        largest = max(largest, drag_row(h, n, f, inverse, contacts, parts))
+    return largest
+
+
+@kernel(leaf=True)
+def drag_row(h, n, f, inverse, contacts, parts):
+    """Find the drag of all contacts of one row; the first of these has their force."""
     node, count = contacts[n], contacts[n].group
     if count == 0:
         return 0.0

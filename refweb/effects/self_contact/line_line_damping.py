@@ -108,7 +108,7 @@ def add_bounds(reach, speed, x, mass, rates, cells, data, viscous):
     """Add the row sums of ∂F/∂v, or of ∂F/∂x, to the rates."""
     rates_here, largest = np.zeros(rates.size), np.zeros(rates.size)
     for c in range(cells.shape[0]):
-        depth = depth_ahead(reach, speed, x, mass, cells, data, c)
+        depth, _ = depth_ahead(reach, speed, x, mass, cells, data, c)
         if depth > 0.0:
             of = numbers_of(data, c)
             now = (1.875 * stored(x, cells, data, c) / of.scale) ** 0.4

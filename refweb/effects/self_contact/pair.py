@@ -35,11 +35,13 @@ PAIR = np.dtype(
         ("elements", float, (2,)),
         ("approach", float),
         ("speed", float),
+        ("closing", float),
     ]
 )
 """Data of a pair: the same, natural length of the second element [m], from the first node of the first element the
 vectors to the three others in the web's position [m], and the numbers of both; for bounds the largest approach of the
-two elements [m] and their largest relative speed [m/s], infinite where only those of the net are known."""
+two elements [m], their largest relative speed [m/s] and how much their distance may fall [m], infinite where only those
+of the net are known."""
 APART = width_of(ELEMENT)
 """First column of the data of an element behind these."""
 

@@ -84,7 +84,10 @@ def boxes_of(width, buffer):
 
 @kernel()
 def sorted_by_box(low, width, count, buffer):
-    """(elements in the order of boxes, where each box begins among them, and their rows of ``buffer``)."""
+    """(elements in the order of boxes, where each box begins among them, and their columns of ``buffer``).
+
+    The last three columns are the half sizes of their boxes, with their margins.
+    """
     sorted_elements = np.empty(buffer.shape[0], dtype=np.int64)
     start = np.empty(count[0] * count[1] * count[2] + 1, dtype=np.int64)
     for b in range(start.size):
@@ -98,7 +101,7 @@ def sorted_by_box(low, width, count, buffer):
     for b in range(1, start.size):
         start[b] += start[b - 1]
     order, filled = np.empty(buffer.shape[0], dtype=np.int64), np.empty(start.size - 1, dtype=np.int64)
-    rows = np.empty((buffer.shape[0], buffer.shape[1]))
+    columns = np.empty((buffer.shape[1] + 3, buffer.shape[0]))
     for b in range(filled.size):
         filled[b] = start[b]
     for c in range(buffer.shape[0]):
@@ -106,8 +109,10 @@ def sorted_by_box(low, width, count, buffer):
         order[at] = c
         filled[sorted_elements[c]] += 1
         for k in range(buffer.shape[1]):
-            rows[at, k] = buffer[c, k]
-    return order, start, rows
+            columns[k, at] = buffer[c, k]
+        for k in range(3):
+            columns[8 + k, at] = abs(buffer[c, 3 + k]) + buffer[c, 7]
+    return order, start, columns
 
 
 @kernel(forceinline=True)
@@ -124,20 +129,24 @@ def nonadjacent(a, b, cells, data):
     return True
 
 
-@kernel(forceinline=True)
-def boxes_meet(reach, m, n, rows):
-    """Tell if the boxes of two elements are nearer than a reach."""
-    out = abs(rows[m, 0] - rows[n, 0]) > reach + abs(rows[m, 3]) + abs(rows[n, 3])
-    out |= abs(rows[m, 1] - rows[n, 1]) > reach + abs(rows[m, 4]) + abs(rows[n, 4])  # three looks and one branch
-    out |= abs(rows[m, 2] - rows[n, 2]) > reach + abs(rows[m, 5]) + abs(rows[n, 5])
-    return not out
+@kernel(leaf=True)
+def note_boxes(reach, m, begin, end, columns, meets):
+    """Write if the boxes of an element and of those from ``begin`` to ``end`` are nearer than a reach.
+
+    Many are looked at at once; to test one by one takes twice as long.
+    """
+    x, y, z = columns[0, m], columns[1, m], columns[2, m]
+    a, b, c = reach + columns[8, m], reach + columns[9, m], reach + columns[10, m]
+    for n in range(begin, end):
+        first, second = abs(columns[0, n] - x) <= a + columns[8, n], abs(columns[1, n] - y) <= b + columns[9, n]
+        meets[n] = first & second & (abs(columns[2, n] - z) <= c + columns[10, n])
 
 
 @kernel(forceinline=True)
-def segments_meet(reach, m, n, rows):
+def segments_meet(reach, m, n, columns):
     """Tell if two elements are nearer than a reach."""
-    g, h = (rows[m, 3], rows[m, 4], rows[m, 5]), (rows[n, 3], rows[n, 4], rows[n, 5])
-    d = rows[m, 0] - rows[n, 0], rows[m, 1] - rows[n, 1], rows[m, 2] - rows[n, 2]
+    g, h = (columns[3, m], columns[4, m], columns[5, m]), (columns[3, n], columns[4, n], columns[5, n])
+    d = columns[0, m] - columns[0, n], columns[1, m] - columns[1, n], columns[2, m] - columns[2, n]
     p = d[0] - g[0] + h[0], d[1] - g[1] + h[1], d[2] - g[2] + h[2]
     u, w = (2.0 * g[0], 2.0 * g[1], 2.0 * g[2]), (2.0 * h[0], 2.0 * h[1], 2.0 * h[2])
     return nearest(p, u, w)[2] < reach * reach
@@ -160,9 +169,9 @@ def set_ranges(box, count, start, ranges):
 
 
 @kernel()
-def fill(reach, count, start, order, rows, cells, data, pairs):
+def fill(reach, count, start, order, columns, cells, data, pairs):
     """Write all pairs of elements nearer than a reach and both margins, as far as ``pairs`` holds; their number."""
-    ranges, amount = np.empty((5, 2), dtype=np.int64), 0
+    ranges, amount, meets = np.empty((5, 2), dtype=np.int64), 0, np.empty(order.size, dtype=np.bool_)
     for box in range(start.size - 1):
         if start[box] == start[box + 1]:
             continue
@@ -170,12 +179,16 @@ def fill(reach, count, start, order, rows, cells, data, pairs):
         for m in range(start[box], start[box + 1]):
             ranges[0, 0] = m + 1
             for part in range(beside):
+                note_boxes(reach, m, ranges[part, 0], ranges[part, 1], columns, meets)
                 for n in range(ranges[part, 0], ranges[part, 1]):
-                    within = reach + rows[m, 7] + rows[n, 7]
-                    if not boxes_meet(within, m, n, rows):
+                    if not meets[n]:
                         continue
-                    a, b = min(order[m], order[n]), max(order[m], order[n])
-                    if nonadjacent(a, b, cells, data) and segments_meet(within, m, n, rows):
+                    a, b, within = (
+                        min(order[m], order[n]),
+                        max(order[m], order[n]),
+                        reach + columns[7, m] + columns[7, n],
+                    )
+                    if nonadjacent(a, b, cells, data) and segments_meet(within, m, n, columns):
                         if amount < pairs.shape[0]:
                             pairs[amount, 0], pairs[amount, 1] = a, b
                         amount += 1
@@ -216,10 +229,10 @@ def pairs_within(skin, marks, x, cells, data):
     low, width, count = boxes_of(2.0 * middles(marks, x, cells, data, buffer) + reach, buffer)
     if count[0] == 0:
         return none
-    order, start, rows = sorted_by_box(low, width, count, buffer)
+    order, start, columns = sorted_by_box(low, width, count, buffer)
     unsorted = np.empty((cells.shape[0] + 64, 2), dtype=np.int64)
     while True:
-        amount = fill(reach, count, start, order, rows, cells, data, unsorted)
+        amount = fill(reach, count, start, order, columns, cells, data, unsorted)
         if amount <= unsorted.shape[0]:
             return in_order(cells.shape[0], amount, unsorted)
         unsorted = np.empty((amount, 2), dtype=np.int64)
@@ -239,7 +252,7 @@ def paired(chosen, cells, data):
         pair.length, pair.second = first.length, second.length
         pair.friction, pair.slip_velocity, pair.rolls = first.friction, first.slip_velocity, first.rolls
         pair.elements[0], pair.elements[1] = a, b
-        pair.approach = pair.speed = math.inf
+        pair.approach = pair.speed = pair.closing = math.inf
         for k in range(3):
             pair.vectors[0, k] = first.ends[1, k] - first.ends[0, k]
             pair.vectors[1, k] = second.ends[0, k] - first.ends[0, k]
@@ -262,24 +275,32 @@ def near_pairs(skin, x, cells, data):
 
 
 @kernel()
-def foresee(span, early, v, f, inverse, cells, data):
+def foresee(span, early, x, v, f, inverse, cells, data):
     """Write how near the elements of each pair may come in a span [s], and how fast they are then.
 
     Their nodes have the velocities v, and what the forces f add within a time ``early`` [s]. A force that is not in
-    balance turns within half a period of its line, so that it does not act for a longer span.
+    balance turns within half a period of its line, so that it does not act for a longer span. All points of both are
+    apart by their distance, along the line between the nearest two, so that it falls by what nodes move along that.
     """
     for c in range(cells.shape[0]):
-        fastest = 0.0
+        (p, u, w), fastest, closest = place_of(x, cells, data, c), 0.0, 0.0
+        s, t, square = nearest(p, u, w)
+        q = p[0] + s * u[0] - t * w[0], p[1] + s * u[1] - t * w[1], p[2] + s * u[2] - t * w[2]
+        inverse_size = 1.0 / math.sqrt(square) if square > 0.0 else 0.0
         for i in range(2):
             for j in range(2, 4):
-                r, q, speed, push = cells[c, i], cells[c, j], 0.0, 0.0
+                r, o, speed, push, apart = cells[c, i], cells[c, j], 0.0, 0.0, 0.0
                 for k in range(3):
-                    speed += (v[r, k] - v[q, k]) ** 2
-                    push += (inverse[r, k] * f[r, k] - inverse[q, k] * f[q, k]) ** 2
-                fastest = max(fastest, math.sqrt(speed) + early * math.sqrt(push))
+                    speed += (v[r, k] - v[o, k]) ** 2
+                    push += (inverse[r, k] * f[r, k] - inverse[o, k] * f[o, k]) ** 2
+                    apart += (v[r, k] - v[o, k]) * q[k]
+                speed, push = math.sqrt(speed), early * math.sqrt(push)
+                fastest = max(fastest, speed + push)
+                toward = -apart * inverse_size if square > 0.0 else speed
+                closest = max(closest, toward + (FASTER - 1.0) * speed + FASTER * push)
         pair = record_at(PAIR, data, c, 0)
         pair.speed = FASTER * fastest
-        pair.approach = span * pair.speed
+        pair.approach, pair.closing = span * pair.speed, span * closest
 
 
 @kernel()
