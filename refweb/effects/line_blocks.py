@@ -12,23 +12,26 @@ May change: the order of elements in a block, and with it the last digits of all
 from __future__ import annotations
 
 import functools
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..compiled.rows import numbers_aside, numbers_at, record_at, width_of
+from ..compiled.rows import column_of, numbers_aside, numbers_at, record_at, width_of
 from ..kernels import FORCE, kernel
 from ..net.laws.law import LINE
-from .base import LINE_OUT
+from .base import BLOCK, BLOCK_OUT, LINE_OUT
 from .line_kernels import strain_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-BLOCK = 256
-"""Number of elements whose forces are found together: their numbers stay in the nearest cache."""
 SPACE, OUTPUTS = 3 * BLOCK, 2 * BLOCK
 """Number of components of their differences, and of their tensions and strains."""
+SHOWN: int = column_of(BLOCK_OUT, "shown")
+"""First column of what the elements of a block show."""
+LANES = 64
+"""Number of tensions and strains whose largest are found at once."""
 LONG = 8
 """Mean number of elements of the runs of a net from which on they are used. A line takes 5.4 ns without runs, and with
 runs of 2.3, 4, 10 and 22 elements 6.6, 5.4, 4.6 and 4.0, on a CPU with AVX-512."""
@@ -133,6 +136,54 @@ def write_output(outputs, k, out, c):
     cell.tension, cell.strain = tension, strain
 
 
+@kernel(forceinline=True)
+def top_of(tops, first):
+    """Largest of every second number of `LANES`."""
+    a = b = c = d = -math.inf
+    for k in range(np.uint64(first), np.uint64(LANES), np.uint64(8)):
+        a, b = max(a, tops[k]), max(b, tops[k + np.uint64(2)])
+        c, d = max(c, tops[k + np.uint64(4)]), max(d, tops[k + np.uint64(6)])
+    return max(max(a, b), max(c, d))
+
+
+@kernel(forceinline=True)
+def largest_of(outputs, count, tops):
+    """Largest tension and strain of a block that is not a number, found in all lanes, with space for these."""
+    for n in range(np.uint64(2 * count), np.uint64(OUTPUTS)):
+        outputs[n] = -math.inf
+    lanes = np.uint64(LANES)
+    for k in range(lanes):
+        largest = -math.inf
+        for n in range(OUTPUTS // LANES):
+            value = outputs[k + np.uint64(n) * lanes]
+            largest = value if value > largest else largest
+        tops[k] = largest
+    return top_of(tops, 0), top_of(tops, 1)
+
+
+@kernel(forceinline=True)
+def show_block(outputs, runs, first, behind, block, count, out):
+    """Write the `BLOCK_OUT` of a block of runs from ``first`` to ``behind`` − 1, the largest of all is in the last row.
+    """
+    shows, most = record_at(BLOCK_OUT, out, block, 0), record_at(BLOCK_OUT, out, out.shape[0] - 1, 0)
+    tension, strain = largest_of(outputs, count, numbers_aside(LANES))
+    shows.tension, shows.strain, shows.count = tension, strain, count
+    if tension > most.tension or strain > most.strain:
+        most.tension, most.strain = max(tension, most.tension), max(strain, most.strain)
+        show_lines(outputs, runs, first, behind, block, out)
+
+
+@kernel(leaf=True)
+def show_lines(outputs, runs, first, behind, block, out):
+    """Write tension and strain of each line of a block to its `BLOCK_OUT`."""
+    shown = numbers_at(out, block, SHOWN)
+    for r in range(first, behind):
+        run = record_at(RUN, runs, r, 0)
+        for k in range(run.count):
+            s, q = np.uint64(2 * (run.begin + k)), np.uint64(2 * (run.element + k * run.stride - block * BLOCK))
+            shown[q], shown[q + np.uint64(1)] = outputs[s], outputs[s + np.uint64(1)]
+
+
 @functools.cache
 def force_by_blocks(law):
     """Force kernel of straight elements of a law without columns, for numbers by `blocks_of`.
@@ -175,6 +226,9 @@ def force_by_blocks(law):
 def force_by_runs(law):
     """Force kernel as that of `force_by_blocks` for ``cells`` of `runs_of`: all loops take all lanes.
 
+    If ``out`` has a row for each block and one more, the kernel writes `BLOCK_OUT` there in place of tension and strain
+    of each element.
+
     Forces on second nodes come first, those of long offsets ahead of short ones: where elements stand in the order of
     their nodes, lower ones first, each node has the sum of `elasticity.kernels` in the same order.
     """
@@ -183,7 +237,7 @@ def force_by_runs(law):
     @kernel(FORCE, leaf=True)
     def force(t, x, v, f, cells, data, out):
         d, outputs = numbers_aside(SPACE), numbers_aside(OUTPUTS)
-        behind = 0
+        behind, alone = 0, out.shape[0] == data.shape[0] + 1
         for block in range(data.shape[0]):
             first, count = behind, 0
             while behind < cells.shape[0] and (behind == first or record_at(RUN, cells, behind, 0).begin):
@@ -204,15 +258,22 @@ def force_by_runs(law):
                 for k in range(np.uint64(3 * run.count)):
                     low[k] += d[q + k]
                 begin, element, stride = run.begin, run.element, run.stride
-                for k in range(run.count):
+                for k in range(0 if alone else run.count):
                     write_output(outputs, begin + k, out, element + k * stride)
+            if alone:
+                show_block(outputs, cells, first, behind, block, count, out)
 
     return force
 
 
 def by_blocks(law, cells, lines):
-    """Force kernel of all elements of a law, its cells and its numbers, by the runs of the net if it has long ones."""
+    """Force kernel of all elements of a law, its cells and its numbers, by the runs of the net if it has long ones.
+
+    The last number is that of the rows of a matrix of `BLOCK_OUT` that the kernel takes in place of what elements show,
+    0 if it takes none.
+    """
     runs = runs_of(cells)
     if runs is None:
-        return force_by_blocks(law), cells, blocks_of(lines)
-    return force_by_runs(law), runs[0], blocks_of(lines, runs[1])
+        return force_by_blocks(law), cells, blocks_of(lines), 0
+    blocks = blocks_of(lines, runs[1])
+    return force_by_runs(law), runs[0], blocks, len(blocks) + 1

@@ -265,7 +265,7 @@ def pulls_together_as_alone(term, x, cells, data):
     """Forces, tensions and strains of elements by blocks beside those of one after another."""
     none, shown, one = np.zeros_like(x), np.zeros((len(cells), 3)), np.zeros((len(cells), 3))
     together, alone = none.copy(), none.copy()
-    force, taken, numbers = term.elements.by_blocks(cells, data)
+    force, taken, numbers, _ = term.elements.by_blocks(cells, data)
     force(0.0, x, none, together, taken, numbers, shown)
     term.force(0.0, x, none, alone, cells, data, one)
     # the same products, which either may contract with sums
