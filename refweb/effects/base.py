@@ -59,7 +59,7 @@ sum of the squared energies that jumps within steps leave in doubt [J²]."""
 
 BLOCK = 256
 """Number of lines whose forces are found together: their numbers stay in the nearest cache."""
-BLOCK_OUT = np.dtype([(name, float) for name in ("tension", "strain", "count")] + [("shown", float, (BLOCK, 2))])
+BLOCK_OUT = np.dtype([(name, float) for name in ("tension", "strain", "count", "rest")] + [("shown", float, (BLOCK, 2))])
 """Numbers that a block of lines shows in place of those of each: its largest tension [N] and strain, the number of its
 lines and, where either is the largest of all blocks and steps so far, both of each line."""
 

@@ -13,9 +13,12 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 
 from ..compiled.rows import column_of, numbers_aside, numbers_at, record_at, width_of
 from ..kernels import FORCE, kernel
@@ -26,12 +29,11 @@ from .line_kernels import strain_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+_intrinsic: Any = intrinsic  # kernels give all but the first argument
 SPACE, OUTPUTS = 3 * BLOCK, 2 * BLOCK
 """Number of components of their differences, and of their tensions and strains."""
 SHOWN: int = column_of(BLOCK_OUT, "shown")
 """First column of what the elements of a block show."""
-LANES = 64
-"""Number of tensions and strains whose largest are found at once."""
 LONG = 8
 """Mean number of elements of the runs of a net from which on they are used. A line takes 5.4 ns without runs, and with
 runs of 2.3, 4, 10 and 22 elements 6.6, 5.4, 4.6 and 4.0, on a CPU with AVX-512."""
@@ -102,9 +104,23 @@ class Line(NamedTuple):
     distance: float
 
 
+@_intrinsic
+def larger(typing, first, second):
+    """The larger of two numbers: sums of it take all lanes of the processor, as one of ``max`` would not."""
+
+    def build(context, builder, signature, arguments):
+        kind = arguments[0].type
+        largest = builder.module.declare_intrinsic("llvm.maxnum", [kind], ir.FunctionType(kind, [kind, kind]))
+        return builder.call(largest, arguments, fastmath=("nnan", "nsz"))
+
+    return types.float64(types.float64, types.float64), build
+
+
 @functools.cache
 def pull_of_block(law):
     """Kernel that turns the differences ``d`` of displacements of a block into forces, with tensions and strains.
+
+    It returns the largest of either, −∞ of no element.
 
     It has no branch, so that it takes all lanes of the processor. Tension and strain of an element lie side by side, so
     that they are copied by one instruction.
@@ -118,6 +134,7 @@ def pull_of_block(law):
         g0, r0 = numbers_at(data, block, 4 * BLOCK), numbers_at(data, block, 5 * BLOCK)
         x0, x1 = numbers_at(data, block, 6 * BLOCK), numbers_at(data, block, 7 * BLOCK)
         x2, distance = numbers_at(data, block, 8 * BLOCK), numbers_at(data, block, 9 * BLOCK)
+        largest = stretched = -math.inf
         for k in range(np.uint64(count)):
             reference, q, s = (x0[k], x1[k], x2[k]), np.uint64(3) * k, np.uint64(2) * k
             numbers = natural[k], ea[k], slackness[k], smoothing[k], g0[k], r0[k]
@@ -126,7 +143,9 @@ def pull_of_block(law):
             tension = stress(e, line)
             scale = tension * inverse
             outputs[s], outputs[s + np.uint64(1)] = tension, e
+            largest, stretched = larger(largest, tension), larger(stretched, e)
             d[q], d[q + np.uint64(1)], d[q + np.uint64(2)] = scale * p0, scale * p1, scale * p2
+        return largest, stretched
 
     return pull
 
@@ -139,37 +158,19 @@ def write_output(outputs, k, out, c):
     cell.tension, cell.strain = tension, strain
 
 
-@kernel(forceinline=True)
-def top_of(tops, first):
-    """Largest of every second number of `LANES`."""
-    a = b = c = d = -math.inf
-    for k in range(np.uint64(first), np.uint64(LANES), np.uint64(8)):
-        a, b = max(a, tops[k]), max(b, tops[k + np.uint64(2)])
-        c, d = max(c, tops[k + np.uint64(4)]), max(d, tops[k + np.uint64(6)])
-    return max(max(a, b), max(c, d))
+@kernel(leaf=True)
+def all_zero(numbers, count):
+    """Tell if some numbers are 0."""
+    others = 0
+    for k in range(np.uint64(count)):
+        others += numbers[k] != 0.0
+    return others == 0
 
 
 @kernel(forceinline=True)
-def largest_of(outputs, count, tops):
-    """Largest tension and strain of a block that is not a number, found in all lanes, with space for these."""
-    for n in range(np.uint64(2 * count), np.uint64(OUTPUTS)):
-        outputs[n] = -math.inf
-    lanes = np.uint64(LANES)
-    for k in range(lanes):
-        largest = -math.inf
-        for n in range(OUTPUTS // LANES):
-            value = outputs[k + np.uint64(n) * lanes]
-            largest = value if value > largest else largest
-        tops[k] = largest
-    return top_of(tops, 0), top_of(tops, 1)
-
-
-@kernel(forceinline=True)
-def show_block(outputs, runs, first, behind, block, count, out):
-    """Write the `BLOCK_OUT` of a block of runs from ``first`` to ``behind`` − 1, the largest of all is in the last row.
-    """
+def show_block(tension, strain, outputs, runs, first, behind, block, count, out):
+    """Write the `BLOCK_OUT` of a block of runs from ``first`` to ``behind`` − 1; the last row has the largest of all."""
     shows, most = record_at(BLOCK_OUT, out, block, 0), record_at(BLOCK_OUT, out, out.shape[0] - 1, 0)
-    tension, strain = largest_of(outputs, count, numbers_aside(LANES))
     shows.tension, shows.strain, shows.count = tension, strain, count
     if tension > most.tension or strain > most.strain:
         most.tension, most.strain = max(tension, most.tension), max(strain, most.strain)
@@ -249,7 +250,14 @@ def force_by_runs(law):
                 for k in range(np.uint64(3 * run.count)):
                     d[q + k] = high[k] - low[k]
                 behind, count = behind + 1, count + run.count
-            pull(data, block, count, d, outputs)
+            shows = record_at(BLOCK_OUT, out, block, 0)
+            may_rest = alone and shows.rest != 0.0
+            rests = may_rest and all_zero(d, 3 * count)
+            if rests and shows.rest > 0.0:
+                continue
+            tension, strain = pull(data, block, count, d, outputs)
+            if may_rest:
+                shows.rest = 1.0 if rests and all_zero(d, 3 * count) else 0.0
             for r in range(behind - 1, first - 1, -1):
                 run = record_at(RUN, cells, r, 0)
                 high, q = numbers_at(f, run.second, 0), np.uint64(3 * run.begin)
@@ -264,7 +272,7 @@ def force_by_runs(law):
                 for k in range(0 if alone else run.count):
                     write_output(outputs, begin + k, out, element + k * stride)
             if alone:
-                show_block(outputs, cells, first, behind, block, count, out)
+                show_block(tension, strain, outputs, cells, first, behind, block, count, out)
 
     return force
 

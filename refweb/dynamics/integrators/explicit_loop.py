@@ -163,6 +163,8 @@ def shows_blocks(model, observed, running):
         return False
     most = record_at(BLOCK_OUT, blocks, blocks.shape[0] - 1, 0)
     most.tension = most.strain = -math.inf
+    for n in range(blocks.shape[0] - 1):
+        record_at(BLOCK_OUT, blocks, n, 0).rest = -1.0
     return True
 
 
