@@ -23,7 +23,7 @@ from numba.extending import intrinsic
 from ..compiled.rows import column_of, numbers_aside, numbers_at, record_at, width_of
 from ..kernels import FORCE, kernel
 from ..net.laws.law import LINE
-from .base import BLOCK, BLOCK_OUT, LINE_OUT
+from .base import BLOCK, BLOCK_OUT, LINE_OUT, MOVES, RESTS
 from .line_kernels import strain_of
 
 if TYPE_CHECKING:
@@ -106,7 +106,10 @@ class Line(NamedTuple):
 
 @_intrinsic
 def larger(typing, first, second):
-    """The larger of two numbers: sums of it take all lanes of the processor, as one of ``max`` would not."""
+    """The larger of two numbers, any of them where one is not a number.
+
+    A loop over it takes all lanes of the processor, and one over ``max`` would not.
+    """
 
     def build(context, builder, signature, arguments):
         kind = arguments[0].type
@@ -160,7 +163,7 @@ def write_output(outputs, k, out, c):
 
 @kernel(leaf=True)
 def all_zero(numbers, count):
-    """Tell if some numbers are 0."""
+    """Tell if all of some numbers are 0."""
     others = 0
     for k in range(np.uint64(count)):
         others += numbers[k] != 0.0
@@ -169,7 +172,7 @@ def all_zero(numbers, count):
 
 @kernel(forceinline=True)
 def show_block(tension, strain, outputs, runs, first, behind, block, count, out):
-    """Write the `BLOCK_OUT` of a block of runs from ``first`` to ``behind`` − 1; the last row has the largest of all."""
+    """Write the `BLOCK_OUT` of a block, with runs from ``first`` to ``behind`` − 1, and the largest of all."""
     shows, most = record_at(BLOCK_OUT, out, block, 0), record_at(BLOCK_OUT, out, out.shape[0] - 1, 0)
     shows.tension, shows.strain, shows.count = tension, strain, count
     if tension > most.tension or strain > most.strain:
@@ -231,7 +234,12 @@ def force_by_runs(law):
     """Force kernel as that of `force_by_blocks` for ``cells`` of `runs_of`: all loops take all lanes.
 
     If ``out`` has a row for each block and one more, the kernel writes `BLOCK_OUT` there in place of tension and strain
-    of each element.
+    of each element. Copies of these take 0.45 ns of the 4 of a line, and another 0.2 to find the largest among 79 600;
+    the largest of a block takes 0.15. A block without differences and forces keeps both until a node moves, which
+    spares all but the differences ahead of a wave in a web without prestress. Among 79 600 lines, to read numbers ahead
+    of their block gains nothing, to keep equal columns once 0.06 ns, and to begin blocks where lines of the cache do
+    0.04; without roots and divisions a line would take 0.07 less, and without the change from and to coordinates side
+    by side 0.3.
 
     Forces on second nodes come first, those of long offsets ahead of short ones: where elements stand in the order of
     their nodes, lower ones first, each node has the sum of `elasticity.kernels` in the same order.
@@ -251,13 +259,13 @@ def force_by_runs(law):
                     d[q + k] = high[k] - low[k]
                 behind, count = behind + 1, count + run.count
             shows = record_at(BLOCK_OUT, out, block, 0)
-            may_rest = alone and shows.rest != 0.0
+            may_rest = alone and shows.rest != MOVES
             rests = may_rest and all_zero(d, 3 * count)
-            if rests and shows.rest > 0.0:
+            if rests and shows.rest == RESTS:
                 continue
             tension, strain = pull(data, block, count, d, outputs)
             if may_rest:
-                shows.rest = 1.0 if rests and all_zero(d, 3 * count) else 0.0
+                shows.rest = RESTS if rests and all_zero(d, 3 * count) else MOVES
             for r in range(behind - 1, first - 1, -1):
                 run = record_at(RUN, cells, r, 0)
                 high, q = numbers_at(f, run.second, 0), np.uint64(3 * run.begin)

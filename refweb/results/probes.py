@@ -9,10 +9,10 @@ value to ``where[0]``.
 May change: private functions; how a value is found, if it stays the same to the last digit. Must stay: the signature
 `PROBE`, which kernels here, in `observables` and in plug-ins have; ``where[0]`` and ``where[1]``; numbers of
 `MAGNITUDE`, `PLACE`, `NODES`, `LINES` and of sources, which kernels read; parameters in ``rows`` as each docstring
-says; `plain_of`, as `dynamics.integrators.extremes` has loops of its own for what it knows; a kernel
-that reads ``lines`` is not in `WITHOUT_LINES`; all names that
-`observables.reaction`, `integrators.rupture` and other files import. Tests: ``tests/results/test_probes.py``,
-``tests/results/test_observable_contract.py``.
+says; `plain_of`, as `dynamics.integrators.extremes` has loops of its own for what it knows; no kernel in
+`WITHOUT_LINES` reads ``lines``; all names that `observables.reaction`, `integrators.rupture` and other files import.
+Tests: ``tests/results/test_probes.py``, ``tests/results/test_observable_contract.py``,
+``tests/dynamics/integrators/test_line_blocks.py``.
 """
 
 from __future__ import annotations

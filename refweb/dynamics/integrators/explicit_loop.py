@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...compiled.rows import record_at
-from ...effects.base import BLOCK_OUT
+from ...effects.base import BLOCK_OUT, UNKNOWN
 from ...effects.sliding_material import BEHIND
 from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import add_forces_to_bodies
@@ -155,7 +155,8 @@ def joins_kicks(model, observed, running):
 def shows_blocks(model, observed, running):
     """Tell if nothing that follows from step to step reads more of the lines than the largest of their blocks.
 
-    Then the largest of all steps begins anew: no extreme is below that of a step that it has seen.
+    Then the largest of all steps so far begins anew: no extreme is below one that follows. The last step of a call
+    shows all lines, for history rows and all that is read between calls.
     """
     blocks, more = model.terms.blocks, model.terms.viscous.size + model.terms.powers.shape[0] + observed.each_line
     more += model.implicit_contacts.terms.size + observed.sums.shape[0] + observed.windows.slots.size
@@ -164,7 +165,7 @@ def shows_blocks(model, observed, running):
     most = record_at(BLOCK_OUT, blocks, blocks.shape[0] - 1, 0)
     most.tension = most.strain = -math.inf
     for n in range(blocks.shape[0] - 1):
-        record_at(BLOCK_OUT, blocks, n, 0).rest = -1.0
+        record_at(BLOCK_OUT, blocks, n, 0).rest = UNKNOWN
     return True
 
 

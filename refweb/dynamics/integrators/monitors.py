@@ -92,7 +92,7 @@ class Observed(Record):
             terms=np.unique(terms_seen).astype(np.int64),
             plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
             scales=np.array([scale for _, scale in plain], dtype=float),
-            each_line=int(any(reads_each_line(p, len(outs[0])) for p in probes if p.sign)),
+            each_line=int(any(reads_each_line(p, len(outs[0]) if outs else 0) for p in probes if p.sign)),
         )
 
 
