@@ -173,22 +173,22 @@ def all_zero(numbers, count):
 @kernel(forceinline=True)
 def show_block(tension, strain, outputs, runs, first, behind, block, count, out):
     """Write the `BLOCK_OUT` of a block, with runs from ``first`` to ``behind`` − 1, and the largest of all."""
-    shows, most = record_at(BLOCK_OUT, out, block, 0), record_at(BLOCK_OUT, out, out.shape[0] - 1, 0)
+    shows, highest = record_at(BLOCK_OUT, out, block, 0), record_at(BLOCK_OUT, out, out.shape[0] - 1, 0)
     shows.tension, shows.strain, shows.count = tension, strain, count
-    if tension > most.tension or strain > most.strain:
-        most.tension, most.strain = max(tension, most.tension), max(strain, most.strain)
+    if tension > highest.tension or strain > highest.strain:
+        highest.tension, highest.strain = max(tension, highest.tension), max(strain, highest.strain)
         show_lines(outputs, runs, first, behind, block, out)
 
 
 @kernel(leaf=True)
 def show_lines(outputs, runs, first, behind, block, out):
     """Write tension and strain of each line of a block to its `BLOCK_OUT`."""
-    shown = numbers_at(out, block, SHOWN)
+    pairs = numbers_at(out, block, SHOWN)
     for r in range(first, behind):
         run = record_at(RUN, runs, r, 0)
         for k in range(run.count):
             s, q = np.uint64(2 * (run.begin + k)), np.uint64(2 * (run.element + k * run.stride - block * BLOCK))
-            shown[q], shown[q + np.uint64(1)] = outputs[s], outputs[s + np.uint64(1)]
+            pairs[q], pairs[q + np.uint64(1)] = outputs[s], outputs[s + np.uint64(1)]
 
 
 @functools.cache

@@ -162,8 +162,8 @@ def shows_blocks(model, observed, running):
     more += model.implicit_contacts.terms.size + observed.sums.shape[0] + observed.windows.slots.size
     if not blocks.shape[0] or more + running.events.size:
         return False
-    most = record_at(BLOCK_OUT, blocks, blocks.shape[0] - 1, 0)
-    most.tension = most.strain = -math.inf
+    highest = record_at(BLOCK_OUT, blocks, blocks.shape[0] - 1, 0)
+    highest.tension = highest.strain = -math.inf
     for n in range(blocks.shape[0] - 1):
         record_at(BLOCK_OUT, blocks, n, 0).rest = UNKNOWN
     return True
@@ -212,8 +212,8 @@ def run_steps(
         if near:
             update_neighbours(drift, x, v, bits, before, model)
             check_last_drift(now - h, model, running)
-        shown = terms.blocks if few and not looks and step < count else lines
-        first(now, x, v, f, terms.elements, numbers, shown)
+        out = terms.blocks if few and not looks and step < count else lines
+        first(now, x, v, f, terms.elements, numbers, out)
         for i in terms.still:
             act(i, now, x, v, f, terms)
         if near:
@@ -236,7 +236,7 @@ def run_steps(
         if looks:
             look_inside(now, h, step == fresh, stages == 0, space.inside, where, total, model, observed, running)
         ending = begun + step == planned or math.isnan(extremes.looked[0])
-        turned = follow(now, ending, x, v, f, shown, known, where, observed, extremes)
+        turned = follow(now, ending, x, v, f, out, known, where, observed, extremes)
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:

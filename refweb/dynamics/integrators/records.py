@@ -191,7 +191,7 @@ class ForceTerms(Record):
         Kernel of the first term in steps, one, and what it reads in place of ``cells`` and ``data``: the same, or by
         blocks.
     blocks : ndarray, shape (blocks + 1, numbers of `refweb.effects.base.BLOCK_OUT`)
-        What blocks of lines show in steps in which nothing needs more of the lines, and behind them the largest of all
+        Numbers of blocks of lines in steps in which nothing needs more of the lines, and behind them the largest of all
         steps; without a row if the kernel does not take it, or other terms need what each line shows.
     still, viscous : ndarray of int
         Terms behind the first whose forces follow from displacement and time alone, and those of velocity whose
