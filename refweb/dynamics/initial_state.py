@@ -76,7 +76,8 @@ def remarks_on(start, system):
     driven = before.copy()
     system.drive(0.0, driven)
     inner = [term for term in system.terms if term.balance.internal]
-    rounding = 1e-14 * max(np.ptp(system.net.points, axis=0).max(), np.abs(before).max())
+    size = np.ptp(system.net.points, axis=0).max()
+    rounding = 1e-14 * max(size, np.abs(before).max())
     moved = np.flatnonzero((np.abs(driven - before) > rounding).any(axis=1))
     if len(moved):
         stored = sum(system.energy_of(term, 0.0, driven).sum() for term in inner)
@@ -89,7 +90,7 @@ def remarks_on(start, system):
         yield Finding("moved-at-start", f"{text}: the web starts with {stored:.4g} J", by.strip("[]"))
     off = np.linalg.norm(np.where(system.fixed, driven, 0.0), axis=1)
     off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0
-    if off.max() > OFF * np.ptp(system.net.points, axis=0).max():
+    if off.max() > OFF * size:
         worst = int(off.argmax())
         text = f"node {worst} is held where the start has it, {off[worst]:.4g} m off its place in this scene"
         yield Finding("moved-at-start", text, "supports")

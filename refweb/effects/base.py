@@ -19,11 +19,11 @@ matrix and knows no other effect.
 May change: helpers below `ForceTerm` (`with_rows`, `refuse_flows`, `without`, …) inside, with their signatures kept.
 Must stay: names, order and defaults of the fields of `ForceTerm`, its parts, `PrescribedMotion`, `Constraint` and
 `BreakLimits`, since effects of users make them (a new field needs a default); columns of `LINE_OUT` (numbers of which
-are `TENSION` to `LENGTH_POWER`), `TOUCH` and `FELT`, and the mark `CONTACT`, which kernels write and `results.probes`,
-`results.state` and `system.contact_forces` read. `system.effect_parts` checks what effects make. Must stay as well: all
-names that `contact.table`, `damping` and other files import; public names of `InternalVariables`, `ContactForce`,
-`VelocityForce`, `ImplicitContactKernels`, `Balance`, `Timing` and `CellElements`, which other files use. Tests:
-``tests/test_contract.py``, ``tests/test_plugins.py``.
+are `TENSION` to `LENGTH_POWER`), `BLOCK_OUT`, `TOUCH` and `FELT`, and the mark `CONTACT`, which kernels write and
+`results.probes`, `results.state` and `system.contact_forces` read. `system.effect_parts` checks what effects make. Must
+stay as well: all names that `contact.table`, `damping` and other files import; public names of `InternalVariables`,
+`ContactForce`, `VelocityForce`, `ImplicitContactKernels`, `Balance`, `Timing` and `CellElements`, which other files
+use. Tests: ``tests/test_contract.py``, ``tests/test_plugins.py``.
 """
 
 from __future__ import annotations
@@ -57,6 +57,16 @@ LAST_STRAIN, SNAPPED = range(5, 7)
 """Columns that explicit steps write behind them, see `VelocityForce.jumps`: the strain at the last step [1], and the
 sum of the squared energies that jumps within steps leave in doubt [J²]."""
 
+BLOCK = 256
+"""Number of lines whose forces are found together: their numbers stay in the nearest cache."""
+_of_block: list = [(name, float) for name in ("tension", "strain", "count", "rest")]
+BLOCK_OUT = np.dtype([*_of_block, ("shown", float, (BLOCK, 2))])
+"""Numbers that a block of lines shows in place of those of each: its largest tension [N] and strain, the number of its
+lines, `MOVES`, `RESTS` or `UNKNOWN`, and both numbers of each line. These are of the last step in which the tension or
+the strain was above all before, in that step and those since its last row, which stands behind those of the blocks, was
+−∞."""
+UNKNOWN, MOVES, RESTS = -1.0, 0.0, 1.0
+"""Motion of a block: one at rest has neither differences of displacements nor forces, so that it shows what it has."""
 
 TOUCH = np.dtype([("value", float), ("force", float, (3,))])
 """Numbers that terms of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of a
@@ -352,7 +362,7 @@ class CellElements(NamedTuple):
         Number of values per cell in ``out`` that observables read, of a thread.
     by_blocks : callable, optional
         Returns the force kernel of lines for steps of an explicit method, its cells and its numbers, for those of the
-        term.
+        term, and the number of rows of a matrix of `BLOCK_OUT` that the kernel takes as well, 0 if it takes none.
     internal : InternalVariables, optional
         Internal variables that the cells have.
     """

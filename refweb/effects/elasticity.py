@@ -115,7 +115,7 @@ def kernels(law, record, gradients, weights):
 
 
 def by_blocks(law, cells, lines):
-    """Force kernel of all elements of a law in explicit steps, its cells and its numbers."""
+    """Force kernel of all elements of a law in explicit steps, its cells, its numbers, and rows of `BLOCK_OUT`."""
     from .line_blocks import by_blocks
 
     return by_blocks(law, cells, lines)

@@ -9,9 +9,10 @@ value to ``where[0]``.
 May change: private functions; how a value is found, if it stays the same to the last digit. Must stay: the signature
 `PROBE`, which kernels here, in `observables` and in plug-ins have; ``where[0]`` and ``where[1]``; numbers of
 `MAGNITUDE`, `PLACE`, `NODES`, `LINES` and of sources, which kernels read; parameters in ``rows`` as each docstring
-says; `plain_of`, as `dynamics.integrators.extremes` has loops of its own for what it knows; all names that
-`observables.reaction`, `integrators.rupture` and other files import. Tests: ``tests/results/test_probes.py``,
-``tests/results/test_observable_contract.py``.
+says; `plain_of`, as `dynamics.integrators.extremes` has loops of its own for what it knows; no kernel in
+`WITHOUT_LINES` reads ``lines``; all names that `observables.reaction`, `integrators.rupture` and other files import.
+Tests: ``tests/results/test_probes.py``, ``tests/results/test_observable_contract.py``,
+``tests/dynamics/integrators/test_line_blocks.py``.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from ..compiled.rows import numbers_aside, numbers_at, record_at
-from ..effects.base import FELT, STRAIN
+from ..compiled.rows import numbers_aside, numbers_at, record_at, width_of
+from ..effects.base import BLOCK, BLOCK_OUT, FELT, STRAIN
 from ..kernels import INTEGERS, MATRIX, kernel, sum_of
 
 PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, MATRIX, INTEGERS)
@@ -115,6 +116,8 @@ NODES, LINES = 1, 2
 GROUP, LANES = 512, 64
 """Number of rows, or elements, whose largest value is found by itself, so that its place is searched in few of them.
 Number of maxima that are found at once: a loop without a branch takes all lanes of the processor."""
+OF_BLOCKS: int = width_of(BLOCK_OUT)
+"""Number of columns of a matrix that has blocks of lines in place of lines: no other has as many."""
 
 
 @kernel(leaf=True, forceinline=True)
@@ -141,6 +144,15 @@ def largest_in(lines, column, first, last):
             near = begin
         best = _larger(best, largest)
     return best, near
+
+
+@kernel(leaf=True, forceinline=True)
+def largest_of_blocks(blocks, column):
+    """Largest tension, or strain, of all blocks of lines, of a matrix of `BLOCK_OUT` with one more row."""
+    best = -math.inf
+    for n in range(blocks.shape[0] - 1):
+        best = _larger(best, blocks[n, column])
+    return best
 
 
 @kernel(leaf=True, forceinline=True)
@@ -210,6 +222,21 @@ def element_of(lines, column, first, last, scale, value):
     return first
 
 
+@kernel(leaf=True, forceinline=True)
+def element_of_blocks(blocks, column, scale, value):
+    """First element of which ``scale`` times a column is the largest value of all blocks and steps so far, −1 if none.
+
+    Its block shows each of its lines.
+    """
+    for n in range(blocks.shape[0] - 1):
+        if scale * blocks[n, column] == value:
+            block = record_at(BLOCK_OUT, blocks, n, 0)
+            for k in range(int(block.count)):
+                if scale * block.shown[k, column] == value:
+                    return n * BLOCK + k
+    return -1
+
+
 def plain_of(probe: Probe) -> tuple[tuple[int, ...], float]:
     """Quantity of a probe if it is so simple that the loop needs no kernel for it.
 
@@ -226,6 +253,14 @@ def plain_of(probe: Probe) -> tuple[tuple[int, ...], float]:
     if probe.kernel is line and len(data) and data[0, 0] > 0.0 and (data[:, 0] == data[0, 0]).all():
         return (LINES, *rows), float(data[0, 0])
     return none
+
+
+def reads_each_line(probe: Probe, lines: int) -> bool:
+    """Tell if a probe reads more of a number of lines than the largest tension or strain of all."""
+    (kind, column, first, last), _ = plain_of(probe)
+    if kind == LINES:
+        return column > STRAIN or first > 0 or last < lines or probe.sign < 0.0
+    return probe.term == 0 or not any(probe.kernel is kernel for kernel in WITHOUT_LINES)
 
 
 @kernel(PROBE)
@@ -450,3 +485,10 @@ def surface_speed(t, x, v, f, lines, rows, data, where):
             speed += data[n, 0] * math.sqrt(v[spin, 0] ** 2 + v[spin, 1] ** 2 + v[spin, 2] ** 2)
         best = max(best, speed)
     return best
+
+
+WITHOUT_LINES = (
+    displacement, velocity, reaction, contact_force, contact_depth, selected_row, selected_contact, deepest,
+    surface_speed,
+)  # fmt: skip
+"""Kernels of probes that do not read what lines show."""

@@ -9,11 +9,14 @@ import skfem
 from nets import LAWS, skew_cable, skew_net, skew_web, system
 from oracle import Oracle
 
+from refweb.compiled.rows import column_of, records_of, width_of
 from refweb.effects import line_blocks
+from refweb.effects.base import BLOCK_OUT, MOVES, RESTS, UNKNOWN
 from refweb.effects.elasticity import Elasticity
 from refweb.effects.line_blocks import BLOCK, runs_of
 from refweb.net import discretisation, elements
 from refweb.net.cable import Cable
+from refweb.net.laws.law import LINE
 from refweb.net.web import Web
 from refweb.results.state import State
 from refweb.system.system import System
@@ -265,7 +268,7 @@ def pulls_together_as_alone(term, x, cells, data):
     """Forces, tensions and strains of elements by blocks beside those of one after another."""
     none, shown, one = np.zeros_like(x), np.zeros((len(cells), 3)), np.zeros((len(cells), 3))
     together, alone = none.copy(), none.copy()
-    force, taken, numbers = term.elements.by_blocks(cells, data)
+    force, taken, numbers, _ = term.elements.by_blocks(cells, data)
     force(0.0, x, none, together, taken, numbers, shown)
     term.force(0.0, x, none, alone, cells, data, one)
     # the same products, which either may contract with sums
@@ -315,13 +318,80 @@ def test_runs_of_lines_pull_as_each_alone(law, cells):
     pulls_together_as_alone(net.terms[0], displacement(4, cells.max() + 1), cells, data)
 
 
+def shown_by_blocks(force, x, taken, numbers, blocks):
+    """Forces on rows at x, where blocks of lines show what they have."""
+    f = np.zeros_like(x)
+    force(0.0, x, f, f, taken, numbers, blocks)
+    return f
+
+
+@pytest.mark.parametrize("cells", LISTS.values(), ids=LISTS)
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_blocks_show_their_largest_values(law, cells):
+    """The same forces to the last bit; each line is shown where a block is above all before it, and steps before."""
+    net, rng = skew_system(law), np.random.default_rng(len(cells))
+    data = np.tile(net.net.line_data.matrix, (len(cells), 1))[: len(cells)]
+    data = data * rng.uniform(0.99, 1.01, data.shape)
+    force, taken, numbers, rows = net.terms[0].elements.by_blocks(cells, data)
+    blocks = np.zeros((rows, width_of(BLOCK_OUT)))
+    shows = records_of(BLOCK_OUT, blocks)
+    shows["rest"], shows["tension"][-1], shows["strain"][-1] = UNKNOWN, -np.inf, -np.inf
+    assert rows == -(-len(cells) // BLOCK) + 1
+    most, fresh = np.full(2, -np.inf), []
+    for seed in range(4):
+        x, lines, expected = (
+            displacement(seed, cells.max() + 1),
+            np.zeros((len(cells), 2)),
+            np.zeros((cells.max() + 1, 3)),
+        )
+        force(0.0, x, np.zeros_like(x), expected, taken, numbers, lines)
+        shows["shown"] = np.nan
+        assert np.array_equal(shown_by_blocks(force, x, taken, numbers, blocks), expected)
+        for n in range(rows - 1):
+            part = lines[n * BLOCK : (n + 1) * BLOCK]
+            largest = part.max(axis=0)
+            assert [*shows[n]][:4] == [*largest, len(part), MOVES]
+            fresh.append((largest > most).any())
+            np.testing.assert_array_equal(shows["shown"][n, : len(part)], part if fresh[-1] else np.nan)
+            most = np.maximum(most, largest)
+        assert [shows["tension"][-1], shows["strain"][-1]] == [*most]
+    assert not all(fresh)
+
+
+def test_blocks_at_rest_show_what_they_have_until_they_move():
+    """A web without prestress: blocks without differences are left out, and found anew when a node moves."""
+    net, cells = skew_system("tension-only"), LISTS["grid"]
+    data = np.tile(net.net.line_data.matrix[:1], (len(cells), 1))
+    data[:, column_of(LINE, "distance")] = data[:, column_of(LINE, "natural_length")] = np.linalg.norm(data[0, 6:9])
+    force, taken, numbers, rows = net.terms[0].elements.by_blocks(cells, data)
+    blocks, x = np.zeros((rows, width_of(BLOCK_OUT))), np.zeros((cells.max() + 1, 3))
+    shows = records_of(BLOCK_OUT, blocks)
+    shows["rest"] = UNKNOWN
+    x[:, 0] = 0.3  # as a whole
+    for _ in range(2):
+        assert not shown_by_blocks(force, x, taken, numbers, blocks).any()
+        assert (shows["rest"][:-1] == RESTS).all() and not shows["tension"].any()
+    shows["tension"][1] = 7.0  # stays where nothing is found anew
+    for away in (9.0, 0.0):
+        x[0, 1:] = away
+        expected = np.zeros_like(x)
+        force(0.0, x, x, expected, taken, numbers, np.zeros((len(cells), 2)))
+        assert expected.any() == (away > 0.0)
+        assert np.array_equal(shown_by_blocks(force, x, taken, numbers, blocks), expected)
+        assert [*shows["rest"][:-1]] == [MOVES] + [RESTS] * (rows - 2)
+        assert (shows["tension"][0] > 0.0) == (away > 0.0) and shows["tension"][1] == 7.0
+    numbers[:, BLOCK * column_of(LINE, "natural_length") :][:, :BLOCK] *= 0.9  # with prestress none is at rest
+    shows["rest"], x[...] = UNKNOWN, 0.0
+    assert shown_by_blocks(force, x, taken, numbers, blocks).any() and (shows["rest"][:-1] == MOVES).all()
+
+
 def test_runs_keep_the_order_of_sums():
     """Where lines stand in the order of their nodes, forces have the same bits as without runs."""
     net, cells = skew_system("tension-only"), LISTS["grid"]
     data = np.tile(net.net.line_data.matrix, (len(cells), 1))[: len(cells)]
     x, forces = displacement(5, cells.max() + 1), []
-    whole = line_blocks.force_by_blocks(net.net.law), cells, line_blocks.blocks_of(data)
-    for force, taken, numbers in (whole, net.terms[0].elements.by_blocks(cells, data)):
+    whole = line_blocks.force_by_blocks(net.net.law), cells, line_blocks.blocks_of(data), 0
+    for force, taken, numbers, _ in (whole, net.terms[0].elements.by_blocks(cells, data)):
         forces.append(np.zeros_like(x))
         force(0.0, x, np.zeros_like(x), forces[-1], taken, numbers, np.zeros((len(cells), 2)))
     assert forces[0].any() and np.array_equal(*forces)

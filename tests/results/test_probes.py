@@ -1,8 +1,12 @@
 """Probes that loops look at themselves: their values are those of numpy, and of their own kernels, to the last bit."""
 
+import dis
+
 import numpy as np
 import pytest
 
+from refweb.compiled.rows import records_of
+from refweb.effects.base import BLOCK, BLOCK_OUT
 from refweb.results import probes
 
 
@@ -69,3 +73,47 @@ def test_what_is_not_plain():
     ]
     for probe in others:
         assert probes.plain_of(probe) == ((0, 0, 0, 0), 1.0)
+
+
+@pytest.mark.parametrize("column", [0, 1])
+def test_blocks_have_the_largest_values_and_their_places(column):
+    """The first of equal values has the place, also in a later block of which one of them is scaled to the other."""
+    rng, count = np.random.default_rng(column), 2 * BLOCK + 30
+    lines, top = 0.1 * rng.normal(size=(count, 2)), np.nextafter(3.0, 4.0)
+    scale = next(s for s in np.linspace(0.3, 0.9, 100) if s * top == s * 3.0)
+    for places in ([700 - BLOCK, 520], [300], [530], [5, 300], [255, 256]):
+        values = lines.copy()
+        values[places, column] = top
+        values[places[0], column] = 3.0
+        blocks = np.zeros((4, probes.OF_BLOCKS))
+        shows = records_of(BLOCK_OUT, blocks)
+        for n, show in enumerate(shows[:3]):
+            part = values[n * BLOCK : (n + 1) * BLOCK]
+            show["tension"], show["strain"], show["count"] = *part.max(axis=0), len(part)
+            show["shown"][: len(part)] = part
+            show["shown"][len(part) :] = show["shown"][:1]
+        blocks[3, :2] = 99.0  # of steps before
+        largest = probes.largest_of_blocks(blocks, column)
+        assert largest == values[:, column].max()
+        assert probes.element_of_blocks(blocks, column, scale, scale * largest) == places[0]
+    assert probes.element_of_blocks(blocks, column, scale, 7.0) == -1
+
+
+def test_who_reads_each_line():
+    """Largest tensions and strains of all lines are those of blocks; nodes and bodies have no lines."""
+    rows, one = [probes.MAGNITUDE, 0, 4], np.ones((4, 1))
+    largest = probes.Probe(probes.line, [0, 0, 4], one, sign=1.0)
+    assert not probes.reads_each_line(largest, 4)
+    assert not probes.reads_each_line(largest._replace(rows=[1, 0, 4]), 4)
+    for other in (dict(rows=[2, 0, 4]), dict(rows=[0, 1, 4]), dict(sign=-1.0), dict(kernel=probes.slack_fraction)):
+        assert probes.reads_each_line(largest._replace(**other), 4)
+    assert probes.reads_each_line(largest, 5)
+    assert probes.reads_each_line(largest._replace(data=np.arange(1.0, 5.0)[:, None]), 4)
+    for kernel in probes.WITHOUT_LINES:
+        assert not probes.reads_each_line(probes.Probe(kernel, rows, np.zeros((4, 3)), 1.0), 4)
+    assert probes.reads_each_line(probes.Probe(probes.deepest, [0, 4], one, 1.0, term=0), 4)
+    for kernel in vars(probes).values():  # a kernel that has the name of lines in its code
+        if kernel in probes.WITHOUT_LINES:
+            assert "lines" not in kernel.py_func.__code__.co_names
+            code = [(i.opname, i.argval) for i in dis.get_instructions(kernel.py_func)]
+            assert not any(name.startswith("LOAD_FAST") and value == "lines" for name, value in code)

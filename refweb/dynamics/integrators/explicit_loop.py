@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...compiled.rows import record_at
+from ...effects.base import BLOCK_OUT, UNKNOWN
 from ...effects.sliding_material import BEHIND
 from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import add_forces_to_bodies
@@ -149,6 +151,24 @@ def joins_kicks(model, observed, running):
     return simple and not model.implicit_contacts.terms.size + model.inertia.turns.moment.size + forces + observed_more
 
 
+@kernel(leaf=True)
+def shows_blocks(model, observed, running):
+    """Tell if nothing that follows from step to step reads more of the lines than the largest of their blocks.
+
+    Then the largest of all steps so far begins anew: no extreme is below one that follows. The last step of a call
+    shows all lines, for history rows and all that is read between calls.
+    """
+    blocks, more = model.terms.blocks, model.terms.viscous.size + model.terms.powers.shape[0] + observed.each_line
+    more += model.implicit_contacts.terms.size + observed.sums.shape[0] + observed.windows.slots.size
+    if not blocks.shape[0] or more + running.events.size:
+        return False
+    highest = record_at(BLOCK_OUT, blocks, blocks.shape[0] - 1, 0)
+    highest.tension = highest.strain = -math.inf
+    for n in range(blocks.shape[0] - 1):
+        record_at(BLOCK_OUT, blocks, n, 0).rest = UNKNOWN
+    return True
+
+
 @kernel(leaf=True, apart=())
 def run_steps(
     count: int, h: float, changing: bool, scheme: Scheme, model: Model, observed: Observed, running: Running,
@@ -172,6 +192,7 @@ def run_steps(
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
     checked, moves = model.ccd.checks.size > 0, driven.size + len(motions.kernels) > 0
     joins, waits = not (changing or near or stages or checked or moves) and joins_kicks(model, observed, running), False
+    few = not (changing or stages or checked) and shows_blocks(model, observed, running)
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
@@ -191,7 +212,8 @@ def run_steps(
         if near:
             update_neighbours(drift, x, v, bits, before, model)
             check_last_drift(now - h, model, running)
-        first(now, x, v, f, terms.elements, numbers, lines)
+        out = terms.blocks if few and not looks and step < count else lines
+        first(now, x, v, f, terms.elements, numbers, out)
         for i in terms.still:
             act(i, now, x, v, f, terms)
         if near:
@@ -214,7 +236,7 @@ def run_steps(
         if looks:
             look_inside(now, h, step == fresh, stages == 0, space.inside, where, total, model, observed, running)
         ending = begun + step == planned or math.isnan(extremes.looked[0])
-        turned = follow(now, ending, x, v, f, lines, known, where, observed, extremes)
+        turned = follow(now, ending, x, v, f, out, known, where, observed, extremes)
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:

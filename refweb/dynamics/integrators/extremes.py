@@ -27,7 +27,17 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from ...kernels import Integers, Matrix, Record, Vector, inner, kernel
-from ...results.probes import NODES, PLACE, element_of, largest_in, largest_square, row_of_square
+from ...results.probes import (
+    NODES,
+    OF_BLOCKS,
+    PLACE,
+    element_of,
+    element_of_blocks,
+    largest_in,
+    largest_of_blocks,
+    largest_square,
+    row_of_square,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -129,7 +139,7 @@ def plain_value(i, x, lines, plain, scales, known):
 
     Displacements x are in a row. ``known`` holds behind that the probe before it of a column in this step, −1 for none,
     the largest of that, which may be of the same elements, the square of the last displacement, and the row and element
-    from which the places of both are searched.
+    from which the places of both are searched. ``lines`` may have blocks in place of lines, of `BLOCK_OUT`.
     """
     kind = plain[i, 0]
     if kind == NODES:
@@ -139,7 +149,10 @@ def plain_value(i, x, lines, plain, scales, known):
         j = int(known[1])
         if j < 0 or plain[i, 1] != plain[j, 1] or plain[i, 2] != plain[j, 2] or plain[i, 3] != plain[j, 3]:
             known[1] = i
-            known[2], known[5] = largest_in(lines, plain[i, 1], plain[i, 2], plain[i, 3])
+            if lines.shape[1] == OF_BLOCKS:
+                known[2] = largest_of_blocks(lines, plain[i, 1])
+            else:
+                known[2], known[5] = largest_in(lines, plain[i, 1], plain[i, 2], plain[i, 3])
         known[0] = scales[i] * known[2]
     return kind > 0
 
@@ -199,6 +212,8 @@ def update_plain_extreme(
     extremes.values[i], extremes.times[i], extremes.corrections[i] = known[0], t, 0.0
     if plain[i, 0] == NODES:
         extremes.places[i] = row_of_square(x, int(known[4]), plain[i, 2], known[3])
+    elif lines.shape[1] == OF_BLOCKS:
+        extremes.places[i] = element_of_blocks(lines, plain[i, 1], observed.scales[i], known[0])
     else:
         extremes.places[i] = element_of(lines, plain[i, 1], int(known[5]), plain[i, 3], observed.scales[i], known[0])
 

@@ -26,7 +26,7 @@ from ...kernels import (
     Record,
     Vector,
 )
-from ...results.probes import PROBE, plain_of
+from ...results.probes import PROBE, plain_of, reads_each_line
 from .averages import Windows, begin_averages
 from .events import starts_above
 
@@ -54,6 +54,8 @@ class Observed(Record):
         Quantities that the loop evaluates without a kernel, see `refweb.results.probes.plain_of`.
     scales : ndarray, shape (probes,)
         Factor on each of these.
+    each_line : int
+        1 if probes that are followed read more of the lines than the largest tension or strain of all, else 0.
     """
 
     probes: ProbeTable
@@ -66,6 +68,7 @@ class Observed(Record):
     terms: Integers
     plain: IntegerMatrix
     scales: Vector
+    each_line: int
 
     @classmethod
     def of(cls, probes, sums, terms, outs=(), contacts=None):
@@ -89,6 +92,7 @@ class Observed(Record):
             terms=np.unique(terms_seen).astype(np.int64),
             plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
             scales=np.array([scale for _, scale in plain], dtype=float),
+            each_line=int(any(reads_each_line(p, len(outs[0]) if outs else 0) for p in probes if p.sign)),
         )
 
 

@@ -22,6 +22,8 @@ import numpy as np
 from numba import from_dtype, types
 
 from ... import kernels as k
+from ...compiled.rows import width_of
+from ...effects.base import BLOCK_OUT
 from ...effects.mass_flow import FollowedMass
 from ...effects.natural_lengths import NaturalLengths
 from ...kernels import (
@@ -188,6 +190,9 @@ class ForceTerms(Record):
     of_lines, elements, numbers : table and ndarray
         Kernel of the first term in steps, one, and what it reads in place of ``cells`` and ``data``: the same, or by
         blocks.
+    blocks : ndarray, shape (blocks + 1, numbers of `refweb.effects.base.BLOCK_OUT`)
+        Numbers of blocks of lines in steps in which nothing needs more of the lines, and behind them the largest of all
+        steps; without a row if the kernel does not take it, or other terms need what each line shows.
     still, viscous : ndarray of int
         Terms behind the first whose forces follow from displacement and time alone, and those of velocity whose
         kicks are iterated.
@@ -211,6 +216,7 @@ class ForceTerms(Record):
     of_lines: ForceTable
     elements: Indices
     numbers: Matrix
+    blocks: Matrix
     still: Integers
     viscous: Integers
     beside: Integers
@@ -236,9 +242,10 @@ class ForceTerms(Record):
         powers = [(i, k, (i in ready) + terms[i].velocity.jumps) for i, k in booked if i not in inner]
         near, stored = near_of(system), [np.zeros(len(term.cells)) for term in terms]
         cells = [*(terms[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
-        by_elements = terms[0].force, terms[0].cells, lines
+        by_elements = terms[0].force, terms[0].cells, lines, 0
         by_blocks = None if net.factors else terms[0].elements.by_blocks
-        of_lines, elements, of_blocks = by_blocks(terms[0].cells, lines) if by_blocks else by_elements
+        of_lines, elements, of_blocks, rows = by_blocks(terms[0].cells, lines) if by_blocks else by_elements
+        beside = [i for i in (*still, *viscous) if terms[i].over_lines]
         return cls(
             forces=Functions(k.FORCE, [term.force for term in terms]),
             cells=Arrays(INDICES, [*(term.cells for term in terms), *cells]),
@@ -247,9 +254,10 @@ class ForceTerms(Record):
             of_lines=Functions(k.FORCE, [of_lines]),
             elements=elements,
             numbers=of_blocks,
+            blocks=np.zeros((0 if beside or inner else rows, width_of(BLOCK_OUT))),
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
-            beside=np.array([i for i in (*still, *viscous) if terms[i].over_lines], dtype=np.int64),
+            beside=np.array(beside, dtype=np.int64),
             energies=Functions(k.ENERGY, [term.energy or no_energy for term in terms]),
             stored=Arrays(VECTOR, [*stored, *(stored[i] for i in near)]),
             working=system.working,
