@@ -886,6 +886,7 @@ MUTANTS = [
     Mutant("dynamics/history", "SPREAD = 3.0", "SPREAD = 1.5"),
     Mutant("dynamics/twin_error", "MOST_CHANCE, TELLING = 10.0", "MOST_CHANCE, TELLING = 1.0"),
     Mutant("dynamics/twin_error", "self._course.stopped != stopped", "False"),
+    Mutant("effects/line_blocks", "places[runs[1]] = np.arange(len(cells))", "places = runs[1].copy()"),
     Mutant("dynamics/twin_error", "self._left = [AGAIN] if self._by is None else [None, AGAIN]", "self._left = [None]"),
     Mutant("dynamics/integrators/central_difference", "STABLE, FEWEST, SHORT = 0.75,", "STABLE, FEWEST, SHORT = 1.0,"),
     Mutant("dynamics/integrators/central_difference", "return min(ratio, 1.0 / ratio)", "return ratio"),

@@ -118,9 +118,7 @@ def roots(given, method):
     if "elastic-plastic" in laws:
         yield "effects.plastic"
     explicit = not static and method not in ("cvode", "ida")
-    if (
-        explicit and len(laws) == 1 and "table" not in laws and "reel" not in given
-    ):  # one law without numbers of its own
+    if explicit and len(laws) == 1 and "table" not in laws:  # one law without numbers of its own
         yield "effects.line_blocks"
     if "viscous" in cable:
         yield "effects.viscous"

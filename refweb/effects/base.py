@@ -362,7 +362,8 @@ class CellElements(NamedTuple):
         Number of values per cell in ``out`` that observables read, of a thread.
     by_blocks : callable, optional
         Returns the force kernel of lines for steps of an explicit method, its cells and its numbers, for those of the
-        term, and the number of rows of a matrix of `BLOCK_OUT` that the kernel takes as well, 0 if it takes none.
+        term, the number of rows of a matrix of `BLOCK_OUT` that the kernel takes as well, 0 if it takes none, and the
+        place of each natural length among the numbers, flattened.
     internal : InternalVariables, optional
         Internal variables that the cells have.
     """

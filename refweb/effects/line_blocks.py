@@ -288,11 +288,14 @@ def force_by_runs(law):
 def by_blocks(law, cells, lines):
     """Force kernel of all elements of a law, its cells and its numbers, by the runs of the net if it has long ones.
 
-    The last number is that of the rows of a matrix of `BLOCK_OUT` that the kernel takes in place of what elements show,
-    0 if it takes none.
+    The next number is that of the rows of a matrix of `BLOCK_OUT` that the kernel takes in place of what elements show,
+    0 if it takes none. Last are the places of natural lengths among the numbers, flattened, shape (elements,).
     """
-    runs = runs_of(cells)
+    runs, places = runs_of(cells), np.arange(len(cells))
+    if runs is not None:
+        places[runs[1]] = np.arange(len(cells))
+    places = places // BLOCK * (width_of(LINE) * BLOCK) + column_of(LINE, "natural_length") * BLOCK + places % BLOCK
     if runs is None:
-        return force_by_blocks(law), cells, blocks_of(lines), 0
+        return force_by_blocks(law), cells, blocks_of(lines), 0, places
     blocks = blocks_of(lines, runs[1])
-    return force_by_runs(law), runs[0], blocks, len(blocks) + 1
+    return force_by_runs(law), runs[0], blocks, len(blocks) + 1, places

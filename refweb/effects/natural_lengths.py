@@ -137,6 +137,17 @@ def set_lengths(t: float, lengths: NaturalLengths, lines: Matrix) -> None:
         set_growth(t, lengths, lines)
 
 
+@kernel(apart=("lengths",))
+def set_lengths_by_blocks(
+    t: float, lengths: NaturalLengths, lines: Matrix, places: Integers, blocks: Matrix
+) -> None:  # fmt: skip
+    """Write the same to the numbers of all ``lines``, and natural lengths to ``places`` among those of blocks."""
+    set_lengths(t, lengths, lines)
+    numbers = blocks.reshape(-1)
+    for c in range(places.size):
+        numbers[places[c]] = record_at(LINE, lines, lengths.elements[c], 0).natural_length
+
+
 def with_factor(net: Net, lines: NDArray[np.int64], table: Any) -> Net:
     """The net with a factor on the natural lengths of some lines.
 

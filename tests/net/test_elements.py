@@ -268,7 +268,7 @@ def pulls_together_as_alone(term, x, cells, data):
     """Forces, tensions and strains of elements by blocks beside those of one after another."""
     none, shown, one = np.zeros_like(x), np.zeros((len(cells), 3)), np.zeros((len(cells), 3))
     together, alone = none.copy(), none.copy()
-    force, taken, numbers, _ = term.elements.by_blocks(cells, data)
+    force, taken, numbers, *_ = term.elements.by_blocks(cells, data)
     force(0.0, x, none, together, taken, numbers, shown)
     term.force(0.0, x, none, alone, cells, data, one)
     # the same products, which either may contract with sums
@@ -332,7 +332,7 @@ def test_blocks_show_their_largest_values(law, cells):
     net, rng = skew_system(law), np.random.default_rng(len(cells))
     data = np.tile(net.net.line_data.matrix, (len(cells), 1))[: len(cells)]
     data = data * rng.uniform(0.99, 1.01, data.shape)
-    force, taken, numbers, rows = net.terms[0].elements.by_blocks(cells, data)
+    force, taken, numbers, rows, _ = net.terms[0].elements.by_blocks(cells, data)
     blocks = np.zeros((rows, width_of(BLOCK_OUT)))
     shows = records_of(BLOCK_OUT, blocks)
     shows["rest"], shows["tension"][-1], shows["strain"][-1] = UNKNOWN, -np.inf, -np.inf
@@ -363,7 +363,7 @@ def test_blocks_at_rest_show_what_they_have_until_they_move():
     net, cells = skew_system("tension-only"), LISTS["grid"]
     data = np.tile(net.net.line_data.matrix[:1], (len(cells), 1))
     data[:, column_of(LINE, "distance")] = data[:, column_of(LINE, "natural_length")] = np.linalg.norm(data[0, 6:9])
-    force, taken, numbers, rows = net.terms[0].elements.by_blocks(cells, data)
+    force, taken, numbers, rows, _ = net.terms[0].elements.by_blocks(cells, data)
     blocks, x = np.zeros((rows, width_of(BLOCK_OUT))), np.zeros((cells.max() + 1, 3))
     shows = records_of(BLOCK_OUT, blocks)
     shows["rest"] = UNKNOWN
@@ -390,8 +390,8 @@ def test_runs_keep_the_order_of_sums():
     net, cells = skew_system("tension-only"), LISTS["grid"]
     data = np.tile(net.net.line_data.matrix, (len(cells), 1))[: len(cells)]
     x, forces = displacement(5, cells.max() + 1), []
-    whole = line_blocks.force_by_blocks(net.net.law), cells, line_blocks.blocks_of(data), 0
-    for force, taken, numbers, _ in (whole, net.terms[0].elements.by_blocks(cells, data)):
+    whole = line_blocks.force_by_blocks(net.net.law), cells, line_blocks.blocks_of(data), 0, None
+    for force, taken, numbers, *_ in (whole, net.terms[0].elements.by_blocks(cells, data)):
         forces.append(np.zeros_like(x))
         force(0.0, x, np.zeros_like(x), forces[-1], taken, numbers, np.zeros((len(cells), 2)))
     assert forces[0].any() and np.array_equal(*forces)

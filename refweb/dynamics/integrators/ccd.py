@@ -110,9 +110,10 @@ class Ccd(Record):
     paths: PathArray
 
     @classmethod
-    def of(cls, system):
-        """Make the record of a system."""
-        checks = [check for check in checks_of(system) if check.kind != PAIRS]
+    def of(cls, system, reports=True):
+        """Make the record of a system; without ``reports`` it leaves out neighbours, for which no step is cut."""
+        left_out = (PAIRS,) if reports else (PAIRS, BESIDE)
+        checks = [check for check in checks_of(system) if check.kind not in left_out]
         counts = [len(check.cells) + 3 if check.kind == BESIDE else 0 for check in checks]
         return cls(
             checks=np.array([(check.kind, check.term, check.limit, check.factor) for check in checks], dtype=CHECK),

@@ -120,7 +120,8 @@ class CentralDifference(Integrator):
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
         self._outs = outs = tuple(system.per_cell())
-        self.model, jump = Model.of(system, outs), any(term.velocity.jumps for term in system.terms)
+        first = finer == 1.0  # passages of the first run are what a solution tells
+        self.model, jump = Model.of(system, outs, first), any(term.velocity.jumps for term in system.terms)
         self._snapped = outs[0][:, SNAPPED] if jump else np.zeros(0)
         self._observed = Observed.of(probes, sums, len(outs), outs, self.model.contacts)
         self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])

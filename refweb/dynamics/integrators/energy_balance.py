@@ -21,7 +21,7 @@ from ...compiled.rows import record_at
 from ...effects.base import LAST_STRAIN, POWER, SNAPPED, STRAIN
 from ...effects.line_kernels import LINE, line_at
 from ...effects.mass_flow import exchange_by_slips, exchange_masses, set_masses_by_slips
-from ...effects.natural_lengths import NaturalLengths, set_growth, set_lengths
+from ...effects.natural_lengths import NaturalLengths, set_growth, set_lengths_by_blocks
 from ...errors import EnergyDriftError
 from ...kernels import (
     ENERGY,
@@ -284,7 +284,7 @@ def change_lengths(t: float, h: float, model: Model, was: Vector, running: Runni
         exchange_masses(t, running.v, lengths.masses, work, running.ledger.pushed)
     for c in range(was.size):
         was[c] = record_at(LINE, lines, lengths.elements[c], 0).natural_length
-    set_lengths(t, lengths, lines)
+    set_lengths_by_blocks(t, lengths, lines, model.terms.natural, model.terms.numbers)
     if lengths.growth >= 0:
         set_growth(t - 0.5 * h, lengths, lines)
     if model.relaxing.terms.size:
@@ -300,7 +300,7 @@ def change_lengths(t: float, h: float, model: Model, was: Vector, running: Runni
 def set_lines(t, x, model):
     """Set natural lengths at time t, and masses by the slips of x, where any change."""
     if model.lengths.elements.size:
-        set_lengths(t, model.lengths, model.terms.data[0])
+        set_lengths_by_blocks(t, model.lengths, model.terms.data[0], model.terms.natural, model.terms.numbers)
     if model.lengths.masses.slips.size:
         set_masses_by_slips(t, x, model.lengths.masses)
 

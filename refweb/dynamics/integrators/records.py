@@ -190,6 +190,8 @@ class ForceTerms(Record):
     of_lines, elements, numbers : table and ndarray
         Kernel of the first term in steps, one, and what it reads in place of ``cells`` and ``data``: the same, or by
         blocks.
+    natural : ndarray of int, shape (changing,)
+        Places of natural lengths that change among these numbers, flattened; none where they are ``data``.
     blocks : ndarray, shape (blocks + 1, numbers of `refweb.effects.base.BLOCK_OUT`)
         Numbers of blocks of lines in steps in which nothing needs more of the lines, and behind them the largest of all
         steps; without a row if the kernel does not take it, or other terms need what each line shows.
@@ -216,6 +218,7 @@ class ForceTerms(Record):
     of_lines: ForceTable
     elements: Indices
     numbers: Matrix
+    natural: Integers
     blocks: Matrix
     still: Integers
     viscous: Integers
@@ -242,9 +245,9 @@ class ForceTerms(Record):
         powers = [(i, k, (i in ready) + terms[i].velocity.jumps) for i, k in booked if i not in inner]
         near, stored = near_of(system), [np.zeros(len(term.cells)) for term in terms]
         cells = [*(terms[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
-        by_elements = terms[0].force, terms[0].cells, lines, 0
-        by_blocks = None if net.factors else terms[0].elements.by_blocks
-        of_lines, elements, of_blocks, rows = by_blocks(terms[0].cells, lines) if by_blocks else by_elements
+        by_elements = terms[0].force, terms[0].cells, lines, 0, np.zeros(0, dtype=np.int64)
+        by_blocks, changing = terms[0].elements.by_blocks, system.lengths.elements
+        of_lines, elements, of_blocks, rows, places = by_blocks(terms[0].cells, lines) if by_blocks else by_elements
         beside = [i for i in (*still, *viscous) if terms[i].over_lines]
         return cls(
             forces=Functions(k.FORCE, [term.force for term in terms]),
@@ -254,7 +257,8 @@ class ForceTerms(Record):
             of_lines=Functions(k.FORCE, [of_lines]),
             elements=elements,
             numbers=of_blocks,
-            blocks=np.zeros((0 if beside or inner else rows, width_of(BLOCK_OUT))),
+            natural=places[changing] if by_blocks else places,
+            blocks=np.zeros((0 if beside or inner or changing.size else rows, width_of(BLOCK_OUT))),
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
             beside=np.array(beside, dtype=np.int64),
@@ -324,14 +328,14 @@ class Model(Record):
     contacts: Contacts
 
     @classmethod
-    def of(cls, system, outs):
-        """Make the record of a `refweb.system.system.System`, whose terms write their values to ``outs``."""
+    def of(cls, system, outs, reports=True):
+        """Make the record of a `refweb.system.system.System`, whose terms write to ``outs``; see `Ccd` for reports."""
         inertia, lengths = Inertia.of(system), system.lengths
         if system.net.flows:
             lengths = replace(lengths, masses=FollowedMass.of(system, inertia.mass, inertia.inverse))
         forces = inertia, ForceTerms.of(system, outs), ImplicitContacts.of(system, inertia.turns), Relaxing.of(system)
         changes = Motions.of(system), lengths, system.corners, Outside.of(system)
-        return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), Contacts.of(system))
+        return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system, reports), Contacts.of(system))
 
 
 class Running(Record):

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ...effects.natural_lengths import set_lengths
+from ...effects.natural_lengths import set_lengths_by_blocks
 from ...effects.self_contact.search import FASTER
 from ...kernels import BOUND, Matrix, kernel
 from ...net.rotation_bounds import carry_rates, pull_rates
@@ -76,7 +76,8 @@ def safe_step(
     for corner in model.lengths.corners:
         if changing and (start < corner < end or corner == math.inf) or corner == -math.inf:
             if changing:
-                set_lengths(min(max(corner, start), end), model.lengths, model.terms.data[0])
+                t, terms = min(max(corner, start), end), model.terms
+                set_lengths_by_blocks(t, model.lengths, terms.data[0], terms.natural, terms.numbers)
             bound = min(bound, step_bound(reach, speed, x, f, model.inertia, model.terms))
     return bound
 
