@@ -888,7 +888,7 @@ MUTANTS = [
     Mutant("dynamics/twin_error", "self._course.stopped != stopped", "False"),
     Mutant("effects/line_blocks", "places[runs[1]] = np.arange(len(cells))", "places = runs[1].copy()"),
     Mutant("dynamics/twin_error", "self._left = [AGAIN] if self._by is None else [None, AGAIN]", "self._left = [None]"),
-    Mutant("dynamics/integrators/central_difference", "STABLE, FEWEST, SHORT = 0.75,", "STABLE, FEWEST, SHORT = 1.0,"),
+    Mutant("dynamics/integrators/central_difference", "FEWEST, SHORT = 1.5, 0.8,", "FEWEST, SHORT = 1.5, 1.0,"),
     Mutant("dynamics/integrators/central_difference", "return min(ratio, 1.0 / ratio)", "return ratio"),
     Mutant("dynamics/history", "distances[name] = 0.5 * time * float(along.max())", "distances[name] = 0.0"),
     Mutant(

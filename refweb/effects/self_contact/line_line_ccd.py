@@ -33,7 +33,7 @@ MEETING = 1e-9
 """Distance at which centre lines count as meeting, over the distance of contact."""
 LOOKS = 200
 """Largest number of positions of a pair that are checked; an undecided pair then counts as meeting."""
-AHEAD = 64.0
+AHEAD = 8.0
 """Number of drifts for which pairs to check in turn are chosen."""
 TRAVEL = 0.2
 """Largest approach of lines in an implicit step, over the distance of contact; or half of their distance."""
