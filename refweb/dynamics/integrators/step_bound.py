@@ -22,7 +22,7 @@ from ...net.rotation_bounds import carry_rates, pull_rates
 if TYPE_CHECKING:
     from .records import ForceTerms, Inertia, Model, Running
 
-SPAN = 64.0
+SPAN = 100.0
 """Length of a span for which steps are planned where lines touch lines, over the step that the lines alone allow."""
 EARLY = 2.0
 """Time for which a force at the start of a span changes the speed of a pair, over the same step."""

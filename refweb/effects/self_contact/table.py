@@ -59,7 +59,7 @@ class SelfContact(Table):
     the time, since no force keeps them apart. Load steps of statics are not certified, but lines are named that meet on
     straight paths from one load step to the next. A warning reports lines that are not certified.
 
-    Explicit methods search near pairs during the run, and plan steps for spans of some 64 steps, by how near each pair
+    Explicit methods search near pairs during the run, and plan steps for spans of some 100 steps, by how near each pair
     may come in a span and how fast. Statics, cvode and ida, and explicit methods for a small web, have one list of all
     pairs.
 
