@@ -7,8 +7,8 @@ May change: how kernels are written. Must stay: fields of `NaturalLengths`, whic
 −∞ behind the corners, on which `explicit_loop` and `step_bound` count; the column `GROWTH`, which `damping` adds.
 `set_lengths` is the only place that computes lengths: a new effect on them calls `with_factor`. Must stay as well:
 `shortest_of`, which `self_contact.table` imports; `set_growth`, which `integrators.energy_balance` and
-`integrators.step` import; `work_of_lengths`, which `system.system` imports. Tests: ``tests/effects/test_reel.py``,
-``tests/effects/test_viscous.py``.
+`integrators.step` import; `set_lengths_by_blocks`, which explicit steps and their bound call; `work_of_lengths`, which
+`system.system` imports. Tests: ``tests/effects/test_reel.py``, ``tests/effects/test_viscous.py``.
 """
 
 from __future__ import annotations

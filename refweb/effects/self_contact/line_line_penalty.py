@@ -389,11 +389,12 @@ def note_pairs(reach, speed, x, mass, cells, data, rates_here, largest):
         if not depth > 0.0:
             continue
         of = numbers_of(data, c)
-        value, limit = 2.0 * steepest(of, depth), math.inf
-        highest = MOST * value
         if in_span:
             value, limit = row_sum(of, depth), steepest(of, of.touch * of.touch)
             highest = value
+        else:
+            value, limit = 2.0 * steepest(of, depth), math.inf
+            highest = MOST * value
         for n in range(4):
             r = cells[c, n]
             largest[r] = max(largest[r], highest)

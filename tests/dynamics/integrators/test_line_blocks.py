@@ -18,6 +18,16 @@ LEAST = dict(name="least", quantity="tension", reduce="min")
 ENERGY = dict(name="energy", quantity="kinetic_energy", reduce="max")
 
 
+def advanced(scene):
+    """Integrator of a scene and its course at the end, row by row."""
+    simulation = Simulation(scene, scene.build(), Solution(scene))
+    integrator = simulation.integrator
+    course = integrator.start()
+    for time in simulation.schedule.times[1:]:
+        integrator.advance(course, [time])
+    return integrator, course
+
+
 def run(observe, effects=(), prestrain=0.0):
     """Steps of a web of 760 lines that a mass leaves, from rest on, and their end."""
     thrown = refweb.PointMass(node=90, mass=0.05), refweb.Velocity(node=90, value=(0.3, 0.0, 3.0))
@@ -30,12 +40,7 @@ def run(observe, effects=(), prestrain=0.0):
         output=refweb.Output(interval=4e-3, frames=3),
         accuracy=refweb.Accuracy(error="none"),
     )
-    simulation = Simulation(scene, scene.build(), Solution(scene))
-    integrator = simulation.integrator
-    course = integrator.start()
-    for time in simulation.schedule.times[1:]:
-        integrator.advance(course, [time])
-    return integrator, course
+    return advanced(scene)
 
 
 def without_blocks(law, cells, lines, made):
@@ -85,12 +90,7 @@ def test_lengths_that_change_have_the_same_bits(monkeypatch, web, runs):
             observe=[refweb.Observe(**table) for table in (DEFLECTION, STRESS)],
             accuracy=refweb.Accuracy(error="none"),
         )
-        simulation = Simulation(scene, scene.build(), Solution(scene))
-        integrator = simulation.integrator
-        course = integrator.start()
-        for time in simulation.schedule.times[1:]:
-            integrator.advance(course, [time])
-        return integrator, course
+        return advanced(scene)
 
     def by_lines(law, cells, lines):
         places = np.arange(len(cells)) * lines.shape[1]
