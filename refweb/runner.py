@@ -384,7 +384,7 @@ def _cpu_by_effect(system, solution):
     state, share, scene = solution.state, {}, solution.scene
     calls = solution.solver["nfev"] or 0
     if scene.solve.kind == "dynamic":
-        calls *= 1.0 + solution.twin_steps / max(solution.solver["nsteps"] or 0, 1)
+        calls *= solution.steps_of_both
     for term in system.terms:
         if state is None:
             break

@@ -233,6 +233,11 @@ class SolutionData:
     passage: dict[str, Any] = field(default_factory=dict)
 
     @property
+    def steps_of_both(self) -> float:
+        """Steps of the run and of its step refinement, over those of the run; 1 in statics."""
+        return 1.0 + self.twin_steps / max(self.solver["nsteps"] or 0, 1)
+
+    @property
     def warnings(self) -> list[str]:
         """Texts of the findings, without the refusal that is in ``message``."""
         return texts(self.findings)

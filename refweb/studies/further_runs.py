@@ -117,7 +117,7 @@ class FurtherRuns:
         self.static = scene.solve.kind == "static"
         spent = clock.spent()
         first = max(spent["cpu_s"] - spent["compile_s"], 1e-3)
-        self._single = first / (1.0 + solution.twin_steps / max(solution.solver["nsteps"] or 0, 1))
+        self._single = first / solution.steps_of_both
         self.budget = budget_of(scene.accuracy.budget, first)
         self._compared = {None: (_results(solution), as_history(solution.columns, rows))}
 
